@@ -38,28 +38,16 @@ QUESTIONS = [
 ]  # fmt: skip
 _ENTRY = "?share irt:of_Effect ?effect ; irt:Energy ?energy"
 _OF_RUN = f"{_ENTRY} ; irt:share_of_Run ?run . ?run"
-_OF_EFFECT = (
-    "{ SELECT DISTINCT ?effect { ?total irt:total_of_Effect ?effect } } BIND(column:sum(irt:Energy, irt:of_Effect"
-)
-_IN = "AS ?energy_J) FILTER(BOUND(?energy_J))"
 _MONTH = "irt:Start_Time ?start BIND(SUBSTR(STR(?start), 1, 7) AS ?month)"
-SUMS = {  # of all entries of the ledgers; nothing holds them ready. Triple by triple, and by columns
-    "ledger by effect": (
-        f"?effect (SUM(?energy) AS ?energy_J) {{ {_ENTRY} }} GROUP BY ?effect",
-        f"?effect ?energy_J {{ {_OF_EFFECT}, ?effect) {_IN} }}",
-    ),
+SUMS = {  # of all entries of the ledgers; nothing holds them ready
+    "ledger by effect": f"?effect (SUM(?energy) AS ?energy_J) {{ {_ENTRY} }} GROUP BY ?effect",
     "ledger by robot and effect": (
-        f"?robot ?effect (SUM(?energy) AS ?energy_J) {{ {_OF_RUN} irt:run_of ?robot }} GROUP BY ?robot ?effect",
-        f"?robot ?effect ?energy_J {{ ?robot a irt:Industrial_Robot"
-        f" {_OF_EFFECT}, ?effect, 'irt:share_of_Run/irt:run_of', ?robot) {_IN} }}",
+        f"?robot ?effect (SUM(?energy) AS ?energy_J) {{ {_OF_RUN} irt:run_of ?robot }} GROUP BY ?robot ?effect"
     ),
     "ledger by month and effect": (
-        f"?month ?effect (SUM(?energy) AS ?energy_J) {{ {_OF_RUN} {_MONTH} }} GROUP BY ?month ?effect",
-        f"?month ?effect ?energy_J {{ {{ SELECT DISTINCT ?month {{ ?run {_MONTH} }} }}"
-        f" {_OF_EFFECT}, ?effect, 'irt:share_of_Run/irt:Start_Time/month', ?month) {_IN} }}",
+        f"?month ?effect (SUM(?energy) AS ?energy_J) {{ {_OF_RUN} {_MONTH} }} GROUP BY ?month ?effect"
     ),
 }
-BY_COLUMNS = ", by columns"
 KINDS = ("named.nq", "all.nt", "asserted.nt")  # of files: quads, their triples, and those that nobody inferred
 PATIENCE = 60  # s for one answer
 UPDATES = 200
@@ -106,10 +94,8 @@ def measure(name: str, folder: Path, files: dict[str, Path], small: Path) -> Res
         result["load named"] = {"failed": str(error)}
     for question in QUESTIONS:
         result["questions"][question] = _answer(engine, named_questions()[question].text)
-    for question, (plain, by_columns) in SUMS.items():
+    for question, plain in SUMS.items():
         result["questions"][question] = _answer(engine, f"PREFIX irt: <{IRT}> SELECT {plain}")
-        if isinstance(engine, Irtwin):
-            result["questions"][f"{question}{BY_COLUMNS}"] = _answer(engine, f"SELECT {by_columns}")
     result["update"] = _attempt(lambda: _updates(engine, files["all.nt"]))
     result["closure"] = _attempt(lambda: _closure(engine, small))
     result["memory_mb"] = most_used() / 2**20
@@ -238,7 +224,7 @@ def report(results: dict[str, Result], title: str) -> str:
             lambda result, kind=kind: timed(result[kind], lambda found: f" ({_shown(found['processor'])})"),
         )
     for question in ours["questions"]:
-        expected = ours["questions"][question.removesuffix(BY_COLUMNS)].get("rows")
+        expected = ours["questions"][question].get("rows")
         line(
             f"{question} ({len(expected or [])} rows)",
             lambda result, q=question, e=expected: timed(

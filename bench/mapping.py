@@ -1,5 +1,4 @@
-"""How long the mapping takes: 100,000 rows to 400,000 quads in the store, how much memory, and what ten changes cost:
-where all rows are read, and where the database notes which change.
+"""How long the mapping takes: 100,000 rows to 400,000 quads in the store, how much memory, and what ten changes cost.
 
 python bench/mapping.py [ROWS]
 """
@@ -19,7 +18,6 @@ from sqlalchemy import Engine
 from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.engine import open_engine
-from irtwin.storage.row_changes import keep_notes
 
 MAPPING = """
 @prefix rr: <http://www.w3.org/ns/r2rml#> .
@@ -60,20 +58,11 @@ def main(rows: int) -> None:
             started = time.perf_counter()
             store.bulk_extend(map_database(engine, [mapping]))
             print(f"into a store in {name}: {time.perf_counter() - started:.2f} s, {len(store)} quads")
-        print("all rows are read")
-        incremental(engine, database, mapping, Path(folder, "read"))
-        keep_notes(engine, ["reading"])
-        print("changes are noted")
-        incremental(engine, database, mapping, Path(folder, "noted"))
+        incremental(engine, database, mapping, Path(folder))
 
 
 def incremental(engine: Engine, database: Path, mapping: Path, folder: Path) -> None:
     """A first run into the graph on disk, one without changes, and one after ten: updates, inserts and deletions."""
-    folder.mkdir()
-    with sqlite3.connect(database) as connection:
-        started = time.perf_counter()
-        connection.execute("UPDATE reading SET state = state")
-        print(f"all rows written: {time.perf_counter() - started:.2f} s")
     changes = [
         *(f"UPDATE reading SET power = power - 1 WHERE number = {row}" for row in range(0, 4000, 1000)),
         "DELETE FROM reading WHERE number IN (SELECT number FROM reading WHERE number % 1000 = 1 LIMIT 3)",

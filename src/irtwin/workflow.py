@@ -386,7 +386,6 @@ def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
     """Bring the individuals up to date with the database."""
     files = graph.resources.of("mappings")
     seconds = LONGEST_SQL if any(file.is_extension for file in files) else math.inf
-    place.note_changes()
     refresh(graph, place.engine, [file.path for file in files], place.mapped_rows, seconds)
     with place.reading() as session:
         map_facts(graph, session)
@@ -442,9 +441,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
     announce(f"  {inferred.owl_rl} triples from {by}, {inferred.by_rules} from rules")
     if inferred.joined_by:
-        announce(
-            f"  reasoned over all robots together, because this statement concerns all of them: {inferred.joined_by}"
-        )
+        announce(f"  reasoned over all robots together, for this concerns all of them: {inferred.joined_by}")
     for contradiction, about in inferred.contradictions.items():
         announce(f"  about {', '.join(shorten(node, graph.base) for node in about)}: {contradiction}")
     announce("Checking the constraints")

@@ -10,10 +10,9 @@ from tests.trusting import trust_all
 
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check, check_mappings
-from irtwin.knowledge.locality import of_all_rules
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.resources import Resources, resources_of
+from irtwin.resources import resources_of
 from irtwin.storage.database import Workspace
 
 PREFIXES = """@prefix irt: <https://w3id.org/irtwin#> .
@@ -145,7 +144,6 @@ def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
         assert {"long run", "odd"} <= {rule.label for rule in all_rules(place.resources)}
         assert "long_runs" in named_questions(place.resources)
         assert "long_runs" not in named_questions()
-        assert not of_all_rules(Resources(place.resources.extensions)).unknown
 
 
 @pytest.mark.parametrize("command", [["query"], ["query", "robots"], ["explain", "?"], ["export", "--owl", "x.owl"]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -12,14 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import NamedNode, Quad, Triple
 from sqlalchemy import Engine
+from tests import small_fleet
 from tests.knowledge.test_mapping import PREFIXES
 
+from irtwin import workflow
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.knowledge.mapping.remembered import RememberedRows
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.storage.database import Workspace
 from irtwin.storage.engine import open_engine
+from irtwin.storage.staging import staged
 
 TABLES = """
 CREATE TABLE city (id INTEGER PRIMARY KEY, name VARCHAR, area NUMERIC(8, 2));
@@ -66,6 +70,8 @@ statements = st.one_of(
     st.tuples(st.just("UPDATE person SET city = ?"), st.tuples(st.integers(0, 3))),
 )
 SQL = tuple[str, Sequence[object]]
+ENDLESS_VIEW = """ALTER TABLE entries RENAME TO other; CREATE VIEW entries AS
+WITH RECURSIVE c(a) AS (SELECT 1 UNION ALL SELECT a + 1 FROM c) SELECT other.* FROM other, c"""
 
 
 class Place:
@@ -82,6 +88,10 @@ class Place:
         with sqlite3.connect(self.database) as connection:
             for sql, values in statements:
                 connection.execute(sql, values)
+
+    def alter_file(self, script: str) -> None:
+        with sqlite3.connect(self.file) as connection:
+            connection.executescript(script)
 
     def refresh(self) -> None:
         refresh(self.graph, self.engine, [self.document], self.file)
@@ -186,8 +196,21 @@ def test_a_row_that_others_stand_in_for_takes_nothing_with_it(place: Place) -> N
         lambda place: place.file.write_bytes(b"no database at all" * 100),
         lambda place: setattr(place, "graph", KnowledgeGraph()),
         lambda place: place.graph.replace([], f"{GRAPH_SOURCE}version"),
+        lambda place: place.alter_file("PRAGMA user_version = 0"),
+        lambda place: place.alter_file(ENDLESS_VIEW),
+        lambda place: place.alter_file("CREATE TRIGGER t AFTER INSERT ON kept_row BEGIN DELETE FROM kept_row; END"),
     ],
-    ids=["another document", "another table", "no file", "a broken file", "another graph", "a graph of another time"],
+    ids=[
+        "another document",
+        "another table",
+        "no file",
+        "a broken file",
+        "another graph",
+        "a graph of another time",
+        "an older file",
+        "a view that never ends",
+        "a trigger",
+    ],
 )
 def test_all_is_mapped_where_the_rows_are_not_the_graphs(
     place: Place, happens: Callable[[Place], object], full_runs: list[int]
@@ -255,3 +278,33 @@ def test_where_rows_cannot_be_remembered(place: Place, tmp_path: Path) -> None:
     place.file = tmp_path / "none" / "rows.db"
     with pytest.raises(InputError, match=r"rows\.db: cannot be written: unable to open"):
         place.refresh()
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
+def fleet(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Workspace]:
+    url = None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
+    with Workspace(tmp_path / "fleet", url) as place:
+        small_fleet.fill(place)
+        yield place
+
+
+def test_a_workspace_is_followed(fleet: Workspace) -> None:
+    documents = [file.path for file in fleet.resources.of("mappings")]
+    with KnowledgeGraph() as graph:
+        workflow.map_rows(fleet, graph)
+
+        def follow() -> None:
+            workflow.map_rows(fleet, graph)
+            made = KnowledgeGraph()
+            made.replace(map_database(fleet.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+            for name in {*made.graphs(GRAPH_SOURCE, GRAPH_ACTIVITY), *graph.graphs(GRAPH_SOURCE, GRAPH_ACTIVITY)}:
+                assert name == f"{GRAPH_SOURCE}version" or graph.triples(name) == made.triples(name)
+
+        with fleet.engine.begin() as connection:
+            connection.exec_driver_sql("UPDATE run_energy SET peak_power_w = 1 WHERE run_id = 'Arm_A.fit_1'")
+        follow()
+        with staged(fleet, "Arm_C") as apart, apart.engine.begin() as connection:
+            connection.exec_driver_sql("DELETE FROM run_energy")
+        follow()
+        fleet.drop_robot("Arm_B")
+        follow()

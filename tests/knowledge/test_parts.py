@@ -136,13 +136,12 @@ def anew(quads: Iterable[Quad]) -> KnowledgeGraph:
 
 
 def refused(*_: object) -> None:
-    raise parts.Joined
+    raise parts.Joined("for comparison")
 
 
 def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
     """Return what follows from the whole graph, taken as one part."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(parts, "join", lambda *_: "for comparison")
         patch.setattr(by_parts, "conclude", refused)
         copy = KnowledgeGraph()
         names = [name for name in graph.graphs() if not name.startswith((GRAPH_INFERRED, GRAPH_REASONED))]
@@ -279,6 +278,14 @@ def test_an_update_of_one_individual_is_followed() -> None:
     assert graph.changed(GRAPH_INFERRED)
     reason(graph)
     assert conclusions(graph) == as_one_part(graph)
+
+
+def test_nothing_in_the_place_of_nothing_has_nothing_done_anew() -> None:
+    graph = anew(FACTS)
+    before = graph.made_of()
+    assert before
+    graph.replace([], SOURCE + "/none")
+    assert graph.made_of() == before
 
 
 def test_another_ontology_has_all_done_anew() -> None:

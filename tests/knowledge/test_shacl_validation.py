@@ -1,14 +1,10 @@
-from random import Random
-
 import pytest
-from pyoxigraph import Literal, NamedNode, Quad, Triple
+from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
 
 from irtwin.knowledge import parts
-from irtwin.knowledge.parts import Ontology, Region
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl import validation
-from irtwin.knowledge.shacl.suspects import any_suspect
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
@@ -225,40 +221,16 @@ def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], ch
     assert len(graph.triples(GRAPH_VALIDATION)) == 2
 
 
-def test_near_a_change_the_same_is_suspected_as_in_all_of_a_part(two_robots: list[Quad]) -> None:
-    graph, draw = reasoned(two_robots), Random(3)
-    ontology = Ontology.of(graph)
-    part = parts.around(graph, ontology, [NamedNode(individual("robot", "Arm_A"))])
-    said = sorted(part.asserted, key=str)
-    types, values = ([one for one in said if (one.predicate.value == RDF + "type") is typed] for typed in (True, False))
-    others = [Literal(-1.0), Literal(float("nan")), Literal("x"), *(one.object for one in values)]
-    shapes = validation._shapes(frozenset(ontology.triples), graph.resources.of("shapes"))
-    outcomes = []
-    for _ in range(16):
-        gone = draw.choice(draw.choice((types, values)))
-        come = {
-            Triple(gone.subject, draw.choice(values).predicate, draw.choice(others)) for _ in range(draw.randrange(2))
-        }
-        ends = {gone.subject, *(one.object for one in come | {gone} if one.predicate.value != RDF + "type")}
-        nodes = {one for one in ends if isinstance(one, NamedNode)} - ontology.terms
-        now = Region(part.nodes | nodes, (part.asserted - {gone}) | come)
-        suspected = any_suspect(*shapes.store_of(ontology.triples | now.asserted), now.nodes)
-        assert validation._is_clear(ontology, now, nodes) is not suspected, (gone, come)
-        outcomes.append(suspected)
-    assert 2 < sum(outcomes) < 14
-
-
-def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl_nor_asked_of_all(
-    two_robots: list[Quad], checked: list[set[str]]
+def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl(
+    two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = reasoned(two_robots)
     assert validate(graph) == ()
-    checked.clear()
+    monkeypatch.setattr(validation.pyshacl, "validate", None)
     longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
     graph.change(set(two_robots) - set(longer), set(longer) - set(two_robots))
     reason(graph)
     assert validate(graph) == ()
-    assert checked == []
 
 
 def test_what_was_not_reasoned_over_is_checked_whole(two_robots: list[Quad], checked: list[set[str]]) -> None:

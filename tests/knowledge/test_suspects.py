@@ -5,7 +5,6 @@ import pytest
 import rdflib
 from pyoxigraph import Quad, RdfFormat, Store, parse
 
-from irtwin.knowledge.locality import ANY
 from irtwin.knowledge.shacl.of_ontology import with_ontology
 from irtwin.knowledge.shacl.suspects import any_suspect, queries
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -59,7 +58,7 @@ DATA = [
 def test_what_breaks_a_constraint_is_suspected(said: str) -> None:
     shapes = f"{PREFIXES} ex:shape a sh:NodeShape ; sh:targetClass ex:C ; {said}"
     below = {quad.triple for quad in parse(f"{PREFIXES} ex:D rdfs:subClassOf ex:C .", format=RdfFormat.TURTLE)}
-    asked = queries((quad.triple for quad in parse(shapes, format=RdfFormat.TURTLE)), below)
+    asked = list(queries((quad.triple for quad in parse(shapes, format=RdfFormat.TURTLE)), below))
     kept = 0
     for some in DATA:
         data = f"{PREFIXES} ex:D rdfs:subClassOf ex:C . ex:x a ex:D . {some}"
@@ -72,27 +71,10 @@ def test_what_breaks_a_constraint_is_suspected(said: str) -> None:
     assert kept or said in (SHAPES["two"], SHAPES["list of numbers"], *UNKNOWN)
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_a_shape_that_may_look_beyond_its_neighbours_is_asked_of_all(name: str) -> None:
-    shapes = f"{PREFIXES} ex:shape a sh:NodeShape ; sh:targetClass ex:C ; {SHAPES[name]}"
-    asked = queries((quad.triple for quad in parse(shapes, format=RdfFormat.TURTLE)), ())
-    assert bool(asked.far) == (name == "query" or SHAPES[name] in UNKNOWN or name in ("two", "list of numbers"))
-    read = {"http://www.w3.org/1999/02/22-rdf-syntax-ns#type", "https://example.org/p"} if name == "query" else {ANY}
-    assert asked.read == (read if asked.far else set())
-
-
-def test_values_that_are_held_to_what_their_own_values_are_make_a_shape_look_far() -> None:
-    nested = "sh:property [ sh:path ex:p ; sh:node [ sh:property [ sh:path ex:q ; sh:class ex:D ] ] ] ."
-    shapes = f"{PREFIXES} ex:shape a sh:NodeShape ; sh:targetClass ex:C ; {nested}"
-    asked = queries((quad.triple for quad in parse(shapes, format=RdfFormat.TURTLE)), ())
-    assert len(asked.far) == 1
-    assert not asked.near
-
-
 def test_each_shape_that_ships_is_known():
     graph = KnowledgeGraph()
     graph.load_ontology()
     by_hand = [triple for file in graph.resources.of("shapes") for triple in read_turtle(file.path)]
-    asked = queries(with_ontology(by_hand, graph.triples()), ())
-    assert len(asked.near) > 200
-    assert ANY not in asked.read, "it would show each graph to pySHACL"
+    asked = list(queries(with_ontology(by_hand, graph.triples()), ()))
+    assert len(asked) > 200
+    assert not any("FILTER(!COALESCE(false, false))" in text for text in asked), "it would show each graph to pySHACL"

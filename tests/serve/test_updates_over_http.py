@@ -40,14 +40,6 @@ def test_who_has_the_token_writes_and_reads_it_at_once(writable) -> None:
         assert [values(writable) for _ in range(4)] == [[str(number)]] * 4
 
 
-def test_sums_by_columns_are_of_what_was_written(writable) -> None:
-    ask = "SELECT (column:sum(<http://e/joules>, <http://e/of>, 1) AS ?o) {}"
-    for number in range(1, 3):
-        writable.update(f"INSERT DATA {{ <http://e/{number}> <http://e/joules> {number} ; <http://e/of> 1 }}")
-        found = [writable.ask(ask).json()["results"]["bindings"][0]["o"]["value"] for _ in range(4)]
-        assert [float(value) for value in found] == [number * (number + 1) / 2] * 4
-
-
 @pytest.mark.parametrize(
     ("authorization", "status"),
     [(None, 401), ("Bearer wrong", 401), ("Bearer", 401), ("Basic YS10b2tlbi1mb3ItdGVzdHM6", 401), ("Bearer é", 401)],

@@ -47,6 +47,7 @@ from irtwin.storage.revisions.versions import (
     r0017_metered_loads,
     r0018_asserted_facts,
     r0019_simulators,
+    r0020_no_notes,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -179,6 +180,7 @@ def test_each_revision_follows_another() -> None:
     assert r0017_metered_loads.down_revision == r0015_supply_states.revision
     assert r0018_asserted_facts.down_revision == r0017_metered_loads.revision
     assert r0019_simulators.down_revision == r0018_asserted_facts.revision
+    assert r0020_no_notes.down_revision == r0019_simulators.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -353,6 +355,17 @@ def test_killed_ten_times_at_any_moment_it_leaves_old_or_new_tables(tmp_path: Pa
 def said(place: Workspace) -> list[tuple[object, ...]]:
     with place.engine.connect() as connection:
         return [tuple(row) for row in connection.execute(text("SELECT * FROM run ORDER BY run_id"))]
+
+
+def test_triggers_that_noted_changes_go(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, place.engine.begin() as connection:
+        connection.execute(text("CREATE TABLE row_change (number INTEGER PRIMARY KEY, table_name TEXT)"))
+        note = "INSERT INTO row_change (table_name) VALUES ('run')"
+        connection.execute(text(f"CREATE TRIGGER irtwin_noted_run_insert AFTER INSERT ON run BEGIN {note}; END"))
+        connection.execute(text("UPDATE alembic_version SET version_num = '0019'"))
+    with Workspace(tmp_path) as place, place.engine.connect() as connection:
+        assert connection.execute(text("SELECT name FROM sqlite_master WHERE type = 'trigger'")).all() == []
+        assert not inspect(connection).has_table("row_change")
 
 
 def test_a_workspace_of_a_newer_irtwin_is_refused(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from sqlalchemy import Engine, create_engine
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.storage.row_changes import keep_notes, noted_tables
 
 pytestmark = pytest.mark.system
 
@@ -155,90 +154,3 @@ def test_only_what_changed(new_postgresql_database: Callable[[], str], tmp_path:
         made = KnowledgeGraph()
         made.replace(map_database(engine, [document]), "https://w3id.org/irtwin/graph/source/")
         assert graph.triples("https://w3id.org/irtwin/graph/source/things") == made.triples()
-
-
-NOTED = """
-<#R> rr:logicalTable [ rr:tableName "r" ] ; rr:subjectMap [ rr:template "http://example.com/{id}/{n}" ; rr:graph g:r ] ;
-    rr:predicateObjectMap [ rr:predicate ex:p ; rr:objectMap [ rr:column "v" ] ] .
-<#S> rr:logicalTable [ rr:sqlQuery "SELECT n, SUM(v) AS v FROM r GROUP BY n" ] ;
-    rr:subjectMap [ rr:template "http://example.com/{n}" ; rr:graph g:r ] ;
-    rr:predicateObjectMap [ rr:predicate ex:p ; rr:objectMap [ rr:column "v" ] ] .
-"""
-
-
-def noted(url: str, folder: Path) -> tuple[Engine, Path]:
-    """Return a database of 50 rows whose changes are noted, and a mapping of them."""
-    engine, document = create_engine(url), folder / "a.r2rml.ttl"
-    document.write_text(PREFIXES + NOTED)
-    run(
-        engine,
-        "CREATE TABLE r (id varchar, n int, v float, PRIMARY KEY (id, n))",
-        "INSERT INTO r SELECT i::text, i % 3, i FROM generate_series(1, 50) i",
-    )
-    keep_notes(engine, ["r"])
-    return engine, document
-
-
-def test_noted_rows_are_mapped(new_postgresql_database: Callable[[], str], tmp_path: Path) -> None:
-    engine, document = noted(new_postgresql_database(), tmp_path)
-    run(engine, "CREATE ROLE guest", "GRANT ALL ON r TO guest")
-    graph = KnowledgeGraph()
-
-    def follow() -> None:
-        refresh(graph, engine, [document], tmp_path / "rows.db")
-        made = KnowledgeGraph()
-        made.replace(map_database(engine, [document]), "https://w3id.org/irtwin/graph/source/")
-        assert graph.triples("https://w3id.org/irtwin/graph/source/r") == made.triples()
-
-    follow()
-    with engine.connect() as connection:
-        assert set(noted_tables(connection)) == {"r"}
-    for change in (
-        "UPDATE r SET v = 7 WHERE id = '3'",
-        "DELETE FROM r WHERE v > 40",
-        "UPDATE r SET id = 'x', n = n + 1 WHERE id = '4'",
-        "INSERT INTO r VALUES ('x', 2, 1) ON CONFLICT (id, n) DO UPDATE SET v = 9",
-        "SET LOCAL ROLE guest; UPDATE r SET v = 2 WHERE id = '5'",
-        "SET LOCAL session_replication_role = replica; UPDATE r SET v = 3 WHERE id = '5'",
-        "ALTER TABLE r DISABLE TRIGGER ALL; UPDATE r SET v = 4 WHERE id = '5'; ALTER TABLE r ENABLE ALWAYS TRIGGER "
-        "irtwin_noted_update_from; ALTER TABLE r ENABLE ALWAYS TRIGGER irtwin_noted_update_to",
-        "ALTER TABLE r ALTER COLUMN v TYPE int USING v * 2",
-        "TRUNCATE r",
-        "INSERT INTO r SELECT i::text, i % 3, i FROM generate_series(1, 6000) i",
-    ):
-        run(engine, change)
-        follow()
-        keep_notes(engine, ["r"])
-    with engine.connect() as late:  # its transaction began first and ends last
-        late.exec_driver_sql("UPDATE r SET v = 11 WHERE id = '6'")
-        run(engine, "UPDATE r SET v = 12 WHERE id = '7'")
-        follow()
-        late.commit()
-    follow()
-    engine.dispose()
-
-
-def test_a_role_that_may_only_read_the_rows(new_postgresql_database: Callable[[], str], tmp_path: Path) -> None:
-    engine, document = noted(new_postgresql_database(), tmp_path)
-    run(engine, "CREATE ROLE reader LOGIN", "GRANT SELECT ON r TO reader", "DELETE FROM r WHERE id <> '1'")
-    reader = create_engine(engine.url.set(username="reader"))
-    graph = KnowledgeGraph()
-    for value in (1, 2):
-        run(engine, f"UPDATE r SET v = {value}")
-        keep_notes(reader, ["r"])
-        refresh(graph, reader, [document], tmp_path / "rows.db")
-        assert {str(it.object)[1] for it in graph.triples("https://w3id.org/irtwin/graph/source/r")} == {str(value)}
-    reader.dispose()
-    engine.dispose()
-
-
-def test_old_notes_go(new_postgresql_database: Callable[[], str]) -> None:
-    engine = create_engine(new_postgresql_database())
-    run(engine, "CREATE TABLE r (id int PRIMARY KEY)")
-    keep_notes(engine, ["r"])
-    for begin in range(0, 120_000, 5_000):
-        run(engine, f"INSERT INTO r SELECT * FROM generate_series({begin}, {begin + 4_999})")
-    keep_notes(engine, ["r"])
-    with engine.connect() as connection:
-        assert 50_000 <= connection.exec_driver_sql("SELECT count(*) FROM row_change").scalar_one() <= 55_000
-    engine.dispose()

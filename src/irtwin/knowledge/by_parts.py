@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from collections.abc import Set as AbstractSet
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -21,8 +20,8 @@ from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.owl_rl.beside import Beside, Equality
-from irtwin.knowledge.owl_rl.closure import Contradiction
-from irtwin.knowledge.parts import Borders, Joined, Name, Ontology, Region
+from irtwin.knowledge.owl_rl.closure import Contradiction, show
+from irtwin.knowledge.parts import EQUALITIES, TYPE, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
@@ -62,7 +61,7 @@ class Changes:
     def take(self, change: Change) -> None:
         """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
         if has_blank_node(change.removed | change.added):
-            raise Joined
+            raise Joined("a node without a name")
         self.removed |= change.removed
         self.added |= change.added
         self.names.update(map(graph_of, change.removed | change.added))
@@ -89,7 +88,7 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | 
     Raises Joined where parts bear on each other.
     """
     if ontology.schema.unfit is not None:
-        raise Joined
+        raise Joined(ontology.schema.unfit)
     changes, minted = Changes(graph, seeds is None), set[Name]()
     if seeds is None:
         found = each_part.of_each(graph, ontology, changes_of)
@@ -98,7 +97,7 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | 
     with closing(found):
         for change in found:
             if not minted.isdisjoint(change.minted) or any(graph.about(node) for node in change.minted):
-                raise Joined
+                raise Joined("what rules conclude of several robots, and the ontology does not name")
             minted |= change.minted
             changes.take(change)
     return changes
@@ -120,47 +119,55 @@ def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[Change]:
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
-    """Conclude of some parts as of one; of a part that contradicts itself all but what follows from the clash."""
+    """Conclude of some parts as of one; of a part that Beside does not take all but what follows from a clash."""
     region = regions[0] if len(regions) == 1 else parts.one(regions)
-    try:
-        yield region, _conclude_of_one(ontology, region)
-    except Contradiction as clash:
-        if len(regions) == 1:
-            yield region, _contained(ontology, region, clash)
-            return
-        for alone in regions:
-            yield from _conclude(ontology, [alone])
-
-
-def _conclude_of_one(ontology: Ontology, region: Region, aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
     if not region.nodes:
-        return Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
+        yield region, Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
+        return
     if not region.asserted:
-        return Conclusions()
-    borders = ontology.borders  # numbers terms, so it comes before facts take numbers of their own
+        yield region, Conclusions()
+        return
+    _refuse_crossing(ontology, region.asserted)
     try:
-        asserted = region.asserted - aside
-        closure = Beside(ontology.schema, asserted)
-        _check(borders, closure)
-        found = by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure, aside)
-        _check(borders, closure)
-    except Equality as same:
-        raise Joined from same
-    return found
+        found = _beside(ontology, region.asserted)
+    except (Contradiction, Equality):
+        if len(regions) > 1:
+            for alone in regions:
+                yield from _conclude(ontology, [alone])
+            return
+        found = _alone(ontology, region.asserted)
+    _refuse_crossing(ontology, found.concluded())
+    yield region, found
 
 
-def _check(borders: Borders, closure: Beside) -> None:
-    if borders.crossed_by(closure):
-        raise Joined
+def _refuse_crossing(ontology: Ontology, said: Iterable[Triple]) -> None:
+    """Raise Joined for a statement that concerns all parts."""
+    properties, classes = ontology.models
+    for it in said:
+        is_of_models = it.predicate in properties or (it.predicate == TYPE and it.object in classes)
+        if is_of_models or it.subject in ontology.terms:
+            raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
 
 
-def _contained(ontology: Ontology, region: Region, clash: Contradiction) -> Conclusions:
+def _beside(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
+    """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
+    if any(it.predicate in EQUALITIES for it in asserted):
+        raise Equality
+    closure = Beside(ontology.schema, asserted)
+    return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)
+
+
+def _alone(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
     """Conclude of a part without what clashes; nothing of a part whose clashes have no end."""
-    robots = parts.spoken_for(ontology, region.asserted)
+    conclude = partial(infer, ontology, asserted)
+    robots = parts.spoken_for(ontology, asserted)
     try:
-        aside, _ = contain(clash, ontology.triples, region.asserted, partial(infer, ontology, region.asserted))
-        found = _conclude_of_one(ontology, region, aside.statements | aside.conclusions)
+        try:
+            found = conclude()
+        except Contradiction as clash:
+            aside, found = contain(clash, ontology.triples, asserted, conclude)
+            found.made_by = aside.notes(robots)
     except Contradiction as endless:
         return Conclusions(made_by={Triple(robot, CONTRADICTION, Literal(str(endless))) for robot in robots})
-    found.made_by = aside.notes(robots)
+    found.contents[GRAPH_OWL_RL] = found.contents[GRAPH_OWL_RL] - ontology.schema.kept
     return found

@@ -9,13 +9,12 @@ from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Self
 
 from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
-from irtwin.knowledge import parts
 from irtwin.knowledge.engines import NATIVE
-from irtwin.knowledge.locality import read_by_rules
 from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
@@ -29,12 +28,11 @@ from irtwin.resources import Files, Resources, folder
 
 @dataclass
 class Conclusions:
-    """What was concluded, by the IRIs of named graphs; what it was made of; by whom; what makes the graph one part."""
+    """What was concluded, by the IRIs of named graphs; what it was made of; by whom."""
 
     contents: dict[str, set[Triple]] = field(default_factory=dict)
     made_of: dict[object, NamedNode] = field(default_factory=dict)
     made_by: set[Triple] = field(default_factory=set)
-    joined_by: str | None = None
 
     def concluded(self) -> set[Triple]:
         """Return the triples of all the named graphs."""
@@ -65,16 +63,15 @@ def by_rules(
 
     With a closure of it, rules and closure conclude in turn; what is set aside is concluded by neither.
     """
-    resources = ontology.resources
 
     def close(found: set[Triple]) -> Iterable[Triple]:
         if closure is None:
             return ()
         closure.add(found - aside)
-        return read_by_rules(resources, closure.worth_keeping())
+        return closure.worth_keeping()
 
-    seen = read_by_rules(resources, known, closure.worth_keeping() if closure else ())
-    found = Conclusions(running.conclusions(seen, all_rules(resources), close)).without(aside)
+    seen = chain(known, closure.worth_keeping() if closure else ())
+    found = Conclusions(running.conclusions(seen, all_rules(ontology.resources), close)).without(aside)
     if closure is not None:
         found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
     return found
@@ -82,13 +79,9 @@ def by_rules(
 
 def infer(ontology: Ontology, premises: set[Triple], aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
     """Conclude from the ontology and some parts of the graph, without what is set aside, whoever says it."""
-    closure = Closure(ontology.triples)
-    count = len(closure)
     asserted = premises - aside
-    closure.add(asserted)
-    found = by_rules(ontology, ontology.triples | asserted, closure, aside)
-    found.joined_by = parts.join(ontology, closure, count)
-    return found
+    closure = Closure(ontology.triples | asserted)
+    return by_rules(ontology, ontology.triples | asserted, closure, aside)
 
 
 def content_name(triples: Iterable[Triple], resources: Resources, engine: str = NATIVE) -> NamedNode:

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 from irtwin.knowledge import parts
 from irtwin.knowledge.part_worker import Told, Worker
-from irtwin.knowledge.parts import MOST_TOGETHER, Joined, Name, Ontology, Region, Seen
+from irtwin.knowledge.parts import MOST_TOGETHER, Name, Ontology, Region, Seen
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import view
 
@@ -30,8 +30,6 @@ Work = Callable[[Ontology, list[Region]], Iterator[Made]]  # with some parts tog
 def of_these(ontology: Ontology, regions: Iterable[Region | None], work: Work[Made]) -> Generator[Made, None, None]:
     """Yield what some work makes of some parts. Raises Joined where they are not parts, and what the work raises."""
     for some in parts.together(regions):
-        if some is None:
-            raise Joined
         yield from work(ontology, some)
 
 

@@ -18,7 +18,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from irtwin.knowledge import parts
 from irtwin.knowledge.garbage import seldom_collected
-from irtwin.knowledge.parts import Joined, Name, Ontology, Region, Seen
+from irtwin.knowledge.parts import Name, Ontology, Region, Seen
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.resources import Resources
 
@@ -110,8 +110,6 @@ def _answer(
 
     try:
         for some in parts.together(regions()):
-            if some is None:
-                raise Joined
             made += told.work(ontology, some)
     except Exception as error:  # raised where it was asked for
         error.add_note(traceback.format_exc())

@@ -3,15 +3,9 @@
 All parts have the ontology in common: its triples, and the terms that they speak of. Any other subject or object, but
 for literals and classes, is a node of one part: a robot with its joints, runs and twins is one.
 
-A conclusion is drawn from facts that rules join by common nodes. Those of one part are joined by a node of that part or
-through the ontology, so what is concluded of all parts is what is concluded of each beside the ontology, as long as
-
-- a part says nothing of the ontology's terms alone, and nothing leads from one of these to a node of a part;
-- a part does not model: no subclasses, properties, equalities, lists, keys or datatypes of its own;
-- a part has nothing from the ontology, and no literal, for object of an inverse functional property or of a predicate
-  that rules follow backward, and no predicate that rules look for anywhere (see `locality`).
-
-`join` finds a statement that is against this, and then the graph is one part. It is asked of all that is concluded.
+What is concluded of a part, and which constraints it breaks, is what follows from it beside the ontology: a rule or
+constraint sees one part at a time. Where something but the ontology says more of its terms, or models (subclasses,
+properties, equalities, lists, keys of its own), or nodes have no name, the graph is one part.
 """
 
 from __future__ import annotations
@@ -27,13 +21,9 @@ import numpy as np
 import numpy.typing as npt
 from pyoxigraph import BlankNode, NamedNode, Quad, Triple
 
-from irtwin.knowledge import kept_reach, locality
-from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.beside import Beside
-from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.rules import Fact, Number
-from irtwin.knowledge.owl_rl.schema import Key, Schema
+from irtwin.knowledge.owl_rl.schema import Schema
+from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.changes import is_asserted
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
@@ -54,10 +44,9 @@ Row = tuple[Any, Any, Any, NamedNode]  # subject, predicate, object, and the nam
 MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
 MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
 
-_TYPE = NamedNode(RDF + "type")
-_INVERSE_FUNCTIONAL = NamedNode(OWL + "InverseFunctionalProperty")
+TYPE = NamedNode(RDF + "type")
+EQUALITIES = {NamedNode(OWL + name) for name in ("sameAs", "differentFrom")}
 _ROBOT = NamedNode(term("Industrial_Robot"))
-_HAS_KEY = NamedNode(OWL + "hasKey")
 _NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
@@ -67,7 +56,7 @@ _ONTOLOGIES: WeakKeyDictionary[KnowledgeGraph, tuple[int, Ontology]] = WeakKeyDi
 
 
 class Joined(Exception):
-    """A part bears on others."""
+    """A part bears on others: by what, in words."""
 
 
 class Ontology:
@@ -77,8 +66,7 @@ class Ontology:
         self.resources = graph.resources
         self.triples = graph.triples(GRAPH_ONTOLOGY)
         self.terms: set[object] = {term for triple in self.triples for term in triple}
-        with kept_reach.kept(graph.folder):
-            self.terms.update(map(NamedNode, locality.of_all_rules(graph.resources).terms))
+        self.terms.update(NamedNode(rule.name) for rule in all_rules(graph.resources) if rule.name != rule.label)
 
     @classmethod
     def of(cls, graph: KnowledgeGraph) -> Ontology:
@@ -94,13 +82,14 @@ class Ontology:
         return _schema(frozenset(self.triples))
 
     @cached_property
-    def borders(self) -> Borders:
-        """What a part, closed beside the schema, must not say."""
-        return Borders(self, self.schema.closure)
+    def models(self) -> tuple[set[NamedNode], set[NamedNode]]:
+        """The properties and the classes by whose use a part would say what is to be concluded of others."""
+        properties, classes = (set(map(NamedNode, some)) for some in program().terms_of_models())
+        return properties - EQUALITIES, classes
 
     def nodes(self, triple: Triple) -> list[Name]:
         """Return the nodes of parts that a triple speaks of."""
-        ends = (triple.subject,) if triple.predicate == _TYPE else (triple.subject, triple.object)
+        ends = (triple.subject,) if triple.predicate == TYPE else (triple.subject, triple.object)
         return [end for end in ends if isinstance(end, NamedNode | BlankNode) and end not in self.terms]
 
 
@@ -130,7 +119,7 @@ class Region:
                 self.concluded.add(Quad(subject, predicate, object, graph))
                 if place == _NOTED:
                     continue
-            if type(object) in _NAMES and predicate != _TYPE and object not in terms:
+            if type(object) in _NAMES and predicate != TYPE and object not in terms:
                 found.add(object)
         for graph, count in counts.items():
             self.read[_kind(graph.value)] += count
@@ -214,7 +203,7 @@ class Seen:
 
 def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
     """Return the robots of a graph, by name."""
-    return sorted(graph.subjects(_TYPE, _ROBOT) - ontology.terms, key=str)
+    return sorted(graph.subjects(TYPE, _ROBOT) - ontology.terms, key=str)
 
 
 def left(graph: KnowledgeGraph, ontology: Ontology, held: Counter[str], seen: Seen) -> Iterator[Region | None]:
@@ -238,13 +227,15 @@ def held(graph: KnowledgeGraph) -> Counter[str]:
     return counts
 
 
-def together(regions: Iterable[Region | None]) -> Iterator[list[Region] | None]:
-    """Yield parts, small ones some at a time, so that what is done for the ontology is done once for these."""
+def together(regions: Iterable[Region | None]) -> Iterator[list[Region]]:
+    """Yield parts, small ones some at a time, so that what is done for the ontology is done once for these.
+
+    Raises Joined where they are not parts.
+    """
     some, size = list[Region](), 0
     for region in regions:
         if region is None:
-            yield None
-            return
+            raise Joined("a graph beside the ontology's says more of its terms")
         if not region.nodes:  # that of the ontology alone
             yield [region]
             continue
@@ -322,7 +313,7 @@ def robots_about(ontology: Ontology, triples: Iterable[Triple], some: Iterable[T
 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return the robots of a part."""
-    found = {node for one in part if (one.predicate, one.object) == (_TYPE, _ROBOT) for node in ontology.nodes(one)}
+    found = {node for one in part if (one.predicate, one.object) == (TYPE, _ROBOT) for node in ontology.nodes(one)}
     return sorted(found, key=str)
 
 
@@ -330,79 +321,6 @@ def spoken_for(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return who stands for a part: its robots; where it has none, its first node."""
     said = list(part)
     return robots(ontology, said) or [min((node for one in said for node in ontology.nodes(one)), key=str)]
-
-
-def join(ontology: Ontology, closure: Closure, count: int) -> str | None:
-    """Return a statement that may bear on several parts, in words; None where there is none.
-
-    closure: of the ontology, `count` statements, and then of some parts.
-    """
-    return Borders(ontology, closure).crossed(closure, count)
-
-
-class Borders:
-    """What a part must not say, by the numbers of a closure that holds the ontology."""
-
-    def __init__(self, ontology: Ontology, closure: Closure):
-        reach = locality.of_all_rules(ontology.resources)
-        number, facts = closure.terms.number, closure.facts
-        properties, classes = program().terms_of_models()
-        self._everywhere = min(reach.unknown) if reach.unknown else None
-        self._type, self._has_key = number(_TYPE), number(_HAS_KEY)
-        self._terms = {number(term) for term in ontology.terms}  # type: ignore[arg-type]
-        self._forbidden = {number(NamedNode(iri)) for iri in properties | reach.anywhere}
-        self._kinds = {number(NamedNode(iri)) for iri in classes}
-        self._datatypes = {number(NamedNode(iri)) for iri in datatypes.names()}
-        self._backward = {number(NamedNode(iri)) for iri in reach.backward}
-        self._backward |= facts.subjects.get(self._type, {}).get(number(_INVERSE_FUNCTIONAL), set())
-
-    def crossed(self, closure: Closure, count: int = 0) -> str | None:
-        """Return a statement that `closure` knows beside the first `count`, and that crosses a border, in words."""
-        if self._everywhere is not None:
-            return self._everywhere
-        if closure.facts.objects.get(self._has_key):
-            return "owl:hasKey"
-        crossing = (fact for fact in closure.since(count) if self._joins(fact, closure.terms.literals))
-        return next(map(closure.in_words, crossing), None)
-
-    def crossed_by(self, closure: Beside) -> bool:
-        """Whether facts that are closed beside the ontology say what crosses a border, as `crossed` has it."""
-        if self._everywhere is not None:
-            return True
-        literals = closure.terms.literals
-        return any(self._join(key, found, literals) for key, found in closure.known.items())
-
-    def _join(self, key: Key, found: set[Any], literals: set[Number]) -> bool:
-        """Whether facts do what `_joins` asks of each."""
-        predicate, end = key if isinstance(key, tuple) else (key, None)
-        subjects = found if end is not None else {one for one, _ in found}
-        objects = {end} if end is not None else {other for _, other in found}
-        if predicate == self._type and objects <= self._datatypes:
-            subjects = subjects - literals  # of values, the same in every part
-        if not subjects:
-            return False
-        if not (subjects.isdisjoint(literals) and subjects.isdisjoint(self._terms | self._datatypes)):
-            return True
-        if not objects.isdisjoint(self._datatypes - self._terms):
-            return True
-        if predicate == self._type:
-            return not objects.isdisjoint(self._kinds)
-        if predicate in self._backward and not (objects.isdisjoint(self._terms) and objects.isdisjoint(literals)):
-            return True
-        return predicate in self._forbidden
-
-    def _joins(self, fact: Fact, literals: set[Number]) -> bool:
-        subject, predicate, object = fact
-        if subject in literals:
-            return not (predicate == self._type and object in self._datatypes)  # of a value, the same in every part
-        if subject in self._terms:
-            return True
-        of_ontology = object in self._terms
-        if subject in self._datatypes or (object in self._datatypes and not of_ontology):
-            return True  # all parts would be told of its values
-        if predicate == self._type:
-            return object in self._kinds
-        return predicate in self._forbidden or (predicate in self._backward and (of_ontology or object in literals))
 
 
 @lru_cache(maxsize=1)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -58,7 +57,7 @@ WHERE {{
 class Inferences:
     """How many triples OWL 2 RL and the rules concluded, and the IRIs of the named graphs that changed.
 
-    `joined_by` is a statement that makes the graph one part, so that all of it was reasoned over; None where none is.
+    `joined_by` says what makes the graph one part, so that all of it was reasoned over; None where nothing does.
     `set_aside` are the IRIs of whom statements are about that contradict each other, and of their robots, and which
     these are.
     """
@@ -93,10 +92,12 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
     if engine != NATIVE:
         return _reason_over_all(graph, ontology, changed, engine)
     try:
-        if changed is not None:
-            with suppress(Joined):
-                return _by_parts(graph, ontology, changed)
-        return _reason_over_all(graph, ontology, changed)
+        if changed is None:
+            return _reason_over_all(graph, ontology, changed)
+        try:
+            return _by_parts(graph, ontology, changed)
+        except Joined as joined:
+            return _reason_over_all(graph, ontology, changed, joined_by=str(joined))
     except Contradiction as clash:
         graph.replace([Quad(_OWL_RL, CONTRADICTION, Literal(str(clash)), NamedNode(GRAPH_REASONED))], GRAPH_REASONED)
         raise
@@ -149,7 +150,11 @@ def _grown(before: Counter[str], by: Counter[str]) -> Counter[str]:
 
 
 def _reason_over_all(
-    graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | None, engine: str = NATIVE
+    graph: KnowledgeGraph,
+    ontology: Ontology,
+    changed: set[Quad] | None,
+    engine: str = NATIVE,
+    joined_by: str | None = None,
 ) -> Inferences:
     premises = asserted(graph)
     everything = content_name(premises, ontology.resources, engine)
@@ -163,8 +168,7 @@ def _reason_over_all(
         found = _infer_without_contradiction(ontology, premises - ontology.triples)
     else:
         found = _infer_by(engine, ontology, premises)
-    in_parts = engine == NATIVE and changed is not None and not found.joined_by
-    found.made_of[_OWL_RL] = content_name(ontology.triples, ontology.resources) if in_parts else everything
+    found.made_of[_OWL_RL] = everything
     found.made_by.add(_made_by(engine))
     new = found.quads()
     noted = notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
@@ -174,7 +178,7 @@ def _reason_over_all(
         graph.change(changed or (), ())
     else:
         graph.change((old - new) | (changed or set()), (new - old) | noted)
-    return _count(graph, map(graph_of, new ^ old), found.joined_by)
+    return _count(graph, map(graph_of, new ^ old), joined_by)
 
 
 def _made_by(engine: str) -> Triple:

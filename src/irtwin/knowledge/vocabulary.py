@@ -14,7 +14,6 @@ PROVIDER = f"{ONTOLOGY}/provider/"
 REASONER = f"{ONTOLOGY}/reasoner/"
 LIMIT = f"{ONTOLOGY}/limit/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
-COLUMN = f"{ONTOLOGY}/column/"  # likewise
 ID = DEFAULT  # individuals of a workspace that has no base of its own
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
@@ -35,7 +34,6 @@ PREFIXES = {
     "provider": PROVIDER,
     "reasoner": REASONER,
     "series": SERIES,
-    "column": COLUMN,
     "id": ID,
     "rdf": RDF,
     "rdfs": RDFS,

@@ -77,7 +77,6 @@ class ShownRuns:
 
     def refresh(self) -> None:
         """Bring the graph up to date with the database."""
-        self._place.note_changes()
         refresh(self._graph, self._place.engine, self._documents, self._place.mapped_rows)
 
     def _quads_of(self, run_id: str) -> set[Quad]:

@@ -20,7 +20,6 @@ from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import migrate, stamp
 from irtwin.storage.package_tables import package_tables
-from irtwin.storage.row_changes import keep_notes
 from irtwin.storage.row_rules import check_rows
 from irtwin.storage.rows import (
     base_of,
@@ -159,10 +158,6 @@ class Workspace:
     def mapped_rows(self) -> Path:
         """Where the mapping remembers the rows that the graph was made of."""
         return self.folder / "mapped_rows.db"
-
-    def note_changes(self) -> None:
-        """Have each change of a row noted from now on, so that a mapping need not read them all again."""
-        keep_notes(self.engine, Base.metadata.tables.keys())
 
     def file(self, path: str) -> InsidePath:
         """Return the file that a path in the workspace means. Raises InputError where it leads outside."""

@@ -19,7 +19,7 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage.read_only import connecting, may_only_be_read
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
-TRIGGERS = "irtwin_"  # what the names of irtwin's own begin with
+TRIGGERS = "irtwin_"  # what the names of an older irtwin's begin with: migration drops them
 MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
 _DAMAGE = ("malformed", "not a database")
 _NO_UTF8 = ("ould not decode to UTF-8", "codec can't decode")  # SQLite's words of a value, Python's of a name

@@ -1,9 +1,7 @@
 """Mapping anew only what changed: rows that are new or gone since the last run, on any database.
 
-Rows are told from the remembered ones by a hash. Where the database notes what changes, a statement whose tables were
-not written to is passed by, and one that reads a table row by row reads the noted rows; all others read all rows.
-A quad of a row that is gone goes too, unless another row makes it: rows of the same subject are looked up among the
-remembered ones.
+All rows are read, and told from the remembered ones by a hash. A quad of a row that is gone goes too, unless another
+row makes it: rows of the same subject are looked up among the remembered ones.
 """
 
 from __future__ import annotations
@@ -12,13 +10,11 @@ import hashlib
 import marshal
 import math
 import sqlite3
-import sys
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import metadata
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,16 +23,14 @@ from sqlalchemy import Connection, Engine
 
 from irtwin.errors import InputError
 from irtwin.knowledge.garbage import seldom_collected
-from irtwin.knowledge.mapping.noted_rows import KeyedTable, NotedRows, are_all_there, bookmark
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, RememberedRows
-from irtwin.knowledge.mapping.source import count, read, schema_version
+from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import URI_SPACE, KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL
-from irtwin.storage.row_changes import history
 
 _MAPPED = (GRAPH_SOURCE, GRAPH_ACTIVITY)
 _VERSION_GRAPH = f"{GRAPH_SOURCE}version"
@@ -71,99 +65,54 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
         made_by = _digest(
             metadata.version("irtwin"),
             schema_version(connection),
-            history(connection),
             graph.base,
             *(path.read_text(encoding="utf-8") for path in documents),
             *(statement.sql for statement in statements),
         )
-        reached = bookmark(connection) if any(statement.reads for statement in statements) else None
         current = next((row["version"] for row in graph.query(_ASK_VERSION)), "")
         version = f"{made_by}.{uuid.uuid4().hex}"
         if current == remembered.version and current.startswith(made_by):
-            removed, added = _Run(connection, statements, remembered, _noted(connection, remembered)).changes()
+            removed, added = _Run(connection, statements, remembered).changes()
             if not has_blank_node(added | removed):
                 if added or removed:
                     graph.change({*removed, _version(current)}, {*added, _version(version)})
                     remembered.version = version
-                remembered.bookmark = reached
                 return
         remembered.forget()
-        run = _Run(connection, statements, remembered, None)
+        run = _Run(connection, statements, remembered)
         graph.replace(chain(run.added(), [_version(version)], _uri_space(graph.base)), *_MAPPED)
         remembered.version = version
-        remembered.bookmark = reached
-
-
-def _noted(connection: Connection, remembered: RememberedRows) -> NotedRows | None:
-    """Return what was noted since the last run, None where notes have gone or are of another database."""
-    since = remembered.bookmark
-    return None if since is None or not are_all_there(connection, since) else NotedRows(connection, since)
 
 
 class _Run:
-    """One look at the rows that may have changed, beside those that are remembered."""
+    """One look at all rows, beside those that are remembered."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        statements: Sequence[Statement],
-        remembered: RememberedRows,
-        noted: NotedRows | None,
-    ) -> None:
+    def __init__(self, connection: Connection, statements: Sequence[Statement], remembered: RememberedRows) -> None:
         self.connection = connection
         self.statements = statements
         self.remembered = remembered
-        self.noted = noted
         self.gone: dict[int, Entries] = {}  # by the statement's number
 
     def added(self) -> Iterator[Quad]:
         """Yield the quads of rows that are not remembered, and remember those."""
         for number, statement in enumerate(self.statements):
-            if self.noted is None or statement.reads is None or statement.reads & self.noted.tables:
-                yield from self._added(number, statement)
+            yield from self._added(number, statement)
 
     def _added(self, number: int, statement: Statement) -> Iterator[Quad]:
         entries = self.remembered.entries(number)
         seen = np.zeros(len(entries), dtype=bool)
         new: list[Entries] = []
-        noted = self._noted_rows(statement, entries, seen)
-        for unknown in self._all_rows(statement, entries, seen) if noted is None else noted:
+        for rows in read(self.connection, statement.sql, statement.where):
+            unknown = _unknown(rows, entries, seen)
             made = [statement.quads(row) for row in unknown.values()]
             if made:
                 subjects = _hashes(str(quads[0].subject if quads else None) for quads in made)
-                keys = [_key_hash(statement.keyed, row) for row in unknown.values()]
                 ids = self.remembered.keep(list(unknown.values()))
-                new.append(np.array(list(zip(unknown, subjects, keys, ids, strict=True)), ENTRY))
+                new.append(np.array(list(zip(unknown, subjects, ids, strict=True)), ENTRY))
                 yield from chain.from_iterable(made)
         self.gone[number] = entries[~seen]
         if new or not seen.all():
             self.remembered.set_entries(number, np.concatenate([entries[seen], *new]))
-
-    def _all_rows(
-        self, statement: Statement, entries: Entries, seen: npt.NDArray[np.bool_]
-    ) -> Iterator[dict[int, Row]]:
-        """Yield the rows that have no entry, by hash, a chunk at a time; mark in `seen`, (N,), the others' entries."""
-        seen[:] = False
-        for rows in read(self.connection, statement.sql, statement.where):
-            yield _unknown(rows, entries, seen)
-
-    def _noted_rows(
-        self, statement: Statement, entries: Entries, seen: npt.NDArray[np.bool_]
-    ) -> list[dict[int, Row]] | None:
-        """Do as `_all_rows` with the noted rows alone; None where these cannot be all that changed.
-
-        A row that SQLite removed to put another in its place (REPLACE) may come without a note: then there are fewer.
-        """
-        keyed = statement.keyed
-        keys = None if self.noted is None or keyed is None else self.noted.keys(keyed)
-        if self.noted is None or keyed is None or keys is None:
-            return None
-        of_keys = np.array([_hash(key) for key in keys], np.uint64)
-        seen[:] = ~np.isin(entries["key"], of_keys)
-        sql = f"{statement.sql} WHERE {self.noted.condition(keyed)}"
-        unknown = [_unknown(rows, entries, seen) for rows in read(self.connection, sql, statement.where)]
-        found = int(seen.sum()) + sum(map(len, unknown))
-        return unknown if found == count(self.connection, statement.sql, statement.where) else None
 
     def changes(self) -> tuple[set[Quad], set[Quad]]:
         """Return the quads that no row makes any more, and those that new rows make; forget the rows that are gone."""
@@ -203,14 +152,6 @@ def _unknown(rows: Sequence[Row], entries: Entries, seen: npt.NDArray[np.bool_])
     found[within] = known[at[within]] == hashes[within]
     seen[at[found]] = True
     return {int(hashes[index]): rows[index] for index in np.flatnonzero(~found).tolist()}
-
-
-def _key_hash(keyed: KeyedTable | None, row: Row) -> int:
-    return 0 if keyed is None else _hash(tuple(row[place] for place in keyed.places))
-
-
-def _hash(key: tuple[Any, ...]) -> int:
-    return int.from_bytes(_row_hash(key), sys.byteorder)
 
 
 def _row_hash(row: Row) -> bytes:

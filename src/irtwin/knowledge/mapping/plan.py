@@ -19,11 +19,8 @@ from irtwin.knowledge.mapping.document import (
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import Identifier, quoted
-from irtwin.knowledge.mapping.noted_rows import KeyedTable
 from irtwin.knowledge.mapping.source import Source, describe
-from irtwin.knowledge.mapping.tables_read import table_of, tables_read
 from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, absolute, term_maker
-from irtwin.storage.row_changes import Key
 
 GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
@@ -47,8 +44,6 @@ class Statement:
 
     table: the name of the one table that it reads, empty for a query of the document's or a join;
     columns: what its rows hold of that table, in order;
-    reads: the tables that its rows follow from, None where changes of them may not be noted, or it cannot be told;
-    keyed: the table whose rows it reads one by one, if its columns hold that table's key;
     predicates: those that its quads can have, None where rows say them; begins: how its subjects' IRIs begin.
     """
 
@@ -59,8 +54,6 @@ class Statement:
     subject: TermMaker
     graphs: GraphMaker
     properties: tuple[Property, ...]
-    reads: frozenset[str] | None
-    keyed: KeyedTable | None
     predicates: frozenset[NamedNode] | None
     begins: str
 
@@ -87,13 +80,8 @@ class Statement:
         return found
 
 
-def plan(
-    connection: Connection, document: Document, base_iri: str, noted: Mapping[str, Key] | None = None
-) -> Iterator[Statement]:
-    """Yield a document's statements. Raises InputError where its tables or columns are not there.
-
-    noted: the tables whose changes are noted, with their keys.
-    """
+def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[Statement]:
+    """Yield a document's statements. Raises InputError where its tables or columns are not there."""
     sources: dict[LogicalTable, Source] = {}
 
     def source(table: LogicalTable) -> Source:
@@ -102,7 +90,7 @@ def plan(
         return sources[table]
 
     def select(**sides: LogicalTable) -> _Select:
-        return _Select(connection, sides, {side: source(table) for side, table in sides.items()}, base_iri, noted or {})
+        return _Select(connection, {side: source(table) for side, table in sides.items()}, base_iri)
 
     maps = document.triples_maps
     for triples_map in maps.values():
@@ -117,18 +105,8 @@ def plan(
 class _Select:
     """A query under construction: it gathers the columns that term maps need, each once."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        tables: Mapping[str, LogicalTable],
-        sources: Mapping[str, Source],
-        base_iri: str,
-        noted: Mapping[str, Key],
-    ) -> None:
-        self.connection = connection
-        self.tables = tables
+    def __init__(self, connection: Connection, sources: Mapping[str, Source], base_iri: str) -> None:
         self.sources = sources
-        self.noted = noted
         self.base_iri = base_iri
         self.preparer = connection.dialect.identifier_preparer
         self.chosen: dict[tuple[str, str], int] = {}  # side and column
@@ -175,19 +153,6 @@ class _Select:
     def selected(self, side: str, name: str) -> str:
         column = self.qualified(side, name)
         return f"CAST({column} AS VARCHAR)" if name in self.sources[side].cast else column
-
-    @property
-    def reads(self) -> frozenset[str] | None:
-        """The noted tables that it reads, None where it may read others."""
-        return tables_read(self.connection, self.sql, self.tables.values(), self.noted.keys()) if self.noted else None
-
-    @property
-    def keyed(self) -> KeyedTable | None:
-        """The one noted table that it reads row by row, where it has chosen its whole key."""
-        table = table_of(self.tables["child"], self.noted) if len(self.tables) == 1 else None
-        key = () if table is None else self.noted[table]
-        places = tuple(self.chosen.get(("child", part.name), -1) for part in key)
-        return None if table is None or not key or -1 in places else KeyedTable(table, key, places)
 
     @property
     def sql(self) -> str:
@@ -243,8 +208,6 @@ def _statement(
         subject=subject,
         graphs=graphs,
         properties=tuple(properties),
-        reads=select.reads,
-        keyed=select.keyed,
         predicates=frozenset(name for name in said if isinstance(name, NamedNode)) if None not in said else None,
         begins=_beginning(triples_map.subject, select.base_iri),
     )

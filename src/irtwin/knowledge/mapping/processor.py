@@ -17,7 +17,6 @@ from irtwin.knowledge.mapping.source import declarations, read, snapshot
 from irtwin.knowledge.vocabulary import ID
 from irtwin.storage import files
 from irtwin.storage.engine import open_engine
-from irtwin.storage.row_changes import noted_tables
 
 _Planned = tuple[tuple[str, ...] | None, str | None, tuple[tuple[Path, bytes], ...]]  # tables, base IRI, documents
 
@@ -57,11 +56,10 @@ def _statements(connection: Connection, documents: Sequence[Path], base_iri: str
     if known_by in _KEPT:
         return _KEPT[known_by]
     checked = [read_document(path) for path in documents]
-    noted = noted_tables(connection)
     made = tuple(
         statement
         for document in checked
-        for statement in plan(connection, document, base_iri or document.base_iri or ID, noted)
+        for statement in plan(connection, document, base_iri or document.base_iri or ID)
     )
     if tables is not None:
         _KEPT.clear()  # a process maps the same documents again and again

@@ -6,7 +6,6 @@ import json
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import astuple
 from datetime import date, datetime, time
 from decimal import Decimal
 from pathlib import Path
@@ -18,18 +17,15 @@ import numpy.typing as npt
 
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.natural import by_value
-from irtwin.knowledge.mapping.noted_rows import Bookmark
 from irtwin.knowledge.mapping.terms import Row
 
-# One for each row of a statement, in the order of the hashes: 64 bits tell rows apart, and find those of a subject, and
-# of a key where the statement reads one table row by row.
-ENTRY = np.dtype([("row", np.uint64), ("subject", np.uint64), ("key", np.uint64), ("id", np.int64)])
+# One for each row of a statement, in the order of the hashes: 64 bits tell rows apart, and find those of a subject.
+ENTRY = np.dtype([("row", np.uint64), ("subject", np.uint64), ("id", np.int64)])
 Entries = npt.NDArray[np.void]
 
-_FORM = 2  # of the file, as its `user_version`
+_FORM = 3  # of the file, as its `user_version`
 _TABLES = (
     "CREATE TABLE version (name TEXT NOT NULL)",
-    "CREATE TABLE bookmark (until INTEGER NOT NULL, number INTEGER NOT NULL, token INTEGER NOT NULL)",
     "CREATE TABLE entries (number INTEGER PRIMARY KEY, content BLOB NOT NULL, crc INTEGER NOT NULL)",
     "CREATE TABLE kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL)",
 )
@@ -75,22 +71,9 @@ class RememberedRows:
         self._connection.execute("DELETE FROM version")
         self._connection.execute("INSERT INTO version VALUES (?)", (name,))
 
-    @property
-    def bookmark(self) -> Bookmark | None:
-        """How far the database's notes were seen, None where they are of no use."""
-        found = self._connection.execute("SELECT until, number, token FROM bookmark").fetchone()
-        return None if found is None else Bookmark(*found)
-
-    @bookmark.setter
-    def bookmark(self, reached: Bookmark | None) -> None:
-        if reached != self.bookmark:
-            self._connection.execute("DELETE FROM bookmark")
-            if reached is not None:
-                self._connection.execute("INSERT INTO bookmark VALUES (?, ?, ?)", astuple(reached))
-
     def forget(self) -> None:
         """Start anew, with no rows."""
-        for table in ("version", "bookmark", "entries", "kept_row"):
+        for table in ("version", "entries", "kept_row"):
             self._connection.execute(f"DELETE FROM {table}")
         self._next = 1
 

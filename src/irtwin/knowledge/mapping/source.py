@@ -125,11 +125,6 @@ def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequ
         result.close()
 
 
-def count(connection: Connection, sql: str, where: str) -> int:
-    """Return how many rows a query has. Raises InputError as `run` does."""
-    return int(run(connection, f"SELECT count(*) FROM ({sql}\n) counted", where).scalar_one())
-
-
 def run(connection: Connection, sql: str, where: str) -> CursorResult[Any]:
     """Run SQL as it stands: `%` and `:` mean nothing here. Raises InputError where it fails or takes too long."""
     connection.info["deadline"] = time.monotonic() + connection.info["seconds"]

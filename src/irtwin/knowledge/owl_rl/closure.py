@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain, islice, product
+from itertools import chain, product
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
@@ -116,17 +116,6 @@ class Closure:
     def known(self) -> Mapping[Fact, int]:
         """All that is known, and the round that it was found in."""
         return self._round
-
-    def __len__(self) -> int:
-        """Return how many statements are known."""
-        return len(self._round)
-
-    def since(self, count: int) -> Iterator[Fact]:
-        """Yield what is known beside the first `count` statements, given or inferred, but not that x is itself."""
-        forms, same = self._terms.forms, self._program.same
-        for fact in islice(self._round, count, None):
-            if (fact[1] != same or fact[0] != fact[2]) and forms[fact[0]] and forms[fact[2]]:
-                yield fact
 
     def why(self, statement: Statement | Triple) -> Derivation | None:
         """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""

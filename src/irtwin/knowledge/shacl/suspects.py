@@ -6,14 +6,12 @@ may be too strict, never too lax: what a shape says in words that are not known 
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
-from itertools import chain, count
+from collections.abc import Iterable, Iterator
+from itertools import count
 from typing import cast
 
 from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 
-from irtwin.knowledge import locality
 from irtwin.knowledge.shacl.shapes import Node, Shapes
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF, RDFS, SH, XSD
 
@@ -37,38 +35,17 @@ class _Unknown(Exception):
     """A constraint that is not known here."""
 
 
-@dataclass(frozen=True)
-class Queries:
-    """Queries of a shapes graph, at least one for each shape that has targets; each selects suspects as `$this`.
+def queries(triples: Iterable[Triple], classes: Iterable[Triple]) -> Iterator[str]:
+    """Yield queries of a shapes graph, at least one for each shape that has targets; each selects suspects as `$this`.
 
-    `near` look at what is said of a node, and at the types of what that joins it to; `far` may look at more: at
-    predicates that `read` has, by their IRIs, among them `locality.ANY` where that is not known.
+    classes: what the data say by rdfs:subClassOf.
     """
-
-    near: tuple[str, ...]
-    far: tuple[str, ...]
-    read: frozenset[str]
+    return _Writer(Shapes(triples, "shapes"), classes).queries()
 
 
-def queries(triples: Iterable[Triple], classes: Iterable[Triple]) -> Queries:
-    """Return the queries of a shapes graph; classes: what the data say by rdfs:subClassOf."""
-    near, far, read = list[str](), list[str](), set[str]()
-    for text, predicates in _Writer(Shapes(triples, "shapes"), classes).queries():
-        (near if predicates is None else far).append(text)
-        read |= predicates or set()
-    return Queries(tuple(near), tuple(far), frozenset(read))
-
-
-def any_suspect(store: Store, asked: Queries, among: Container[object] | None = None) -> bool:
-    """Whether a query finds a node in a store's default graph; those that look near: one of some, if they are given."""
-    if among is None:
-        return any(True for text in chain(asked.near, asked.far) for _ in _suspects(store, text))
-    near = (suspect in among for text in asked.near for suspect in _suspects(store, text))
-    return any(near) or any(True for text in asked.far for _ in _suspects(store, text))
-
-
-def _suspects(store: Store, text: str) -> Iterator[object]:
-    return (row[0] for row in cast(QuerySolutions, store.query(text, prefixes=PREFIXES)))
+def any_suspect(store: Store, asked: Iterable[str]) -> bool:
+    """Whether a query finds a node in a store's default graph."""
+    return any(True for text in asked for _ in cast(QuerySolutions, store.query(text, prefixes=PREFIXES)))
 
 
 class _Writer:
@@ -78,29 +55,24 @@ class _Writer:
         for one in classes:
             self._below.setdefault(one.object, set()).add(one.subject)
         self._numbers = count()
-        self._is_near = True  # what is written of a shape
 
-    def queries(self) -> Iterator[tuple[str, frozenset[str] | None]]:
-        """Yield each query; with it, where it may look farther than near, the predicates that it looks at."""
+    def queries(self) -> Iterator[str]:
         for shape in self._shapes.all():
             targets = " UNION ".join(f"{{ {target} }}" for target in self._targets(shape))
             if not targets or self._shapes.is_deactivated(shape):
                 continue
             focus = f"{{ SELECT DISTINCT $this {{ {targets} }} }}"  # each node once, however often it is a target
-            self._is_near = True
             try:
                 if self._shapes.values(shape, "path"):
                     conditions = list(self._of_values(shape, _THIS))
                 else:
                     conditions = list(self._conditions(shape, _THIS, with_queries=False))
             except _Unknown:
-                conditions, self._is_near = ["false"], False
+                conditions = ["false"]
             if conditions:
-                text = f"SELECT DISTINCT $this {{ {focus} FILTER(!COALESCE({' && '.join(conditions)}, false)) }}"
-                yield text, None if self._is_near else frozenset({locality.ANY})
+                yield f"SELECT DISTINCT $this {{ {focus} FILTER(!COALESCE({' && '.join(conditions)}, false)) }}"
             for text in self._selects(shape):
-                read = locality.of_query(text).predicates if text else frozenset({locality.ANY})
-                yield f"SELECT DISTINCT $this {{ {focus} {{ {text} }} }}", read
+                yield f"SELECT DISTINCT $this {{ {focus} {{ {text} }} }}"
 
     def _targets(self, shape: Node) -> Iterator[str]:
         for name, form in _TARGETS.items():
@@ -154,7 +126,6 @@ class _Writer:
 
     def _of_values(self, shape: Node, node: str) -> Iterator[str]:
         """Yield what is true of a node whose values of a property keep a shape of these."""
-        self._is_near &= node == _THIS
         path = self._path(self._shapes.value(shape, "path"))
         for name, values in self._shapes.said_of(shape):
             short = name.removeprefix(SH)

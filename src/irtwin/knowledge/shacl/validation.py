@@ -20,12 +20,11 @@ from rdflib.namespace import SH
 from irtwin.knowledge import each_part, parts
 from irtwin.knowledge.conclusions import content_name
 from irtwin.knowledge.garbage import seldom_collected
-from irtwin.knowledge.locality import ANY
-from irtwin.knowledge.parts import Joined, Name, Ontology, Region
+from irtwin.knowledge.parts import Joined, Ontology, Region
 from irtwin.knowledge.reasoning import asserted
 from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.shacl.of_ontology import SUB_CLASS_OF, with_ontology
-from irtwin.knowledge.shacl.suspects import Queries, any_suspect, queries
+from irtwin.knowledge.shacl.suspects import any_suspect, queries
 from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
@@ -33,14 +32,11 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_REASONED,
     GRAPH_VALIDATION,
-    RDF,
     shorten,
 )
 from irtwin.resources import Files
 
 Results = Iterator[tuple[rdflib.term.Node, rdflib.Graph]]  # with what is said of each
-
-_TYPE = NamedNode(RDF + "type")
 
 
 @dataclass(frozen=True)
@@ -102,9 +98,9 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
     if changed is None:
         report, checked = _empty(), each_part.of_each(graph, ontology, _results)
     else:
-        report, nodes = _as_rdflib(graph.triples(GRAPH_VALIDATION)), nodes_of(changed)
-        regions = parts.some(graph, ontology, nodes, asserted=True)
-        checked = each_part.of_these(ontology, regions, partial(_results_anew, report, nodes))
+        report = _as_rdflib(graph.triples(GRAPH_VALIDATION))
+        regions = parts.some(graph, ontology, nodes_of(changed), asserted=True)
+        checked = each_part.of_these(ontology, regions, partial(_results_anew, report))
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
     with closing(checked):
         for result, said in checked:
@@ -114,50 +110,19 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
     return report
 
 
-def _results_anew(report: rdflib.Graph, changed: set[Name], ontology: Ontology, regions: list[Region]) -> Results:
-    """Yield what is found in some parts since nodes changed, and take what the report says of these parts out of it."""
-    region = parts.one(regions)
-    before = _about(report, region.nodes)
-    if not before and _is_clear(ontology, region, changed):
-        return
-    for result in before:
+def _results_anew(report: rdflib.Graph, ontology: Ontology, regions: list[Region]) -> Results:
+    """Yield what is found in some parts, and take what the report said of them out of it."""
+    for result in _about(report, parts.one(regions).nodes):
         report -= report.cbd(result)
         report.remove((None, SH.result, result))
     yield from _results(ontology, regions)
-
-
-def _is_clear(ontology: Ontology, region: Region, changed: set[Name]) -> bool:
-    """Whether a part that kept all constraints still does, since some nodes changed.
-
-    It tells by the nodes that changed and those joined to them. What others are held to is as it was: what is said of
-    them, and the types of what they are joined to. Queries that look farther are asked of all that they look at.
-    """
-    if any(isinstance(node, BlankNode) for node in region.nodes):
-        return False
-    around = set(changed)
-    for subject, _, object in region.asserted:
-        if subject in changed or object in changed:
-            around.update((subject, object))
-    around &= region.nodes
-    shapes = _shapes(frozenset(ontology.triples), ontology.resources.of("shapes"))
-    store, asked = shapes.store_of(ontology.triples)
-    store.extend(in_graph(triple for triple in region.asserted if _is_asked_of(triple, around, asked)))
-    return not any_suspect(store, asked, around)
-
-
-def _is_asked_of(triple: Triple, around: set[Name], asked: Queries) -> bool:
-    """Whether queries may look at a triple, those that look near nodes only around some."""
-    subject, predicate, object = triple
-    if predicate == _TYPE or predicate.value in asked.read or ANY in asked.read:
-        return True
-    return subject in around or object in around
 
 
 def _results(ontology: Ontology, regions: list[Region]) -> Results:
     """Yield what is found in some parts, results with what is said of them. Raises Joined for nodes without a name."""
     region = parts.one(regions)
     if any(isinstance(node, BlankNode) for node in region.nodes):
-        raise Joined
+        raise Joined("a node without a name")
     if region.nodes and not region.asserted:
         return
     found = _report(ontology.triples | region.asserted, ontology, ontology.resources.of("shapes"))
@@ -211,7 +176,7 @@ class _Constraints:
 
     def __init__(self, shapes: set[Triple]):
         self._shapes = shapes
-        self._queries: dict[frozenset[Triple], Queries] = {}
+        self._queries: dict[frozenset[Triple], tuple[str, ...]] = {}
         self.unions = {triple for triple in shapes if triple.predicate == SUB_CLASS_OF}
 
     @cached_property
@@ -219,13 +184,13 @@ class _Constraints:
         """The shapes, for pySHACL."""
         return _as_rdflib(self._shapes)
 
-    def store_of(self, data: Iterable[Triple]) -> tuple[Store, Queries]:
+    def store_of(self, data: Iterable[Triple]) -> tuple[Store, tuple[str, ...]]:
         """Return a store of data, and the queries for suspects in it: what it says of classes is part of them."""
         store = Store()
         store.extend(in_graph(chain(self.unions, data)))
         classes = frozenset(quad.triple for quad in store.quads_for_pattern(None, SUB_CLASS_OF, None, None))
         if classes not in self._queries:
-            self._queries = {classes: queries(self._shapes, classes)}
+            self._queries = {classes: tuple(queries(self._shapes, classes))}
         return store, self._queries[classes]
 
 

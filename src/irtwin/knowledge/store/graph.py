@@ -24,11 +24,10 @@ from pyoxigraph import (
 from irtwin.errors import InputError
 from irtwin.knowledge.store import changes, store_files
 from irtwin.knowledge.store.blank_nodes import has_blank_node, named_below, same
-from irtwin.knowledge.store.column_functions import column_functions
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.knowledge.store.reading import KeptAnswers, Reading
+from irtwin.knowledge.store.reading import KeptAnswers, answers_of
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
@@ -79,12 +78,12 @@ class KnowledgeGraph:
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
-            self._reading = Reading(self._store)
+            self._answers = answers_of(self._store)
             return
         check_files(self.folder)
         with told(self.folder):
             self._store = Store(str(self.folder))
-        self._reading = Reading(self._store)
+        self._answers = answers_of(self._store)
         for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
             old.unlink(missing_ok=True)
 
@@ -105,7 +104,7 @@ class KnowledgeGraph:
         graph.folder, graph._read_only = path, True
         graph._store = Store.read_only(str(path))
         graph._workspace, graph._resources, graph._base = workspace or path.parent, resources, None
-        graph._reading = Reading(graph._store)
+        graph._answers = answers_of(graph._store)
         graph._says_first = False
         graph.asserted_since = 0
         return graph
@@ -124,7 +123,7 @@ class KnowledgeGraph:
                 self._store.flush()
                 store_files.note_sums(self.folder)
         self._store = Store()
-        self._reading = Reading(self._store)
+        self._answers = answers_of(self._store)
 
     @property
     def shown(self) -> str:
@@ -203,12 +202,12 @@ class KnowledgeGraph:
         try:
             yield self._store
         finally:
-            self._reading = Reading(self._store)
+            self._answers = answers_of(self._store)
 
     @property
     def answers(self) -> KeptAnswers:
         """Answers that hold until the graph is written to. Take it before the question is asked."""
-        return self._reading.answers
+        return self._answers
 
     @telling
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
@@ -221,9 +220,12 @@ class KnowledgeGraph:
         quads = _belonging(quads, below)
         old = self.graphs(*below)
         if isinstance(self._store, Store) and not old:
+            first = next(quads, None)
+            if first is None:  # nothing in the place of nothing
+                return []
             self._forget_what_was_inferred(below)
             with self._writing() as store:
-                store.bulk_extend(with_union(quads))
+                store.bulk_extend(with_union(chain([first], quads)))
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
@@ -330,7 +332,7 @@ class KnowledgeGraph:
         if kept is None:
             faults: dict[str, None] = {}
             kept = table_of(self.answer(text, faults=faults), faults)
-            if len(kept) * len(kept.columns) <= _MOST_KEPT and not kept.faults:
+            if len(kept) * len(kept.columns) <= _MOST_KEPT:
                 answers.keep(kept, text)
         return Table(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
 
@@ -486,13 +488,10 @@ class KnowledgeGraph:
             self.change(changes.made_of(self._store), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
-        """Return the functions that sum by columns, and those that reach the samples where their files are known."""
-        if isinstance(self._store, SparqlServer):
+        """Return the functions that reach the samples of runs, where their files are known."""
+        if isinstance(self._store, SparqlServer) or self._workspace is None:
             return {}
-        functions = column_functions(self._reading.columns, self.prefixes, faults)
-        if self._workspace is None:
-            return functions
-        return functions | series_functions(self._store, self._workspace, faults)
+        return series_functions(self._store, self._workspace, faults)
 
 
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:

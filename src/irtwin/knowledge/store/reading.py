@@ -1,39 +1,23 @@
-"""What was read of a graph since it was last written to: columns of its properties, and answers to queries.
+"""Answers to queries of a graph since it was last written to.
 
-A store in memory, and one that is open to write, changes by its graph alone, which then begins a new `Reading`; a view
-of a folder never changes. So what is kept here is true for as long as it is there.
+A store in memory, and one that is open to write, changes by its graph alone, which then begins anew; a view of a folder
+never changes. So what is kept here is true for as long as it is there.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Hashable
-from functools import cached_property
 from threading import Lock
 from typing import Any
 
 from pyoxigraph import Store
 
-from irtwin.knowledge.store.columns import Columns
 from irtwin.knowledge.store.sparql_server import SparqlServer
 
 MOST_ANSWERS = 256
 # What answers anew each time, and the functions that read files; a backslash may hide them.
 _NOT_KEPT = re.compile(r"\\|series|\b(?:now|rand|uuid|struuid|bnode)\b", re.IGNORECASE)
-
-
-class Reading:
-    """What was read of a store that nobody wrote to since."""
-
-    def __init__(self, store: Store | SparqlServer) -> None:
-        self._store = store
-        self.answers = KeptAnswers(0 if isinstance(store, SparqlServer) else MOST_ANSWERS)  # others write to a server
-
-    @cached_property
-    def columns(self) -> Columns:
-        """Columns of its properties; not of a server's graph."""
-        assert isinstance(self._store, Store)
-        return Columns(self._store)
 
 
 class KeptAnswers:
@@ -60,3 +44,8 @@ class KeptAnswers:
             self._answers[(text, *beside)] = answer
             if len(self._answers) > self._most:
                 del self._answers[next(iter(self._answers))]
+
+
+def answers_of(store: Store | SparqlServer) -> KeptAnswers:
+    """Return where answers of a store are kept that nobody else writes to: others write to a server."""
+    return KeptAnswers(0 if isinstance(store, SparqlServer) else MOST_ANSWERS)
