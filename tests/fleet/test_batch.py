@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from irtwin import workflow
+from irtwin import diagnosing
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.batch import Batch, Record, key
 
@@ -33,7 +33,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text("{}")
 
-    monkeypatch.setattr(workflow, "diagnose", diagnose)
+    monkeypatch.setattr(diagnosing, "diagnose", diagnose)
     return found
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import announce, base_option, say, series_option
+from irtwin.cli.options import FOLDER, announce, base_option, say, series_option
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,9 +35,7 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786, in place of processes."
         ),
         click.option("--workers", type=click.IntRange(1, 1024), help="Processes at once. Default: one a core."),
-        click.option(
-            "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the results."
-        ),
+        click.option("--out", type=FOLDER, required=True, help="Folder for the results."),
         click.argument("source"),
     ):
         command = option(command)
@@ -70,7 +68,7 @@ def diagnose(source: str, out: Path, workers: int | None, scheduler: str | None)
 
 
 @fleet.command()
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.argument("folder", type=FOLDER)
 def status(folder: Path) -> None:
     """Show how many data sets are done, refused, failed and left."""
     from irtwin.fleet.fleet import batches_of, status_of
@@ -93,18 +91,10 @@ def _work(
 ) -> None:
     from irtwin.fleet.fleet import work
 
-    workers = workers or os.cpu_count() or 1
     found = work(
-        source,
-        out,
-        kind,
-        batch=batch,
-        workers=workers,
-        scheduler=scheduler,
-        base=base,
-        series_url=series_url,
-        announce=announce,
-    )
+        source, out, kind, batch=batch, workers=workers or os.cpu_count() or 1, scheduler=scheduler, base=base,
+        series_url=series_url, announce=announce,
+    )  # fmt: skip
     _show(found)
     if found.set_aside:
         sys.exit(3)

@@ -169,16 +169,18 @@ class Batch:
 
     def _done(self, kind: str, place: str, data_set: Path) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
-        from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
-
         trace = self._inside(f"records/{key(place)}.traceback.txt")
         trace.unlink(missing_ok=True)
         try:
             if kind == RUN:
+                from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
+
                 workflow.run(data_set, self._inside("workspace"), base=self.base, series_url=self.series_url)
             else:
+                from irtwin import diagnosing
+
                 results = self._inside(f"diagnoses/{key(place)}")
-                workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
+                diagnosing.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
         except WorkspaceFault as error:  # no fault of the data set: the next call tries again
             return FAILED, str(error)
         except InputError as error:

@@ -19,6 +19,7 @@ from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.refusals import Refusals
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
+from irtwin.location import Location
 from irtwin.providers.records import find_plan, find_robot, load_robot
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
@@ -31,10 +32,8 @@ Announce = Callable[[str], None]
 
 
 def watch(
-    workspace: Path,
+    location: Location,
     *,
-    database: str | None = None,
-    graph_url: str | None = None,
     port: int | None = None,
     replayed: Path | None = None,
     rtde: str | None = None,
@@ -60,10 +59,10 @@ def watch(
         signal.signal(number, lambda *_: done.set())
 
     with (
-        told_when_full(workspace),
-        Workspace.existing(workspace, database) as place,
-        _alone(place, graph_url),
-        KnowledgeGraph.of_workspace(_checked(place), graph_url) as graph,
+        told_when_full(location.folder),
+        Workspace.existing(location) as place,
+        _alone(place),
+        KnowledgeGraph.of_workspace(_checked(place)) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replayed is None else REPLAYED_RUN) as twin,
     ):
@@ -89,9 +88,9 @@ def watch(
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
 
 
-def _alone(place: Workspace, graph_url: str | None) -> AbstractContextManager[None]:
+def _alone(place: Workspace) -> AbstractContextManager[None]:
     """Keep others from a server's graph, as the lock of a folder's store does by itself."""
-    return nullcontext() if graph_url is None else rewriting_alone(place.engine, place.folder)
+    return nullcontext() if place.location.graph_url is None else rewriting_alone(place.engine, place.folder)
 
 
 def _checked(place: Workspace) -> Workspace:
