@@ -17,8 +17,8 @@ from irtwin.planning.programme import Programme, programme_of
 from irtwin.providers.energy import stored_price
 from irtwin.providers.records import (
     check_run_name,
-    find_measured,
     find_robot,
+    find_run,
     keep_run,
     load_run,
     load_twin,
@@ -28,6 +28,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan, run_of
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
+from irtwin.storage.schema import MEASURED_RUN
 from irtwin.storage.staging import staged
 from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
@@ -150,7 +151,7 @@ def optimise(
         modelling.check_plan_file(out)
     with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
-        run_id = find_measured(place, robot_id, run).run_id
+        run_id = find_run(place, robot_id, run, MEASURED_RUN).run_id
 
     def make(twin: Twin) -> tuple[Timings, Run]:
         if not twin.knows_power:

@@ -20,11 +20,11 @@ from irtwin.live.refusals import Refusals
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.location import Location
-from irtwin.providers.records import find_plan, find_robot, load_robot
+from irtwin.providers.records import find_robot, find_run, load_robot
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
-from irtwin.storage.schema import LIVE, LIVE_RUN, REPLAYED_RUN
+from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
 from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
@@ -69,7 +69,7 @@ def watch(
         replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
         receive: Callable[[State], None] = twin.receive
         if performs is not None and robot is not None:
-            find_plan(place, find_robot(place, robot), performs)
+            find_run(place, find_robot(place, robot), performs, PLANNED_RUN)
             receive = _performing(receive, performs)
         reader = StateReader(twin.robots.joints, twin.robots.names)
 
