@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -57,21 +57,13 @@ def import_(
     files: tuple[Path, ...],
     out: Path | None,
     robot: str | None,
-    name: str | None,
-    maps: tuple[str, ...],
-    gear_ratios: tuple[str, ...],
-    power_at: str | None,
-    topics: tuple[str, ...],
-    fixed: tuple[str, ...],
     names: str,
-    payload_mass: float | None,
-    payload_com: tuple[float, float, float],
-    repair: bool,
     owl: Path | None,
     yes: bool,
     author: str | None,
     database: str | None,
     graph_url: str | None,
+    **told: Any,
 ) -> None:
     """Make a data set of logs in other formats, a run a file; or take back an edited OWL file.
 
@@ -93,11 +85,7 @@ def import_(
         raise click.UsageError("Give --out, or --owl.")
     from irtwin.bring.bring import Options, bring, found_in
 
-    options = Options(
-        name=name, maps=maps, gear_ratios=gear_ratios, topics=topics, fixed=fixed, power_at=power_at,
-        names=tuple(one.strip() for one in names.split(",")) if names else (),
-        payload_mass=payload_mass, payload_com=payload_com, repair=repair,
-    )  # fmt: skip
+    options = Options(names=tuple(one.strip() for one in names.split(",")) if names else (), **told)
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)

@@ -47,24 +47,16 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--batch", type=click.IntRange(1, 1000), default=100, show_default=True, help="Robots in one workspace.")
 @base_option
 @series_option
-def run(
-    source: str,
-    out: Path,
-    workers: int | None,
-    scheduler: str | None,
-    batch: int,
-    base: str | None,
-    series_url: str | None,
-) -> None:
+def run(**asked: Any) -> None:
     """Build twins, graphs and reports: one workspace for each batch of robots."""
-    _work(source, out, "run", workers, scheduler, batch, base, series_url)
+    _work("run", **asked)
 
 
 @fleet.command()
 @_options
-def diagnose(source: str, out: Path, workers: int | None, scheduler: str | None) -> None:
+def diagnose(**asked: Any) -> None:
     """Diagnose each data set: gap.json and twin.json in a folder of its own."""
-    _work(source, out, "diagnose", workers, scheduler, 20)
+    _work("diagnose", batch=20, **asked)
 
 
 @fleet.command()
@@ -79,22 +71,10 @@ def status(folder: Path) -> None:
     _show(status_of(batches))
 
 
-def _work(
-    source: str,
-    out: Path,
-    kind: str,
-    workers: int | None,
-    scheduler: str | None,
-    batch: int,
-    base: str | None = None,
-    series_url: str | None = None,
-) -> None:
+def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
     from irtwin.fleet.fleet import work
 
-    found = work(
-        source, out, kind, batch=batch, workers=workers or os.cpu_count() or 1, scheduler=scheduler, base=base,
-        series_url=series_url, announce=announce,
-    )  # fmt: skip
+    found = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
     _show(found)
     if found.set_aside:
         sys.exit(3)

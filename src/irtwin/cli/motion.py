@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -143,13 +143,7 @@ def plan(
 )
 @_kept
 def predict(
-    twin: str,
-    run: Path,
-    out: Path | None,
-    payload_mass: float | None,
-    payload_com: tuple[float, float, float] | None,
-    location: Location | None,
-    name: str | None,
+    twin: str, run: Path, out: Path | None, location: Location | None, name: str | None, **payload: Any
 ) -> None:
     """Predict torque, power and energy of a run with a saved twin.
 
@@ -161,12 +155,9 @@ def predict(
 
     _check_kept(location, name, out)
     if location is None:
-        expected, kept = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com), None
+        expected, kept = modelling.expect(twin, run, out, **payload), None
     else:
-        expected, kept = plans.predict(
-            twin, run, location, name=name or run.stem, out=out, payload_mass=payload_mass, payload_com=payload_com,
-            announce=say,
-        )  # fmt: skip
+        expected, kept = plans.predict(twin, run, location, name=name or run.stem, out=out, announce=say, **payload)
     _say_unchecked(expected.checks_itself)
     click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
 
@@ -177,21 +168,14 @@ def predict(
 @click.option("--cycle", type=Number(0.0, DAY, min_open=True), help="Cycle time, s. Default: as long as the run.")
 @click.option(
     "--pause",
+    "least_pause",
     type=Number(0.0, DAY),
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
 @click.option("--out", type=FILE, help="CSV or Parquet file to write.")
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
-def optimise(
-    robot: str,
-    run: str,
-    cycle: float | None,
-    pause: float | None,
-    out: Path | None,
-    location: Location,
-    name: str | None,
-) -> None:
+def optimise(robot: str, run: str, out: Path | None, location: Location, name: str | None, **asked: Any) -> None:
     """Time the moves of a run so that it takes least energy, by the robot's twin.
 
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
@@ -201,9 +185,7 @@ def optimise(
     """
     from irtwin import plans
 
-    found, kept = plans.optimise(
-        robot, run, location, name=name or f"{run}_optimised", cycle=cycle, least_pause=pause, out=out, announce=say,
-    )  # fmt: skip
+    found, kept = plans.optimise(robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked)
     for line in _curve_lines(found):
         click.echo(line)
     click.echo(f"{_where(out, kept)}: {_cycle_text(found.best)} than {run} (95 % interval)")

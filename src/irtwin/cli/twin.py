@@ -6,7 +6,7 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @base_option
 @series_option
-def run(dataset: Path, location: Location, repair: bool, base: str | None, series_url: str | None) -> None:
+def run(dataset: Path, location: Location, **asked: Any) -> None:
     """Build a twin, a graph and a report from a data set.
 
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
@@ -50,7 +50,7 @@ def run(dataset: Path, location: Location, repair: bool, base: str | None, serie
     """
     from irtwin.workflow import run as run_all
 
-    click.echo(run_all(dataset, location, repair=repair, base=base, series_url=series_url, announce=announce))
+    click.echo(run_all(dataset, location, announce=announce, **asked))
     tell_contradictions(location)
 
 
@@ -120,23 +120,10 @@ def case_study(workspace: Path) -> None:
 
 @click.command()
 @click.argument("dataset", type=PLACE)
-@click.option(
-    "--json",
-    "out",
-    type=FILE,
-    help="JSON file to write the diagnosis to.",
-)
+@click.option("--json", "json_file", type=FILE, help="JSON file to write the diagnosis to.")
 @click.option("--report", type=FILE, help="HTML file to write the report to.")
-@click.option(
-    "--save-twin",
-    type=FILE,
-    help="JSON file to write the twin to, with the causes added.",
-)
-@click.option(
-    "--save-motion",
-    type=FILE,
-    help="CSV file to write the motion of the next experiment to.",
-)
+@click.option("--save-twin", "twin_file", type=FILE, help="JSON file to write the twin to, with the causes added.")
+@click.option("--save-motion", "motion_file", type=FILE, help="CSV file to write the motion of the next experiment to.")
 @click.option(
     "--twin",
     type=FILE,
@@ -151,6 +138,7 @@ def case_study(workspace: Path) -> None:
 )
 @click.option(
     "--save-simulator",
+    "simulator_file",
     type=FILE,
     help="File to write that model to, with the numbers that the robot has; all else stays as it is.",
 )
@@ -167,19 +155,7 @@ def case_study(workspace: Path) -> None:
     click.option("--workspace", type=FOLDER, help="Also store the diagnosis there."), database_option, graph_option
 )
 def diagnose(
-    dataset: Path,
-    out: Path | None,
-    report: Path | None,
-    save_twin: Path | None,
-    save_motion: Path | None,
-    twin: Path | None,
-    simulator: Path | None,
-    save_simulator: Path | None,
-    withhold: tuple[str, ...],
-    cutoff: float | None,
-    seed: int,
-    repair: bool,
-    location: Location | None,
+    dataset: Path, simulator: Path | None, simulator_file: Path | None, location: Location | None, **asked: Any
 ) -> None:
     """Find where a twin, or a simulator, and its robot differ, and why.
 
@@ -192,15 +168,13 @@ def diagnose(
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
-    if save_simulator and not simulator:
+    if simulator_file and not simulator:
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
-    if save_simulator and simulator and save_simulator.absolute() == simulator.absolute():
+    if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
         raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     found = judge(
-        dataset, twin=twin, simulator=simulator, withhold=withhold, cutoff=cutoff, seed=seed, repair=repair,
-        workspace=location, json_file=out, report=report, twin_file=save_twin, motion_file=save_motion,
-        simulator_file=save_simulator, announce=announce,
-    )  # fmt: skip
+        dataset, simulator=simulator, simulator_file=simulator_file, workspace=location, announce=announce, **asked
+    )
     click.echo(line(found.document, found.against))
     for said in (*refused(found.document), *summary.filtered(found.document)):
         click.echo(said)
@@ -227,15 +201,7 @@ def diagnose(
 @payload_com_option
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the log carried out.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
-def improve(
-    robot: str,
-    new_log: Path,
-    location: Location,
-    payload_mass: float,
-    payload_com: tuple[float, float, float],
-    performs: str | None,
-    repair: bool,
-) -> None:
+def improve(robot: str, new_log: Path, location: Location, **asked: Any) -> None:
     """Better a robot's twin by a new log.
 
     LOG is a CSV or Parquet file, such as of the motion that `irtwin run` proposed. The twin is fitted again, with the
@@ -244,10 +210,7 @@ def improve(
     """
     from irtwin import improvement
 
-    found = improvement.improve(
-        robot, new_log, location, payload_mass=payload_mass, payload_com=payload_com, performs=performs,
-        repair=repair, announce=announce,
-    )  # fmt: skip
+    found = improvement.improve(robot, new_log, location, announce=announce, **asked)
     for number, one in enumerate(found.rounds, start=1):
         click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")
     if found.within:
