@@ -189,7 +189,7 @@ def application(
         routes=[
             *plant.routes(),
             Route("/query", lambda request: page.response(), methods=["GET"]),
-            Route("/sparql", Endpoint(pool, updates, limits)),
+            Route("/sparql", Endpoint(pool, updates, limits, asking)),
             Route("/questions", partial(ontology.questions, resources), methods=["GET"]),
             Route("/questions.json", partial(page.questions, resources, base), methods=["GET"]),
             *reports.routes(),

@@ -272,15 +272,8 @@ class Workspace:
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
-    def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
-        """Keep a run that was watched live, with its samples and what is known of it; return where they lie."""
-        return self._keep_run(run, series, [activity, *rows])
-
-    def keep_run(self, run: Run, series: pa.Table) -> None:
-        """Keep a run of no data set, planned or measured, with its samples."""
-        self._keep_run(run, series, [])
-
-    def _keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base]) -> Series:
+    def keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base] = ()) -> Series:
+        """Keep a run of no data set with its samples, and further rows about it; return where the samples lie."""
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)
             run.file, run.sha256 = stored.path, stored.series_id
