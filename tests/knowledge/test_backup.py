@@ -18,6 +18,7 @@ from tests.memory_s3 import memory_s3
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.input_file import checksum
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.backup import backup, restore
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -26,7 +27,6 @@ from irtwin.location import Location
 from irtwin.storage import database
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base, Series
-from irtwin.storage.series import checksum
 
 pytestmark = pytest.mark.slow
 
