@@ -31,6 +31,7 @@ from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import to_csv
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_CHANGED, GRAPH_SOURCE
+from irtwin.location import Location
 from irtwin.providers.records import ingest
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
@@ -109,7 +110,7 @@ def prepared(folder: Path) -> dict[str, Command]:
 def watched(data_set: Path, place: Path) -> None:
     """Make a workspace of many robots that have no twin."""
     known = read_data_set(data_set)
-    with Workspace(place) as workspace, workflow.rewriting(workspace, None) as graph:
+    with Workspace(place) as workspace, workflow.rewriting(workspace) as graph:
         for number in range(ROBOTS):
             ingest(workspace, replace(known, robot=replace(known.robot, name=f"R{number}")))
         graph.load_ontology()
@@ -164,7 +165,7 @@ def faults_of_answer(command: Command, workspace: Path, states: list[State | Non
     if not is_behind and None not in states and asked.stdout not in [of["answers"] for of in states if of]:
         found.append("another answer, and not a word of it")
     if is_behind:
-        workflow.catch_up(workspace)
+        workflow.catch_up(Location(workspace))
         if (differ := len(quads(workspace) ^ made_anew(workspace))) > 0:
             found.append(f"{differ} quads differ from what the database makes")
     return found

@@ -136,7 +136,7 @@ def soak_on(folder: Path, seconds: float, robots: int, rate: float, graph_url: s
 def fill(folder: Path, robots: int, graph_url: str | None) -> None:
     """Make a workspace of robots with twins, and its graph."""
     known = kr6()
-    with Workspace(folder) as place, KnowledgeGraph.of_workspace(place, graph_url) as graph:
+    with Workspace(folder, graph_url=graph_url) as place, KnowledgeGraph.of_workspace(place) as graph:
         graph.load_ontology()
         for number in range(robots):
             add_robot(place, f"R{number:03d}", known)

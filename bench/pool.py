@@ -17,9 +17,9 @@ from pathlib import Path
 import psutil
 
 from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool, Worker
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import Source
 
 SMALL = "SELECT ?name WHERE { ?joint a irt:Robot_Joint ; irt:Joint_Name ?name }"
 ENDLESS = "SELECT (COUNT(*) AS ?n) WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i . ?j ?k ?l }"
@@ -34,7 +34,7 @@ async def asked(worker: Worker, query: str) -> int:
 
 
 async def in_workers(graph: Path, repeats: int) -> None:
-    pool = Pool(Source(graph.parent), 2, Limits(seconds=SECONDS))
+    pool = Pool(Location(graph.parent), 2, Limits(seconds=SECONDS))
     await pool.open()
     times = []
     for _ in range(repeats):

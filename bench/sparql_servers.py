@@ -20,13 +20,14 @@ from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Table
+from irtwin.location import Location
 
 SUMMED, SIX_DIGITS = 1e-12, 1e-5  # relative
 LAST = "the last digits of sums"
 
 
 def main(workspace: Path, urls: list[str]) -> None:
-    with open_graph(workspace, None) as graph:
+    with open_graph(Location(workspace)) as graph:
         quads = list(graph.quads())
         began = time.perf_counter()
         known = {name: ask(graph, name) for name in named_questions()}

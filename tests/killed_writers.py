@@ -26,7 +26,7 @@ from tests.turn_takers import data_set
 
 def take_in(folder: Path, name: str, database: str | None = None, graph_url: str | None = None) -> None:
     """Take in a robot as `irtwin run` does, without its twin."""
-    with Workspace(folder, database) as place, rewriting(place, graph_url) as graph:
+    with Workspace(folder, database, graph_url=graph_url) as place, rewriting(place) as graph:
         place.ingest(*data_set(name, 2))
         graph.load_ontology()
         map_rows(place, graph)
@@ -37,8 +37,8 @@ def broken_off(folder: Path, name: str, database: str | None = None, graph_url: 
     """Take in a robot, and fail once its rows are there."""
     with (
         suppress(KeyboardInterrupt),
-        Workspace(folder, database) as place,
-        rewriting(place, graph_url),
+        Workspace(folder, database, graph_url=graph_url) as place,
+        rewriting(place),
     ):
         place.ingest(*data_set(name, 2))
         raise KeyboardInterrupt

@@ -46,13 +46,13 @@ def workspace(made: Path, tmp_path: Path) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def opened(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Workspace, KnowledgeGraph]]:
     copy = shutil.copytree(made, tmp_path_factory.mktemp("opened") / "place")
-    with Workspace.existing(copy) as place, rewriting(place, None) as graph:
+    with Workspace.existing(copy) as place, rewriting(place) as graph:
         yield place, graph
 
 
 def update(workspace: Path, text: str, author: str = "anna") -> None:
     """Do an update as `irtwin serve` does in a process of its own."""
-    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+    with Workspace.existing(workspace) as place, rewriting(place) as graph:
         follow(place, graph, keep(place, graph, *graph.difference(text), author))
 
 

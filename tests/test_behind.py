@@ -83,7 +83,7 @@ def hold(before: Path, tmp_path: Path, moments: list[int]) -> list[str | None]:
         answer, stands = answered(folder)
         assert stands == BEHIND or answer in whole
         stood.append(stands)
-        with Workspace(folder) as place, rewriting(place, None):
+        with Workspace(folder) as place, rewriting(place):
             pass
         answer, stands = answered(folder)
         assert stands is None
@@ -119,7 +119,7 @@ def test_on_servers_as_well(tmp_path: Path, new_postgresql_database: Callable[[]
         assert process.exitcode == -9
         with KnowledgeGraph(server.url, tmp_path) as graph:
             assert standing(graph, tmp_path) == BEHIND
-            with Workspace(tmp_path, database) as place, rewriting(place, server.url):
+            with Workspace(tmp_path, database, graph_url=server.url) as place, rewriting(place):
                 pass
             assert standing(graph, tmp_path) is None
             assert without_notes(said(graph)) == without_notes(made_anew(tmp_path, tmp_path, database))
@@ -151,7 +151,7 @@ def test_who_asks_is_warned(before: Path, tmp_path: Path) -> None:
 def test_what_fails_before_it_changes_anything_leaves_the_graph_whole(before: Path, tmp_path: Path) -> None:
     folder = tmp_path / "workspace"
     shutil.copytree(before, folder)
-    with pytest.raises(InputError, match="no robot"), Workspace(folder) as place, rewriting(place, None):
+    with pytest.raises(InputError, match="no robot"), Workspace(folder) as place, rewriting(place):
         find_robot(place, "Nobody")
     assert answered(folder)[1] is None
 

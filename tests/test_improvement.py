@@ -169,7 +169,7 @@ def test_the_log_stays_beside_the_data_set_and_is_judged(improved: tuple[Path, S
     assert rows["again"]["part"] == "both"
     assert rows["swing_2"]["part"] == "held_out"
     assert max(row["error_percent"] for row in rows.values()) < 1
-    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+    with Workspace.existing(workspace) as place, rewriting(place) as graph:
         assert list(validate(graph)) == []
     page = (workspace / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert ">Rounds of improvement</h3>" in page

@@ -2,6 +2,9 @@
 
 import doctest
 import inspect
+import json
+import subprocess
+import sys
 
 import pyarrow.parquet as pq
 import pytest
@@ -41,6 +44,27 @@ def test_a_name_that_is_not_there_is_told():
 
 def test_effects_go_by_name():
     assert irtwin.catalogue()["stribeck_friction"].family == "friction"
+
+
+WITHOUT_GRAPH = """
+import json, sys
+import irtwin
+imported = {name.partition(".")[0] for name in sys.modules}
+irtwin.diagnose(sys.argv[1], json_file=sys.argv[2])
+diagnosed = {name.partition(".")[0] for name in sys.modules}
+print(json.dumps([sorted(imported), sorted(diagnosed)]))
+"""
+
+
+@pytest.mark.slow
+def test_a_diagnosis_alone_imports_no_graph_database_or_page(tmp_path):
+    data, gap = data_set(tmp_path / "data", "Arm"), tmp_path / "gap.json"
+    done = subprocess.run([sys.executable, "-c", WITHOUT_GRAPH, data, gap], capture_output=True, text=True, check=True)
+    imported, diagnosed = map(set, json.loads(done.stdout))
+    assert not imported & {"numpy", "scipy", "pinocchio", "pyarrow"}
+    heavy = {"sqlalchemy", "pyoxigraph", "rdflib", "pyshacl", "owlready2", "jinja2", "starlette", "duckdb"}
+    assert not diagnosed & heavy
+    assert gap.exists()
 
 
 @pytest.mark.slow

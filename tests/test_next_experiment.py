@@ -17,7 +17,7 @@ from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.gap.experiment.programmes import Programme, programmes
-from irtwin.next_experiment import motion_text, save_motion
+from irtwin.proposed_motion import motion_text, save_motion
 from irtwin.signals.samples import read_signals
 from tests.synthetic import arm, swing
 

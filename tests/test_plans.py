@@ -16,6 +16,7 @@ from sqlalchemy import select
 from irtwin import asking, plans, workflow
 from irtwin.errors import InputError
 from irtwin.knowledge.shacl.validation import validate
+from irtwin.location import Location
 from irtwin.planning.plan import Task
 from irtwin.providers.records import ingest
 from irtwin.signals.channels import from_columns
@@ -148,7 +149,7 @@ def test_what_is_planned_is_in_no_sum(performed: Path) -> None:
 
 
 def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
-    with Workspace.existing(performed) as place, rewriting(place, None) as graph:
+    with Workspace.existing(performed) as place, rewriting(place) as graph:
         assert list(validate(graph)) == []
     page = (performed / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert ">Planned motions</h3>" in page
@@ -287,7 +288,7 @@ def test_a_robot_without_a_twin_prices_nothing(tmp_path: Path) -> None:
     with Workspace(tmp_path):
         pass
     with pytest.raises(InputError, match='no robot "arm_2" here'):
-        plans.plan("arm_2", Task(np.zeros(2), np.ones(2)), tmp_path, name="x")
+        plans.plan("arm_2", Task(np.zeros(2), np.ones(2)), Location(tmp_path), name="x")
 
 
 def toml_with(folder: Path, text: str) -> Path:
@@ -372,7 +373,7 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
     }
     quick, slower = energies["done"], energies["slower"]
     assert row["times_longer"] == pytest.approx(slower["s"] / quick["s"], rel=1e-3)
-    twin = plans.robot_twin("arm_2", performed)
+    twin = plans.robot_twin("arm_2", Location(performed))
     q = np.repeat([[1.0, -1.0]], 50, axis=0)  # where the motion ends
     held = Motion(np.linspace(0, 1, 50), q, 0 * q, 0 * q, run="held")
     waiting = float(np.mean(twin.power(held))) * (slower["s"] - quick["s"])

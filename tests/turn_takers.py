@@ -17,7 +17,7 @@ NAMES = ("A", "B")
 def taken_in(folder: Path, url: str | None, name: str) -> None:
     """Take in a robot, then a robot that all take in, each time with rows and graph."""
     for robot_id, number in ((name, 1), ("shared", NAMES.index(name) + 2)):
-        with Workspace(folder, url) as place, rewriting(place, None) as graph:
+        with Workspace(folder, url) as place, rewriting(place) as graph:
             place.ingest(*data_set(robot_id, number))
             map_rows(place, graph)
 
@@ -35,6 +35,6 @@ def data_set(robot_id: str, number: int) -> tuple[object, ...]:
 
 def hold(folder: Path, url: str | None, ready: Connection) -> None:
     """Hold all that a writer may hold, for good."""
-    with Workspace(folder, url) as place, rewriting(place, None), engine.writing(place.engine):
+    with Workspace(folder, url) as place, rewriting(place), engine.writing(place.engine):
         ready.send_bytes(b".")
         signal.pause()

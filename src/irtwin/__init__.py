@@ -3,7 +3,7 @@
 As a library: `read_data_set` reads a data set, `identify` fits a `Twin` to it, `predict` says what the twin expects of
 a run, `diagnose` says where twin and robot differ and why, a `Diagnosis` whose `document` is what JSON, graph and page
 say; `read_urdf` gives a `Robot`, `catalogue` the effects.
-With a workspace: `run`, `adopt`, `ask`, `export`.
+With a workspace: `run`, `adopt`, `ask`, `export`; a `Location` names one whose database or graph is kept elsewhere.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ __version__ = "0.2.0"
 __all__ = [
     "DataSet",
     "Diagnosis",
+    "Location",
     "Robot",
     "Twin",
     "adopt",
@@ -31,24 +32,27 @@ __all__ = [
 
 if TYPE_CHECKING:
     from irtwin.asking import ask, export
+    from irtwin.diagnosing import diagnose
     from irtwin.effects.catalogue import catalogue
     from irtwin.gap.diagnosis import Diagnosis
+    from irtwin.location import Location
     from irtwin.modelling import identify, predict
     from irtwin.robot.description import Robot
     from irtwin.robot.urdf import read_urdf
     from irtwin.signals.log import DataSet, read_data_set
     from irtwin.twin.twin import Twin
-    from irtwin.workflow import adopt, diagnose, run
+    from irtwin.workflow import adopt, run
 
 _MODULES = {
     "DataSet": "signals.log",
     "Diagnosis": "gap.diagnosis",
+    "Location": "location",
     "Robot": "robot.description",
     "Twin": "twin.twin",
     "adopt": "workflow",
     "ask": "asking",
     "catalogue": "effects.catalogue",
-    "diagnose": "workflow",
+    "diagnose": "diagnosing",
     "export": "asking",
     "identify": "modelling",
     "predict": "modelling",

@@ -13,45 +13,43 @@ from irtwin.knowledge.questions import queries
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.store.table import Table
+from irtwin.location import WORKSPACE, Location
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
     from irtwin.knowledge.explain.explanation import Explanation
 
-WORKSPACE = Path("irtwin-workspace")
 BEHIND, UPDATING = "behind", "updating"  # the standing of a graph that is not whole
 
 
-def ask(
-    question: str, workspace: Path | str = WORKSPACE, *, robot: str | None = None, graph_url: str | None = None
-) -> Table:
+def ask(question: str, workspace: Location | Path | str = WORKSPACE, *, robot: str | None = None) -> Table:
     """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph.
 
-    `graph_url` is that of a SPARQL server that keeps the graph. InputError where there is no graph or no answer.
+    Raises InputError where there is no graph or no answer.
     """
-    with open_graph(Path(workspace), graph_url) as graph:
+    with open_graph(Location.of(workspace)) as graph:
         return queries.ask(graph, question, robot)
 
 
-def explain(triple: str, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> tuple[Explanation, ...]:
+def explain(triple: str, workspace: Location | Path | str = WORKSPACE) -> tuple[Explanation, ...]:
     """Explain the triples of a workspace's graph that fit a pattern of subject, predicate and object."""
     from irtwin.knowledge.explain.explain import explain as explain_triples
 
-    with open_graph(Path(workspace), graph_url) as graph:
+    with open_graph(Location.of(workspace)) as graph:
         return explain_triples(graph, triple)
 
 
-def export(owl: Path | str, workspace: Path | str = WORKSPACE, *, graph_url: str | None = None) -> None:
+def export(owl: Path | str, workspace: Location | Path | str = WORKSPACE) -> None:
     """Write a workspace's ontology, individuals and inferences as one RDF/XML file."""
     from irtwin.knowledge.store.export import export_owl
 
-    with open_graph(Path(workspace), graph_url) as graph:
+    with open_graph(Location.of(workspace)) as graph:
         export_owl(graph, Path(owl))
 
 
-def questions(workspace: Path | str = WORKSPACE) -> Table:
+def questions(workspace: Path = WORKSPACE) -> Table:
     """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
-    known = queries.named_questions(checked(Path(workspace))).values()
+    known = queries.named_questions(checked(workspace)).values()
     rows = (
         {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
     )
@@ -59,19 +57,19 @@ def questions(workspace: Path | str = WORKSPACE) -> Table:
 
 
 @contextmanager
-def open_graph(workspace: Path, url: str | None) -> Iterator[KnowledgeGraph]:
-    """Give a workspace's graph, or a server's, as it stands.
+def open_graph(location: Location) -> Iterator[KnowledgeGraph]:
+    """Give a workspace's graph, in its folder or on a server, as it stands.
 
     One that is behind the database is told by the warning GraphBehind. Raises InputError where there is none, or for a
     fault in what extends the workspace.
     """
+    workspace, folder = location.folder, location.graph_folder
     checked(workspace)
-    if url is not None:
-        with KnowledgeGraph(url, workspace) as graph:
+    if location.graph_url is not None:
+        with KnowledgeGraph(location.graph_url, workspace) as graph:
             _warn(graph, workspace)
             yield graph
         return
-    folder = workspace / "graph"
     if not folder.is_dir():
         from irtwin.storage.database import Workspace
 
@@ -110,9 +108,9 @@ def _warn(graph: KnowledgeGraph, workspace: Path) -> None:
         warnings.warn(GraphBehind(in_words(found, workspace)), stacklevel=5)  # whoever asks a question
 
 
-def contradictions(workspace: Path, url: str | None) -> list[str]:
+def contradictions(location: Location) -> list[str]:
     """Return, in words, which statements of a graph contradict each other. Raises InputError as `open_graph`."""
-    with open_graph(workspace, url) as graph:
+    with open_graph(location) as graph:
         return contradictions_of(graph)
 
 

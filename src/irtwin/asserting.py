@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pyoxigraph import Quad
 
@@ -21,12 +21,13 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.limits import limit_memory
+from irtwin.location import Location
 from irtwin.storage.database import Workspace
 
 if TYPE_CHECKING:  # they take seconds to import, which an update of a graph without a database can spare
     from irtwin.knowledge.asserted.edited import Edit
     from irtwin.knowledge.asserted.statements import Assertion
-    from irtwin.workflow import Announce
+    from irtwin.modelling import Announce
 
 _SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 _BUSY = "another process is writing the graph: try again later"
@@ -34,12 +35,10 @@ _BUSY = "another process is writing the graph: try again later"
 
 def take_edited(
     owl: Path,
-    workspace: Path,
+    location: Location,
     *,
     author: str,
     agrees: Callable[[Edit], bool],
-    database: str | None = None,
-    graph_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Assertion | None:
     """Take in what was changed in an OWL file since `irtwin export` wrote it; None where nothing was, or not agreed.
@@ -50,7 +49,7 @@ def take_edited(
     from irtwin.knowledge.asserted.edited import edit_of
     from irtwin.workflow import rewriting
 
-    with Workspace.existing(workspace, database) as place, rewriting(place, graph_url, announce) as graph:
+    with Workspace.existing(location) as place, rewriting(place, announce) as graph:
         edit = edit_of(graph, owl)
         if not agrees(edit):
             return None
@@ -87,11 +86,12 @@ def follow(place: Workspace, graph: KnowledgeGraph, said: Assertion, announce: A
 def main(memory: int) -> None:
     """Do the update on standard input; write what is wrong with it. Both are JSON."""
     request = json.load(sys.stdin.buffer)
-    if request["url"] is None:
+    location = Location.told(request["location"])
+    if location.graph_url is None:
         leave_network()
     with ExitStack() as held:
         try:
-            place, graph = held.enter_context(_opened(request))
+            place, graph = held.enter_context(_opened(location))
         except ServerFault as error:
             return _answer(_of_server(error))
         except InputError:
@@ -112,16 +112,15 @@ def main(memory: int) -> None:
 
 
 @contextmanager
-def _opened(request: dict[str, Any]) -> Iterator[tuple[Workspace | None, KnowledgeGraph]]:
+def _opened(location: Location) -> Iterator[tuple[Workspace | None, KnowledgeGraph]]:
     """Open the graph to write, with its workspace; of a graph that has no database it is all that is kept."""
-    folder, url = Path(request["workspace"]), request["url"]
-    if Workspace.is_there(folder, request["database"]):
+    if Workspace.is_there(location):
         from irtwin.workflow import rewriting
 
-        with Workspace.existing(folder, request["database"]) as place, rewriting(place, url) as graph:
+        with Workspace.existing(location) as place, rewriting(place) as graph:
             yield place, graph
     else:
-        with KnowledgeGraph(url or folder / "graph", folder) as graph:
+        with KnowledgeGraph(location.graph_url or location.graph_folder, location.folder) as graph:
             yield None, graph
 
 

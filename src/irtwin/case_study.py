@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import tomllib
-from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +14,8 @@ import pyarrow.parquet as pq
 from irtwin import plans, resources, workflow
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.location import Location
+from irtwin.modelling import Announce
 from irtwin.planning.plan import Plan, Task
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.records import identifier, robot_iri
@@ -24,8 +25,6 @@ from irtwin.report.energy.scene import draw_scene
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-
-Announce = Callable[[str], None]
 
 ROBOT = "KUKA_KR6_R700"
 PLANNED, MEASURED = "process", "process_measured"
@@ -63,7 +62,7 @@ def case_study(workspace: Path, announce: Announce = lambda line: None) -> Path:
     announce(f"3. The measurement: the simulated robot carried the plan out, {1000 * off:.1f} mrad off at most")
     workflow.run(data_set, workspace)
     announce("4. The page: read back from the graph")
-    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place, None) as graph:
+    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
         robot = graph.iri(robot_iri(identifier(ROBOT)))
         described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document)
         out = place.file("reports/case_study.html")
@@ -86,14 +85,14 @@ def unpack(workspace: Path) -> Path:
 
 def identify(data_set: Path, workspace: Path) -> None:
     """Take a data set in, with the twin that is identified from it; nothing is concluded before the plan is there."""
-    with Workspace(workspace) as place, workflow.rewriting(place, None) as graph:
+    with Workspace(workspace) as place, workflow.rewriting(place) as graph:
         workflow.take_in(place, read_data_set(data_set))
         graph.load_ontology()
 
 
 def plan_process(workspace: Path) -> tuple[Plan, plans.Kept]:
     """Plan the process by the twin in the workspace, and keep it there."""
-    return plans.plan(ROBOT, TASK, workspace, name=PLANNED)
+    return plans.plan(ROBOT, TASK, Location(workspace), name=PLANNED)
 
 
 def add_measurement(data_set: Path, plan: Plan) -> float:

@@ -30,51 +30,36 @@ class FileKind:
     commands: tuple[tuple[str, str], ...]
 
 
+def _kind(what: str, *commands: tuple[str, str]) -> FileKind:
+    return FileKind(what, commands)
+
+
 def file_kind(path: Path) -> FileKind:
     """Return what a file or folder is. Raises InputError where it is nothing that irtwin takes, or cannot be read."""
     shown, suffix = shlex.quote(str(path)), path.suffix.lower()
     if path.is_dir():
         return _folder(path, shown)
     if suffix in _TEXTS and is_metered(names_of(path)):
-        return FileKind(
-            "a meter's log: power or energy, and no joint",
-            (
-                (
-                    f"irtwin import {shown} --out FOLDER",
-                    "makes a data set of it, for `irtwin run FOLDER`: load, standby, cycles and cost, without a twin",
-                ),
-            ),
-        )
+        made = "makes a data set of it, for `irtwin run FOLDER`: load, standby, cycles and cost, without a twin"
+        return _kind("a meter's log: power or energy, and no joint", (f"irtwin import {shown} --out FOLDER", made))
     if suffix in _LOGS:
-        return FileKind(
-            "a log",
-            (
-                (
-                    f"irtwin import {shown} --robot ROBOT.urdf --out FOLDER",
-                    "makes a data set of it, and says what each column is",
-                ),
-            ),
-        )
+        made = "makes a data set of it, and says what each column is"
+        return _kind("a log", (f"irtwin import {shown} --robot ROBOT.urdf --out FOLDER", made))
     if suffix in (".urdf", ".xml"):
         return _model(path, shown)
     if suffix == ".json":
-        return FileKind(
+        return _kind(
             "a twin, if `--save-twin` wrote it",
-            (
-                (f"irtwin predict {shown} RUN --out FILE", "torque, power and energy that it expects of a motion"),
-                (f"irtwin plan {shown} --from POSE --to POSE --out FILE", "a motion, and what it costs"),
-                (f"irtwin diagnose DATASET --twin {shown}", "where new logs differ from it, and why"),
-            ),
+            (f"irtwin predict {shown} RUN --out FILE", "torque, power and energy that it expects of a motion"),
+            (f"irtwin plan {shown} --from POSE --to POSE --out FILE", "a motion, and what it costs"),
+            (f"irtwin diagnose DATASET --twin {shown}", "where new logs differ from it, and why"),
         )
     if suffix == ".zip":
-        return FileKind(
-            "an archive, if `irtwin backup` wrote it",
-            ((f"irtwin restore {shown} --workspace NEW", "makes a workspace of it"),),
-        )
+        command = f"irtwin restore {shown} --workspace NEW"
+        return _kind("an archive, if `irtwin backup` wrote it", (command, "makes a workspace of it"))
     if suffix in _GRAPHS:
-        return FileKind(
-            "a graph", ((f"irtwin reason {shown} --out FILE", "draws all conclusions from it, by OWL 2 RL"),)
-        )
+        command = f"irtwin reason {shown} --out FILE"
+        return _kind("a graph", (command, "draws all conclusions from it, by OWL 2 RL"))
     raise InputError(
         f"{path}: neither a data set, a workspace, a log ({', '.join(_LOGS)}), a robot (.urdf), a model of MuJoCo "
         "(.xml), a twin (.json) nor an archive (.zip); `irtwin --help` lists what can be done"
@@ -91,22 +76,18 @@ def names_of(path: Path) -> list[str]:
 
 def _folder(path: Path, shown: str) -> FileKind:
     if (path / "dataset.toml").is_file():
-        return FileKind(
+        return _kind(
             _data_set(read_toml(path / "dataset.toml")),
-            (
-                (f"irtwin check {shown}", "looks for faults of its logs: signs, swapped columns, units, dead channels"),
-                (f"irtwin run {shown}", "builds twin, graph and energy report"),
-                (f"irtwin diagnose {shown} --report gap.html", "says where twin and robot differ, and why"),
-            ),
+            (f"irtwin check {shown}", "looks for faults of its logs: signs, swapped columns, units, dead channels"),
+            (f"irtwin run {shown}", "builds twin, graph and energy report"),
+            (f"irtwin diagnose {shown} --report gap.html", "says where twin and robot differ, and why"),
         )
     if Workspace.is_there(path):
-        return FileKind(
+        return _kind(
             "a workspace",
-            (
-                (f"irtwin status --workspace {shown}", "what is in it"),
-                (f"irtwin serve --workspace {shown}", "its pages, in the browser, and its SPARQL endpoint"),
-                (f"irtwin query --workspace {shown}", "the questions that it answers"),
-            ),
+            (f"irtwin status --workspace {shown}", "what is in it"),
+            (f"irtwin serve --workspace {shown}", "its pages, in the browser, and its SPARQL endpoint"),
+            (f"irtwin query --workspace {shown}", "the questions that it answers"),
         )
     logs = sorted(file for file in path.iterdir() if file.suffix.lower() in _LOGS)
     if not logs:
@@ -114,15 +95,9 @@ def _folder(path: Path, shown: str) -> FileKind:
             f"{path}: a folder without dataset.toml, workspace or logs ({', '.join(_LOGS)}); name a file in it, or "
             "make a data set: `irtwin init FOLDER --robot ROBOT.urdf`"
         )
-    return FileKind(
-        f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}",
-        (
-            (
-                f"irtwin import {shown}/*{logs[0].suffix} --robot ROBOT.urdf --out FOLDER",
-                "makes a data set of them, a run a file",
-            ),
-        ),
-    )
+    command = f"irtwin import {shown}/*{logs[0].suffix} --robot ROBOT.urdf --out FOLDER"
+    said = f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}"
+    return _kind(said, (command, "makes a data set of them, a run a file"))
 
 
 def _data_set(document: dict[str, Any]) -> str:
@@ -140,20 +115,11 @@ def _model(path: Path, shown: str) -> FileKind:
     with path.open("rb") as file:
         head = file.read(_HEAD)
     if b"<mujoco" in head:
-        return FileKind(
-            "a model of MuJoCo",
-            (
-                (
-                    f"irtwin diagnose DATASET --simulator {shown} --save-simulator NEW.xml",
-                    "says what it has otherwise than the robot, and mends it",
-                ),
-            ),
-        )
-    return FileKind(
+        command = f"irtwin diagnose DATASET --simulator {shown} --save-simulator NEW.xml"
+        return _kind("a model of MuJoCo", (command, "says what it has otherwise than the robot, and mends it"))
+    return _kind(
         "a robot's description",
-        (
-            (f"irtwin import LOG --robot {shown} --out FOLDER", "makes a data set of a log of this robot"),
-            (f"irtwin excite {shown} --seconds 20 --out motion.csv", "a motion that shows all that a twin needs"),
-            (f"irtwin robot dh {shown}", "its Denavit-Hartenberg table"),
-        ),
+        (f"irtwin import LOG --robot {shown} --out FOLDER", "makes a data set of a log of this robot"),
+        (f"irtwin excite {shown} --seconds 20 --out motion.csv", "a motion that shows all that a twin needs"),
+        (f"irtwin robot dh {shown}", "its Denavit-Hartenberg table"),
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.location import Location
+from irtwin.modelling import Announce, sound
 from irtwin.next_experiment import NextExperiment, next_experiment
 from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
@@ -14,9 +15,7 @@ from irtwin.providers.records import check_run_name, find_robot, keep_run, load_
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-from irtwin.workflow import conclude, map_rows, populate_apart, populate_others, rewriting, sound, write_report
-
-Announce = Callable[[str], None]
+from irtwin.workflow import conclude, map_rows, populate_apart, populate_others, rewriting, write_report
 
 
 @dataclass(frozen=True)
@@ -36,14 +35,12 @@ class Improvement:
 def improve(
     robot: str,
     new_log: Path,
-    workspace: Path | str,
+    location: Location,
     *,
     payload_mass: float = 0.0,
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
     performs: str | None = None,
     repair: bool = False,
-    database: str | None = None,
-    graph_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Improvement:
     """Take a new log of a robot into its workspace, and better its twin by it where that can be.
@@ -53,7 +50,7 @@ def improve(
     Raises InputError, and changes nothing, where the robot is unknown or has no twin, the log is none of it, its name
     is taken, or it has no power to judge by.
     """
-    with Workspace.existing(Path(workspace), database) as place:
+    with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
         load_twin(place, robot_id)
         known = load_robot(place, robot_id)
@@ -63,7 +60,7 @@ def improve(
         for run in logged.runs:
             check_run_name(place, robot_id, run.name)
         runs = sound(logged, announce).runs
-        with rewriting(place, graph_url, announce) as graph:
+        with rewriting(place, announce) as graph:
             graph.load_ontology()
             limit = _limit(graph)
             with staged(place, robot_id) as apart:
@@ -75,7 +72,7 @@ def improve(
             populate_others(place, graph, announce)  # live runs by the new twin
             conclude(graph, announce)
             following = next_experiment(place, graph, robot_id)
-        report = write_report(place, graph_url, robot_id)
+        report = write_report(place, robot_id)
         return Improvement(improved.rounds, improved.within, limit, following, report)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pyarrow.parquet
 
 from irtwin.check.check import Checked, check, checked
 from irtwin.effects.effect import Effect
+from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
 from irtwin.gap.isolation.torque_scale import torque_scale_of
@@ -35,6 +37,8 @@ from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
 from irtwin.twin.price import Price, price
 from irtwin.twin.twin import Twin
+
+Announce = Callable[[str], None]
 
 
 def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | None = None) -> Twin:
@@ -99,6 +103,32 @@ def check_log(folder: Path, *, repair: bool = False, json_file: Path | None = No
         document = {"findings": [finding.to_json() for finding in result.findings]}
         write(json_file, (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
     return result
+
+
+def read_sound(folder: Path, repair: bool, announce: Announce, commanded: bool = False) -> DataSet:
+    """Read a data set and check it; say what was dropped, found and mended. Raises InputError on what must be cured."""
+    data_set = read_data_set(folder, repair=repair, commanded=commanded)
+    try:
+        Stack(data_set.robot, data_set.effects or ())
+    except InputError as error:
+        raise InputError(f"{data_set.folder / 'dataset.toml'}: [twin] effects: {error}") from error
+    return sound(data_set, announce)
+
+
+def sound(data_set: DataSet, announce: Announce) -> DataSet:
+    """Return a data set, mended where that leaves no doubt; say what was. Raises InputError on what must be cured."""
+    for line in data_set.repairs:
+        announce(f"  {line}")
+    found = checked(data_set)
+    for line in dict.fromkeys(finding.say for finding in found.findings):
+        announce(f"  {line}")
+    return found.data_set
+
+
+def clocked(announce: Announce) -> Announce:
+    """Put the seconds since now before each line."""
+    began = time.monotonic()
+    return lambda line: announce(f"{time.monotonic() - began:5.1f} s  {line}")
 
 
 @dataclass(frozen=True)

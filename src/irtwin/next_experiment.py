@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from sqlalchemy import select
 
 from irtwin.document import form
-from irtwin.document.experiment import Experiment, Programme
-from irtwin.effects.catalogue import catalogue
+from irtwin.document.experiment import Experiment
 from irtwin.errors import InputError
-from irtwin.gap.diagnosis import Diagnosis
 from irtwin.identification.excitation import excite
 from irtwin.json_text import parse_json
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.modelling import expect
-from irtwin.planning.admission import check_motion
-from irtwin.planning.plan import nominal_twin
+from irtwin.proposed_motion import by_hand, how_to_play, play
 from irtwin.providers.records import load_robot, load_twin
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
-from irtwin.signals.channels import Signals, csv_text
-from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove, write
 from irtwin.storage.gap_schema import GapDiagnosis
@@ -86,35 +81,6 @@ def proposal_files(place: Workspace, robot_id: str) -> tuple[InsidePath, InsideP
     return place.file(f"{_FOLDER}/{robot_id}.txt"), place.file(f"{_FOLDER}/{robot_id}.csv")
 
 
-def save_motion(found: Diagnosis, out: Path) -> str:
-    """Write the motion of a diagnosis' next experiment as CSV; say what to do with it, or why there is none.
-
-    Raises InputError where the file cannot be written.
-    """
-    proposed, motion = found.experiment, found.planned
-    if proposed is None or proposed.programme is None or motion is None:
-        return f"{out} was not written: {_by_hand(proposed)}"
-    twin = found.twin or nominal_twin(found.description)
-    collisions = CollisionModel(twin.robot)
-    try:
-        for mass in sorted(set(proposed.programme.payload_mass)):
-            com = proposed.programme.payload_com or (0.0, 0.0, 0.0)
-            check_motion(twin, replace(motion, payload_mass=mass, payload_com=com), collisions, out)
-    except InputError as error:
-        return f"The motion of the next experiment was not written, as the robot cannot make it: {error}"
-    write(out, _csv(motion, twin.robot).encode())
-    return " ".join(_how_to_play(proposed.programme, out, collisions.checks_itself))
-
-
-def motion_text(found: Diagnosis) -> str | None:
-    """Return the motion of a diagnosis' next experiment as CSV, None where there is none."""
-    return None if found.planned is None else _csv(found.planned, found.description)
-
-
-def _csv(motion: Motion, robot: Robot) -> str:
-    return csv_text(Signals(motion.time - motion.time[0], motion.q, dq=motion.dq, ddq=motion.ddq), robot.joint_names)
-
-
 def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
     """Write the motion of the diagnosis' programme; return how to play it. Nothing where no diagnosis designed any."""
     with place.reading() as session:
@@ -128,7 +94,7 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
         return []
     if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:
         remove(out)
-        return [f"No motion is written: {_by_hand(proposed)}."]
+        return [f"No motion is written: {by_hand(proposed)}."]
     twin = load_twin(place, robot_id)[1]
     write(out, place.read_document(found.motion_file, found.motion_sha256))
     try:
@@ -137,41 +103,7 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
             checked = expect(twin, out, payload_mass=mass, payload_com=com)
     except InputError as error:
         return [f"The robot cannot make the motion of that ({error}).", *_exciting(twin.robot, out)]
-    return _how_to_play(proposed.programme, out, checked.checks_itself)
-
-
-def _by_hand(proposed: Experiment | None) -> str:
-    if proposed is None:
-        return "the diagnosis proposes no experiment"
-    tests = "; ".join(proposed.motions)
-    return f"it is done by hand ({tests})" if tests else f"no motion helps ({proposed.note or proposed.purpose})"
-
-
-def _how_to_play(programme: Programme, motion: Path, checks_itself: bool) -> list[str]:
-    """Say how a programme's motion is played, run by run."""
-    seconds = programme.seconds / len(programme.payload_mass)
-    off = [catalogue()[name].taken_off for name in programme.taken_off]
-    runs = [_of_run(programme, number) for number in range(len(programme.payload_mass))]
-    words = [_play(motion, f"{seconds:.3g}", checks_itself)]
-    if off:
-        words.append(f"Play it {', '.join(filter(None, off))}.")
-    if any(runs):
-        words.append(f"Play it {len(runs)} times, each a log of its own: {'; '.join(runs)}.")
-    return words
-
-
-def _of_run(programme: Programme, number: int) -> str:
-    """Say what is different in one of a programme's runs; nothing where nothing is."""
-    said = []
-    if any(programme.payload_mass):
-        mass, com = programme.payload_mass[number], programme.payload_com or (0.0, 0.0, 0.0)
-        at = " ".join(f"{value:g}" for value in com)
-        load = f"with {mass:g} kg at the flange, as the controller is told (--payload-mass {mass:g} --payload-com {at})"
-        said.append(load if mass else "without load")
-    if programme.temperatures:
-        state = "cold" if number == 0 else f"warm, after {programme.set_up_seconds / 60:g} minutes of work"
-        said.append(f"{state}, joints at some {programme.temperatures[number]:g} degC, their temperatures logged")
-    return ", ".join(said)
+    return how_to_play(proposed.programme, out, checked.checks_itself)
 
 
 def _exciting(robot: Robot, motion: InsidePath) -> list[str]:
@@ -181,12 +113,4 @@ def _exciting(robot: Robot, motion: InsidePath) -> list[str]:
     except InputError as error:
         remove(motion)
         return [f"No motion could be designed ({error}). Move all joints, slowly and fast, over their whole range."]
-    return [_play(motion, f"{_SECONDS:g}", CollisionModel(robot).checks_itself)]
-
-
-def _play(motion: Path, seconds: str, checks_itself: bool) -> str:
-    itself = "" if checks_itself else "; whether it meets itself was not checked"
-    return (
-        f"Play {motion} on the robot, {seconds} s from rest to rest within its limits. Check the way first: "
-        f"nothing is known of what stands about it{itself}."
-    )
+    return [play(motion, f"{_SECONDS:g}", CollisionModel(robot).checks_itself)]

@@ -9,15 +9,16 @@ from typing import TypeVar
 
 from irtwin import modelling
 from irtwin.errors import InputError
-from irtwin.modelling import Expectation
+from irtwin.location import Location
+from irtwin.modelling import Announce, Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.plan import Plan, Task
 from irtwin.planning.programme import Programme, programme_of
 from irtwin.providers.energy import stored_price
 from irtwin.providers.records import (
     check_run_name,
-    find_measured,
     find_robot,
+    find_run,
     keep_run,
     load_run,
     load_twin,
@@ -27,10 +28,11 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan, run_of
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
+from irtwin.storage.schema import MEASURED_RUN
 from irtwin.storage.staging import staged
 from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
-from irtwin.workflow import Announce, conclude, map_rows, populate_apart, rewriting, write_report
+from irtwin.workflow import populate_apart, renew, rewriting, write_report
 
 T = TypeVar("T")
 
@@ -48,25 +50,23 @@ class Kept:
     report: Path
 
 
-def robot_twin(robot: str | None, workspace: Path | str, database: str | None = None) -> Twin:
+def robot_twin(robot: str | None, location: Location) -> Twin:
     """Return the twin of a robot of a workspace, of the only one where None.
 
     Raises InputError where there is no such robot, or no twin of it.
     """
-    with Workspace.existing(Path(workspace), database) as place:
+    with Workspace.existing(location) as place:
         return load_twin(place, find_robot(place, robot))[1]
 
 
 def plan(
     robot: str,
     task: Task,
-    workspace: Path | str,
+    location: Location,
     *,
     name: str,
     out: Path | None = None,
     rate: float = 100.0,
-    database: str | None = None,
-    graph_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Plan, Kept]:
     """Plan a motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
@@ -83,7 +83,7 @@ def plan(
 
     if out is not None:
         modelling.check_plan_file(out)
-    made, kept = _keep(robot, name, make, Path(workspace), database, graph_url, announce)
+    made, kept = _keep(robot, name, make, location, announce)
     if out is not None:
         modelling.write_motion(made.motion, made.joint_names, out)
     return made, kept
@@ -92,14 +92,12 @@ def plan(
 def predict(
     robot: str,
     motion: Path,
-    workspace: Path | str,
+    location: Location,
     *,
     name: str,
     out: Path | None = None,
     payload_mass: float | None = None,
     payload_com: tuple[float, float, float] | None = None,
-    database: str | None = None,
-    graph_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Expectation, Kept]:
     """Price a file's motion by the twin of a robot of a workspace, and keep it there as a planned run called `name`.
@@ -116,7 +114,7 @@ def predict(
 
     if out is not None:
         check_place(out)
-    expected, kept = _keep(robot, name, make, Path(workspace), database, graph_url, announce)
+    expected, kept = _keep(robot, name, make, location, announce)
     if out is not None:
         modelling.write_expectation(expected, out)
     return expected, kept
@@ -135,14 +133,12 @@ class Timings:
 def optimise(
     robot: str,
     run: str,
-    workspace: Path | str,
+    location: Location,
     *,
     name: str,
     cycle: float | None = None,
     least_pause: float | None = None,
     out: Path | None = None,
-    database: str | None = None,
-    graph_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Timings, Kept]:
     """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run `name`.
@@ -151,19 +147,20 @@ def optimise(
     motion, as of `plan`. Raises InputError, and keeps nothing, where there is no such run or name, the run has no whole
     move, the robot cannot be so fast, or its twin knows no power.
     """
-    place_of = Path(workspace)
     if out is not None:
         modelling.check_plan_file(out)
-    with Workspace.existing(place_of, database) as place:
+    with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
-        run_id = find_measured(place, robot_id, run).run_id
+        run_id = find_run(place, robot_id, run, MEASURED_RUN).run_id
 
     def make(twin: Twin) -> tuple[Timings, Run]:
         if not twin.knows_power:
-            raise InputError(f"{place_of}: the robot's twin has seen no power, so it cannot say what a timing saves")
-        with Workspace.existing(place_of, database) as place:
+            raise InputError(
+                f"{location.folder}: the robot's twin has seen no power, so it cannot say what a timing saves"
+            )
+        with Workspace.existing(location) as place:
             known = load_run(place, twin.robot, run_id)
-        programme = programme_of(condition(known, twin.robot, twin.cutoff), str(place_of))
+        programme = programme_of(condition(known, twin.robot, twin.cutoff), str(location.folder))
         times, was = CycleTimes(twin, programme, least_pause), float(programme.seconds.sum())
         best = times.in_time(cycle or was)
         made = run_of(
@@ -177,32 +174,24 @@ def optimise(
         )
         return Timings(twin.robot.joint_names, programme, best, times.curve()), made
 
-    found, kept = _keep(robot, name, make, place_of, database, graph_url, announce)
+    found, kept = _keep(robot, name, make, location, announce)
     if out is not None:
         modelling.write_motion(found.best.motion, found.joint_names, out)
     return found, kept
 
 
 def _keep(
-    robot: str,
-    name: str,
-    make: Callable[[Twin], tuple[T, Run]],
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
-    announce: Announce,
+    robot: str, name: str, make: Callable[[Twin], tuple[T, Run]], location: Location, announce: Announce
 ) -> tuple[T, Kept]:
-    with Workspace.existing(workspace, database) as place:
+    with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
         check_run_name(place, robot_id, name)
         _, twin = load_twin(place, robot_id)
         made, run = make(twin)
-        with rewriting(place, graph_url, announce) as graph:
+        with rewriting(place, announce) as graph:
             with staged(place, robot_id) as apart:
                 run_id = keep_run(apart, robot_id, twin.robot.joint_names, run)
                 populate_apart(apart, announce)
-            graph.load_ontology()
-            map_rows(place, graph)
-            conclude(graph, announce)
-        report = write_report(place, graph_url, robot_id)
+            renew(place, graph, announce)
+        report = write_report(place, robot_id)
         return made, Kept(robot_id, name, stored_price(place, run_id), report)

@@ -7,16 +7,16 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from pathlib import Path
 
 from sqlalchemy import select
 
-from irtwin.asking import BEHIND, WORKSPACE, contradictions_of, in_words, standing
+from irtwin.asking import BEHIND, contradictions_of, in_words, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED
+from irtwin.location import Location
 from irtwin.report.extensions import check
 from irtwin.resources import Resource
 from irtwin.storage.database import Workspace
@@ -55,10 +55,10 @@ class Status:
             self.faults.append(str(error))
 
 
-def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, graph_url: str | None = None) -> Status:
+def status(location: Location) -> Status:
     """Look a workspace through. Raises InputError where there is none, or its database cannot be read."""
     found = Status()
-    with Workspace.existing(Path(workspace), database) as place:
+    with Workspace.existing(location) as place:
         found.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
         found.parts["tables"] = _tables()
         storage = elsewhere(place.folder)
@@ -66,7 +66,7 @@ def status(workspace: Path | str = WORKSPACE, *, database: str | None = None, gr
             found.parts["series"] = [storage.url]
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
-            _look_at_graph(found, place, graph_url)
+            _look_at_graph(found, place)
         extensions = place.resources.extensions
         found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
         with found.noting():
@@ -113,10 +113,10 @@ def _robots(place: Workspace) -> list[str]:
     return lines
 
 
-def _look_at_graph(found: Status, place: Workspace, url: str | None) -> None:
+def _look_at_graph(found: Status, place: Workspace) -> None:
     with ExitStack() as held:
-        if url is not None:
-            graph = held.enter_context(KnowledgeGraph(url, place.folder, place.resources))
+        if place.location.graph_url is not None:
+            graph = held.enter_context(KnowledgeGraph.of_workspace(place))
         else:
             place.check_graph()
             if not (place.graph_folder / "CURRENT").is_file():

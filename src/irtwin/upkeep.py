@@ -12,11 +12,11 @@ from sqlalchemy import select
 
 from irtwin.alarms.settings import NAME
 from irtwin.alarms.settings import asks as alarm_asks
-from irtwin.asking import WORKSPACE
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.location import Location
+from irtwin.modelling import Announce
 from irtwin.next_experiment import proposal_files
-from irtwin.providers.effects_of_ontology import check_effects
 from irtwin.providers.records import find_robot, find_run, run_iri
 from irtwin.resources import resources_of
 from irtwin.storage import files
@@ -28,7 +28,7 @@ from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
 from irtwin.storage.series import is_whole
 from irtwin.storage.series_place import asks as series_asks
 from irtwin.storage.series_place import check as check_series
-from irtwin.workflow import Announce, check_before, conclude, map_rows, populate_others, rewriting, write_report
+from irtwin.workflow import check_before, fill, renew, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
 
@@ -44,22 +44,12 @@ def asked(workspace: Path) -> list[str]:
     return [*sorted(own), *(alarm_asks(settings) if settings.exists() else []), *series_asks(workspace)]
 
 
-def drop(
-    robot: str,
-    workspace: Path | str = WORKSPACE,
-    *,
-    database: str | None = None,
-    graph_url: str | None = None,
-    announce: Announce = lambda line: None,
-) -> None:
+def drop(robot: str, location: Location, announce: Announce = lambda line: None) -> None:
     """Forget a robot, by its name: rows, files, report, journals, and all that the graph says of it.
 
     Raises InputError, with the nearest name, where there is no such robot, or one that is watched just now.
     """
-    with (
-        Workspace.existing(Path(workspace), database) as place,
-        rewriting(place, graph_url, announce) as graph,
-    ):
+    with Workspace.existing(location) as place, rewriting(place, announce) as graph:
         robot_id = find_robot(place, robot)
         journals = of_robot(place.folder / LIVE, robot_id)
         if set(journals) - set(left_behind(place.folder / LIVE)):
@@ -71,34 +61,22 @@ def drop(
             files.remove(file)
         if journals:  # the graph may show what no row ever said
             place.mapped_rows.unlink(missing_ok=True)
-        graph.load_ontology()
-        map_rows(place, graph)
-        conclude(graph, announce)  # what was wrong with it goes too
+        renew(place, graph, announce)  # what was wrong with it goes too
 
 
-def drop_run(
-    robot: str,
-    run: str,
-    workspace: Path | str = WORKSPACE,
-    *,
-    database: str | None = None,
-    graph_url: str | None = None,
-    announce: Announce = lambda line: None,
-) -> None:
+def drop_run(robot: str, run: str, location: Location, announce: Announce = lambda line: None) -> None:
     """Forget a plan that was kept, or a live run, of a robot: rows, series, and all that the graph says of it.
 
     The robot's report is written anew. Raises InputError where there is no such run or it is watched just now, where it
     stands in a data set or the twin was judged by it, or another run carried it out.
     """
-    with Workspace.existing(Path(workspace), database) as place:
-        with rewriting(place, graph_url, announce) as graph:
+    with Workspace.existing(location) as place:
+        with rewriting(place, announce) as graph:
             robot_id = find_robot(place, robot)
             _drop_run(place, robot_id, run)
-            graph.load_ontology()
-            map_rows(place, graph)
-            conclude(graph, announce)
+            renew(place, graph, announce)
         if place.report_path(robot_id).exists():
-            write_report(place, graph_url, robot_id)
+            write_report(place, robot_id)
 
 
 def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
@@ -133,25 +111,18 @@ def _check_that_it_may_go(place: Workspace, run: Run) -> None:
         raise InputError(f'{place.folder}: the run "{done.name}" carried out "{run.name}"; {first}')
 
 
-def repair(
-    workspace: Path | str = WORKSPACE,
-    *,
-    database: str | None = None,
-    graph_url: str | None = None,
-    announce: Announce = lambda line: None,
-) -> None:
+def repair(location: Location, announce: Announce = lambda line: None) -> None:
     """Make the graph of a workspace anew from its database, and look through its files.
 
-    The graph that was there is replaced once the new one is whole. On a server, by `graph_url`, each named graph is
-    replaced in a transaction of its own. Raises InputError where the database is damaged, or at the end where files
+    The graph that was there is replaced once the new one is whole. On a server each named graph is replaced in a
+    transaction of its own. Raises InputError where the database is damaged, or at the end where files
     are lost that only a data set or a backup can give back.
     """
-    with Workspace.existing(Path(workspace), database) as place:
-        if graph_url is None:
+    with Workspace.existing(location) as place:
+        if location.graph_url is None:
             _rebuild(place, announce)
         else:
-            with rewriting(place, graph_url) as graph:
-                place.mapped_rows.unlink(missing_ok=True)
+            with rewriting(place) as graph:
                 _fill(place, graph, announce)
         lost = lost_files(place)
     for line in lost:
@@ -167,20 +138,15 @@ def _rebuild(place: Workspace, announce: Announce) -> None:
     """Make the graph in a folder anew, and put it in place of the old one."""
     check_before(place)  # as `rewriting` does
     with _nobody_else(place.graph_folder), files.working_folder(place.folder, ".repair-") as folder:
-        place.mapped_rows.unlink(missing_ok=True)
         with KnowledgeGraph(folder / "graph", place.folder, place.resources, place.base) as graph:
             _fill(place, graph, announce)
         _swap(place, folder / "graph")
 
 
 def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
-    """Put all that the database knows into a graph."""
     announce("Rebuilding the graph from the database")
-    graph.load_ontology()
-    check_effects(graph)
-    map_rows(place, graph)
-    populate_others(place, graph, announce)
-    conclude(graph, announce)
+    place.mapped_rows.unlink(missing_ok=True)
+    fill(place, graph, announce)
 
 
 @contextmanager

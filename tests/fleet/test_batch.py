@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from irtwin import workflow
+from irtwin import diagnosing
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.batch import Batch, Record, key
 
@@ -33,7 +33,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text("{}")
 
-    monkeypatch.setattr(workflow, "diagnose", diagnose)
+    monkeypatch.setattr(diagnosing, "diagnose", diagnose)
     return found
 
 
@@ -59,7 +59,7 @@ def test_a_data_set_that_is_refused_or_fails_costs_no_other(tmp_path: Path, aske
     assert failed is not None and failed.said.startswith("ZeroDivisionError, see ")
     trace = Path(failed.said.removeprefix("ZeroDivisionError, see "))
     assert "1 / 0" in trace.read_text()
-    assert (batch.folder / "diagnoses" / key(batch.places[2]) / "gap.json").exists()
+    assert (batch.folder / "diagnoses" / key(batch.sets.data_sets[2]) / "gap.json").exists()
 
 
 def test_only_what_changed_or_failed_is_taken_again(tmp_path: Path, asked: list[str]) -> None:
@@ -100,13 +100,15 @@ def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: l
 def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str], text: str) -> None:
     batch = _batch(tmp_path, "good")
     batch.work()
-    (batch.folder / "records" / f"{key(batch.places[0])}.json").write_text(text)
+    (batch.folder / "records" / f"{key(batch.sets.data_sets[0])}.json").write_text(text)
     batch.work()
     assert _states(batch) == ["done"] and asked == ["good", "good"]
 
 
 def test_a_storage_that_does_not_answer_fails_one_data_set(tmp_path: Path, asked: list[str]) -> None:
-    batch = Batch.create(tmp_path / "b", "diagnose", ["memory://nothing/here", *_batch(tmp_path, "good").places])
+    batch = Batch.create(
+        tmp_path / "b", "diagnose", ["memory://nothing/here", *_batch(tmp_path, "good").sets.data_sets]
+    )
     batch.work()
     assert _states(batch) == ["failed", "done"]
 
@@ -115,7 +117,7 @@ def test_a_storage_that_does_not_answer_fails_one_data_set(tmp_path: Path, asked
 def test_a_damaged_list_of_sets_says_what_to_do(tmp_path: Path, text: str) -> None:
     (tmp_path / "sets.json").write_text(text)
     with pytest.raises(InputError, match=r"sets\.json: cannot be read .*; remove its folder"):
-        _ = Batch(tmp_path).places
+        _ = Batch(tmp_path).sets.data_sets
 
 
 def test_folders_of_one_name_have_files_of_their_own() -> None:

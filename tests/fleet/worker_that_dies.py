@@ -14,5 +14,5 @@ def diagnose(data_set: Path, json_file: Path, twin_file: Path) -> None:
         os._exit(9)
 
 
-irtwin.workflow = SimpleNamespace(diagnose=diagnose)  # type: ignore[assignment]  # of which nothing else is asked
+irtwin.diagnosing = SimpleNamespace(diagnose=diagnose)  # type: ignore[assignment]  # of which nothing else is asked
 Batch(Path(sys.argv[1])).work()

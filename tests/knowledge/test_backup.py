@@ -18,14 +18,15 @@ from tests.memory_s3 import memory_s3
 
 from irtwin import resources
 from irtwin.errors import InputError
+from irtwin.input_file import checksum
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.backup import backup, restore
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.location import Location
 from irtwin.storage import database
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base, Series
-from irtwin.storage.series import checksum
 
 pytestmark = pytest.mark.slow
 
@@ -134,12 +135,12 @@ def test_into_postgresql_and_back(
     filled: Workspace, archive: Path, tmp_path: Path, new_postgresql_database: Callable[[], str]
 ) -> None:
     url = new_postgresql_database()
-    restore(archive, tmp_path / "after", url)
+    restore(archive, Location(tmp_path / "after", url))
     with Workspace(tmp_path / "after", url) as place, KnowledgeGraph(place.graph_folder) as graph:
         assert not (tmp_path / "after" / "irtwin.db").exists()
         backup(place, graph, tmp_path / "again.zip")
     with pytest.raises(InputError, match="holds rows already"):
-        restore(archive, tmp_path / "third", url)
+        restore(archive, Location(tmp_path / "third", url))
     assert not (tmp_path / "third").exists()
     restore(tmp_path / "again.zip", tmp_path / "back")
     with Workspace(tmp_path / "back") as place:

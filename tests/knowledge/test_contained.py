@@ -119,7 +119,7 @@ MINE = "https://plant.example/mine"  # written beside irtwin: what comes by it i
 
 def second_payload(workspace: Path) -> str:
     """Say a second payload of a run of the first robot; return the run."""
-    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+    with Workspace.existing(workspace) as place, rewriting(place) as graph:
         run = next(str(row["run"]) for row in graph.query("SELECT ?run { ?run irt:Payload ?kg } ORDER BY ?run"))
         payload = Quad(NamedNode(run), NamedNode(term("Payload")), Literal(5.5), NamedNode(MINE))
         graph.change((), {payload})
@@ -154,7 +154,7 @@ def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> Non
     before = concluded(workspace)
     second_payload(workspace)
     assert irtwin("reason", "--workspace", workspace).status == 3
-    with Workspace.existing(workspace) as place, rewriting(place, None) as graph:
+    with Workspace.existing(workspace) as place, rewriting(place) as graph:
         graph.change(set(graph.quads_in(MINE)), ())
         assert reason(graph).set_aside == ()
     assert concluded(workspace) == before

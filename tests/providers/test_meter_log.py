@@ -41,7 +41,7 @@ def test_a_meters_log(tmp_path: Path) -> None:
     (tmp_path / "dataset.toml").write_text(DATA_SET)
     np.savetxt(tmp_path / "day.csv", np.column_stack([time, power]), delimiter=",", header="time,power", comments="")
     said: list[str] = []
-    with Workspace(tmp_path / "ws") as place, rewriting(place, None) as graph:
+    with Workspace(tmp_path / "ws") as place, rewriting(place) as graph:
         take_in(place, read_data_set(tmp_path), said.append)
         assert "  no twin, for a meter alone was logged: which joint, effect or motion takes it stays unknown" in said
         graph.load_ontology()

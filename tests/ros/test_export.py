@@ -20,6 +20,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.location import Location
 from irtwin.planning.plan import nominal_twin
 from irtwin.providers.records import ingest, load_robot, load_run
 from irtwin.robot.structure import structure_of
@@ -75,7 +76,7 @@ def test_a_robot_with_a_twin_has_its_bodies_and_friction(
     effects = (*known.effects, catalogue()["viscous_friction"].on("joint_a1"))
     twin = replace(known, effects=effects, parameters=(*changed, friction))
     monkeypatch.setattr(export, "known_twin", lambda place, robot: (robot, twin))
-    export.export_package(tmp_path / "out", workspace, None)
+    export.export_package(tmp_path / "out", Location(workspace), None)
     found = structure_of(read_urdf(tmp_path / "out" / "urdf" / "KUKA_KR6_R700.urdf"))
     before = {body.name: body.mass for body in structure_of(kr6()).bodies}
     assert {body.name: body.mass for body in found.bodies} == before | masses

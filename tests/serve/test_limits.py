@@ -15,9 +15,9 @@ import httpx
 import psutil
 import pytest
 
+from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import Source
 
 pytestmark = pytest.mark.slow
 
@@ -139,7 +139,7 @@ def test_many_clients_at_once_get_their_own_answers(server) -> None:
 
 @asynccontextmanager
 async def pool(graph: Path, limits: Limits, size: int = 1) -> AsyncIterator[Pool]:
-    workers = Pool(Source(graph.parent), size, limits)
+    workers = Pool(Location(graph.parent), size, limits)
     await workers.open()
     try:
         yield workers

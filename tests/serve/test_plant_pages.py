@@ -15,9 +15,9 @@ from tests import plants
 from tests.endpoint import Server
 
 from irtwin.errors import InputError
+from irtwin.location import Location
 from irtwin.serve.pool import Limits
 from irtwin.serve.server import serve
-from irtwin.serve.source import Source
 
 pytestmark = pytest.mark.slow
 
@@ -177,7 +177,7 @@ def test_a_tariff_that_cannot_be_used_is_said_before_anything_is_served(tmp_path
     (tmp_path / "plant.toml").write_text("prise = 1\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"plant\.toml: unknown key 'prise'"):
         serve(
-            Source(plants.make_empty_plant(tmp_path).parent),
+            Location(plants.make_empty_plant(tmp_path).parent),
             "127.0.0.1",
             0,
             token=None,

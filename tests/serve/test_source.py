@@ -18,10 +18,10 @@ from tests.sparql_servers import Running, oxigraph
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.location import Location
 from irtwin.serve import server
 from irtwin.serve.pool import Limits, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal
-from irtwin.serve.source import Source
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
 
@@ -46,10 +46,10 @@ def served(keeper: Running, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     with KnowledgeGraph(keeper.url) as graph:
         graph.load_ontology()
         graph.replace(parse(path=str(TWO_ROBOTS), format=RdfFormat.TRIG), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    source = Source(tmp_path_factory.mktemp("workspace"), with_password(keeper))
+    place = Location(tmp_path_factory.mktemp("workspace"), graph_url=with_password(keeper))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(server, "Pool", lambda source, size, limits: Pool(source, 1, limits))
-        app = server.application(source, "127.0.0.1", token=TOKEN, limits=Limits())
+        patch.setattr(server, "Pool", lambda place, size, limits: Pool(place, 1, limits))
+        app = server.application(place, "127.0.0.1", token=TOKEN, limits=Limits())
     with TestClient(app, base_url="http://127.0.0.1") as client:
         yield client
 
@@ -90,13 +90,13 @@ def test_the_password_is_in_no_command(served: TestClient) -> None:
 
 def test_one_that_is_gone_is_told_without_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     async def asked() -> list[Refusal]:
-        source = Source(tmp_path, with_password(keeper))
-        worker = await Worker.start(source, Limits())
+        place = Location(tmp_path, graph_url=with_password(keeper))
+        worker = await Worker.start(place, Limits())
         keeper.stop()
         told = []
         asked = {"text": "ASK {}", "default_graphs": [], "named_graphs": [], "base": "http://e/", "accept": ""}
         clear = Operation("update", "CLEAR ALL")
-        update = Updates(source, TOKEN, Limits()).do(clear, "http://e/", f"Bearer {TOKEN}", "me")
+        update = Updates(place, TOKEN, Limits()).do(clear, "http://e/", f"Bearer {TOKEN}", "me")
         for asking in (worker.ask({**asked, "at_once": False}), update):
             with pytest.raises(Refusal) as refusal:
                 await asking

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import Displaced
-from irtwin.serve.source import Source
 from irtwin.serve.turns import Turns
 
 Served = list[str]
@@ -110,7 +110,7 @@ def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callab
     request = {"default_graphs": (), "named_graphs": (), "base": "http://e/", "accept": "text/csv", "at_once": False}
 
     async def run() -> None:
-        pool, done = Pool(Source(new_graph().parent), 1, Limits()), Served()
+        pool, done = Pool(Location(new_graph().parent), 1, Limits()), Served()
 
         async def ask(client: str, number: int) -> None:
             async with pool.worker(client) as worker:
@@ -133,7 +133,7 @@ def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callab
 @pytest.mark.slow
 def test_the_queue_says_that_it_is_full(new_graph: Callable[[], Path]) -> None:
     async def run() -> None:
-        pool = Pool(Source(new_graph().parent), 1, Limits(waiting=0))
+        pool = Pool(Location(new_graph().parent), 1, Limits(waiting=0))
         await pool.open()
         try:
             async with pool.worker("A"):

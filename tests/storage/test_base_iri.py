@@ -10,9 +10,9 @@ from tests.rows import data_set
 
 from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import ID
+from irtwin.location import Location
 from irtwin.serve.pool import Limits
 from irtwin.serve.server import application
-from irtwin.serve.source import Source
 from irtwin.storage import base_iri
 from irtwin.storage.database import Workspace
 
@@ -57,7 +57,7 @@ def test_what_no_individual_can_lie_below(base: object, message: str) -> None:
 
 
 def test_no_individual_lies_at_a_path_that_serve_has_for_itself(tmp_path: Path) -> None:
-    routes = application(Source(tmp_path), "localhost", token=None, limits=Limits()).routes
+    routes = application(Location(tmp_path), "localhost", token=None, limits=Limits()).routes
     paths = {route.path.split("{")[0].split("/")[1] for route in routes if isinstance(route, Route)}
     assert paths - {""} == set(base_iri.SERVED)
 

@@ -6,7 +6,8 @@ import pyarrow as pa
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.storage.series import checksum, read_series, write_series
+from irtwin.input_file import checksum
+from irtwin.storage.series import read_series, write_series
 
 TABLE = pa.table({"time": [0.0, 0.1], "q_a1": [1.0, 2.0]})
 

@@ -55,7 +55,7 @@ def test_several_at_once_lose_nothing(tmp_path: Path, url: str | None) -> None:
 
 @pytest.fixture
 def held(tmp_path: Path, url: str | None) -> Iterator[multiprocessing.process.BaseProcess]:
-    with Workspace(tmp_path, url) as place, rewriting(place, None) as graph:
+    with Workspace(tmp_path, url) as place, rewriting(place) as graph:
         place.ingest(*rows.data_set())
         map_rows(place, graph)
     reading, ready = FORKS.Pipe(duplex=False)
@@ -78,13 +78,13 @@ def test_one_that_waits_too_long_says_so_and_one_that_was_killed_holds_nothing(
             place.ingest(*rows.data_set())
         with (
             pytest.raises(InputError, match=r"rewriting the graph for 0\.2 s; try again later"),
-            rewriting(place, None),
+            rewriting(place),
         ):
             pass
         held.kill()
         held.join()
         monkeypatch.setattr(engine, "BUSY_TIMEOUT", 20.0)
-        with rewriting(place, None) as graph:
+        with rewriting(place) as graph:
             map_rows(place, graph)
         assert place.ingest(*rows.data_set()) == "unchanged"
 

@@ -18,6 +18,7 @@ from irtwin import asking, workflow
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.stored_times import StoredTimes
+from irtwin.location import Location
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import WATCHED_RUNS, ImprovementRound, Run
 
@@ -28,25 +29,24 @@ pytestmark = [pytest.mark.system, pytest.mark.slow]
 class Plant:
     """A workspace with its database, and the motion that was planned in it."""
 
-    folder: Path
-    url: str
+    at: Location
     reach: Path
 
     def irtwin(self, *arguments: object) -> Said:
-        said = in_this_process(*arguments, "--workspace", self.folder, "--database", self.url)
+        said = in_this_process(*arguments, "--workspace", self.at.folder, "--database", self.at.database)
         assert said.status == 0, said.err
         return said
 
     def open(self) -> Workspace:
-        return Workspace.existing(self.folder, self.url)
+        return Workspace.existing(self.at)
 
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory: pytest.TempPathFactory, new_postgresql_database: Callable[[], str]) -> Plant:
     """A robot with a plan that is kept, and that was watched while it carried the plan out."""
     folder, url = tmp_path_factory.mktemp("plant"), new_postgresql_database()
-    made = Plant(folder / "w", url, folder / "reach.parquet")
-    workflow.run(test_plans.write(folder / "logs", test_plans.recorded()), made.folder, database=url)
+    made = Plant(Location(folder / "w", url), folder / "reach.parquet")
+    workflow.run(test_plans.write(folder / "logs", test_plans.recorded()), made.at)
     made.irtwin("plan", "arm_2", *test_plans.GOAL, "--out", made.reach)
     done = test_plans.write(folder / "done", [test_plans.carried_out(made.reach)]) / "runs" / "done.parquet"
     watched = ("live", "--replay", done, "--robot", "arm_2", "--speed", 1000, "--performs", "reach")
@@ -61,7 +61,7 @@ def live_run(plant: Plant) -> Run:
 
 @pytest.mark.nightly
 def test_a_plan_is_held_against_the_run_that_was_watched(plant: Plant) -> None:
-    (row,) = asking.ask("planned_against_measured", plant.folder)
+    (row,) = asking.ask("planned_against_measured", plant.at.folder)
     assert (row["plan"], row["run"]) == ("reach", live_run(plant).name)
     with plant.open() as place, KnowledgeGraph.of_workspace(place) as graph:
         assert validate(graph) == ()
@@ -88,12 +88,12 @@ def test_a_sample_that_was_stored_is_known_by_its_time(plant: Plant) -> None:
 
 def test_a_new_log_betters_the_twin_or_leaves_it(plant: Plant) -> None:
     again = as_run(measure(test_plans.ROBOT, swing(test_plans.ROBOT, 9, seconds=8.0), noise=0.02))
-    log = plant.folder.parent / "again.parquet"
+    log = plant.at.folder.parent / "again.parquet"
     pq.write_table(data_sets.table(test_plans.ROBOT, again), log)
     said = plant.irtwin("improve", "arm_2", log)
     assert said.out.startswith("round 1, same effects: ")
     with plant.open() as place, place.reading() as session:
         (row,) = session.scalars(select(ImprovementRound))
     assert (row.number, row.robot_id) == (1, "arm_2")
-    (shown,) = asking.ask("improvement_rounds", plant.folder)
+    (shown,) = asking.ask("improvement_rounds", plant.at.folder)
     assert shown["after_percent"] == pytest.approx(row.error_after_percent)

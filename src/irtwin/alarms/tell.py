@@ -15,19 +15,19 @@ from irtwin.alarms.follow import follow, told_in
 from irtwin.alarms.settings import NAME, asks, read_receivers
 from irtwin.asking import checked, open_graph
 from irtwin.knowledge.store.table import Table
+from irtwin.location import Location
 from irtwin.storage.files import inside
 from irtwin.trust import how, trusted
 
 
-def listed(workspace: Path, *, graph_url: str | None = None, robot: str | None = None) -> Table:
+def listed(location: Location, robot: str | None = None) -> Table:
     """Return the alarms that are active. Raises InputError where there is no graph, or no robot of the name."""
-    return active(_alarms(workspace, graph_url, robot))
+    return active(_alarms(location, robot))
 
 
 def tell(
-    workspace: Path,
+    location: Location,
     *,
-    graph_url: str | None = None,
     robot: str | None = None,
     config: Path | None = None,
     announce: Callable[[str], None] = lambda line: None,
@@ -37,8 +37,8 @@ def tell(
     `config` is `alarms.toml` of the workspace by default, if that is there, and as far as the user trusts it.
     `announce` is told what is amiss. Ends with SIGINT or SIGTERM, and gives messages on their way some seconds.
     """
-    done = threading.Event()
-    look = partial(_alarms, workspace, graph_url, robot)
+    workspace, done = location.folder, threading.Event()
+    look = partial(_alarms, location, robot)
     found = look()  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
     receivers = read_receivers(config) if config is not None else _of_workspace(workspace, announce)
@@ -70,8 +70,8 @@ def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> list[Rece
     return read_receivers(file, may=may)
 
 
-def _alarms(workspace: Path, graph_url: str | None, robot: str | None) -> list[Alarm]:
-    with open_graph(workspace, graph_url) as graph:
+def _alarms(location: Location, robot: str | None) -> list[Alarm]:
+    with open_graph(location) as graph:
         return alarms(graph, robot)
 
 

@@ -8,6 +8,12 @@ from dataclasses import dataclass, replace
 from irtwin.bring.unit import QUANTITIES, Unit, unit_of
 from irtwin.signals.channels import CHANNELS
 
+
+def word_set(text: str) -> frozenset[str]:
+    """Return the words of a text."""
+    return frozenset(text.split())
+
+
 # words, in small letters, by field of Signals; of several in a name the last one counts
 _WORDS = {
     "time": "time timestamp stamp datetime zeit zeitstempel clock elapsed t",
@@ -21,60 +27,17 @@ _WORDS = {
     "meter_voltage": "voltage volt u spannung",
 }
 _FIELD = {word: field for field, words in _WORDS.items() for word in words.split()}
-_WEAK = frozenset(
-    ["joint", "axis", "achse", "j", "a", "axes", "joints", "gelenk"]
-)  # say a joint; alone with a number, its position
-_MEASURED = frozenset(["actual", "act", "measured", "meas", "ist", "real", "feedback", "fbk"])
-_NOT_MEASURED = frozenset(
-    [
-        "target",
-        "targets",
-        "desired",
-        "des",
-        "cmd",
-        "command",
-        "commanded",
-        "setpoint",
-        "set",
-        "soll",
-        "sollwert",
-        "ref",
-        "reference",
-        "goal",
-        "error",
-        "err",
-        "ff",
-        "feedforward",
-        "limit",
-        "max",
-        "min",
-        "mode",
-        "model",
-        "predicted",
-        "estimated",
-        "planned",
-    ]
+_WEAK = word_set("joint axis achse j a axes joints gelenk")  # alone with a number, a joint's position
+_MEASURED = word_set("actual act measured meas ist real feedback fbk")
+_NOT_MEASURED = word_set(
+    "target targets desired des cmd command commanded setpoint set soll sollwert ref reference goal error "
+    "err ff feedforward limit max min mode model predicted estimated planned"
 )
-_ELSEWHERE = frozenset(
-    [
-        "tcp",
-        "cartesian",
-        "tool",
-        "wrench",
-        "force",
-        "forces",
-        "imu",
-        "orientation",
-        "quaternion",
-        "pose",
-        "accelerometer",
-        "ambient",
-        "header",
-        "nsecs",
-    ]
+_ELSEWHERE = word_set(
+    "tcp cartesian tool wrench force forces imu orientation quaternion pose accelerometer ambient header nsecs"
 )
-_MAGNITUDE = frozenset(["abs", "absolute", "magnitude"])
-_MOTOR = frozenset(["motor", "mot", "motors", "drive", "rotor", "antrieb", "encoder", "enc"])
+_MAGNITUDE = word_set("abs absolute magnitude")
+_MOTOR = word_set("motor mot motors drive rotor antrieb encoder enc")
 _LONGEST = 12  # parts of a name that may write a unit, and what joins them: rad per s 2 has seven
 _TOKEN = re.compile(r"[^\W\d_]+|\d+")
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from irtwin.bring.column_name import said_by, words_of
+from irtwin.bring.column_name import said_by, word_set, words_of
 from irtwin.bring.recording import Recording
 from irtwin.bring.rtde_names import JOINTS, PAYLOAD, is_rtde, variable
 from irtwin.bring.told import Target
@@ -14,26 +14,8 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel, by_column
 
 _GEARED = ("q", "dq", "ddq", "torque")  # fields that may be of the motor's side of the gear
-_METER = frozenset(
-    [
-        "robot",
-        "bus",
-        "supply",
-        "dc",
-        "main",
-        "mains",
-        "total",
-        "grid",
-        "netz",
-        "ac",
-        "system",
-        "sum",
-        "gesamt",
-        "meter",
-        "zwischenkreis",
-    ]
-)
-_GENERIC = frozenset(["joint", "axis", "link"])  # words that tell no joint from another
+_METER = word_set("robot bus supply dc main mains total grid netz ac system sum gesamt meter zwischenkreis")
+_GENERIC = word_set("joint axis link")  # words that tell no joint from another
 _ALONE = "it names a joint and nothing else, as positions do"
 
 

@@ -6,20 +6,20 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import graph_option, say, workspace_option
+from irtwin.cli.options import FILE, located_graph, say
+from irtwin.location import Location
 
 
 @click.command()
-@workspace_option
-@graph_option
+@located_graph
 @click.option("--robot", metavar="NAME", help="Of this robot only.")
 @click.option("--follow", is_flag=True, help="Go on: tell each alarm when it begins, and when it is over.")
 @click.option(
     "--config",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="Who else is told, with --follow. Default: alarms.toml in the workspace, if there.",
 )
-def alarms(workspace: Path, graph_url: str | None, robot: str | None, follow: bool, config: Path | None) -> None:
+def alarms(location: Location, robot: str | None, follow: bool, config: Path | None) -> None:
     """List the alarms that are active: a gap out of its band, a robot idle for too long, a twin to identify again.
 
     With --follow, each is told once when it begins and once when it is over, as a line of JSON on standard output,
@@ -29,10 +29,10 @@ def alarms(workspace: Path, graph_url: str | None, robot: str | None, follow: bo
     from irtwin.alarms.tell import listed, tell
 
     if follow:
-        tell(workspace, graph_url=graph_url, robot=robot, config=config, announce=say)
+        tell(location, robot=robot, config=config, announce=say)
         return
     if config is not None:
         raise click.UsageError("--config goes with --follow.")
     from irtwin.report.terminal import show
 
-    show(listed(workspace, graph_url=graph_url, robot=robot))
+    show(listed(location, robot))

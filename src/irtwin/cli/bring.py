@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import Number, database_option, graph_option, payload_com_option, printable, say
+from irtwin.cli.options import PLACE, Number, database_option, graph_option, payload_com_option, printable, say
 from irtwin.errors import InputError
+from irtwin.location import Location
 
 if TYPE_CHECKING:
     from irtwin.bring.bring import Brought
@@ -23,8 +24,8 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 
 
 @click.command(name="import")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="New folder for the data set.")
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PLACE)
+@click.option("--out", type=PLACE, help="New folder for the data set.")
 @click.option("--robot", metavar="ROBOT", help=f"{_robot_help} Left out of a meter's log, which has no joints.")
 @_name_option
 @click.option(
@@ -47,9 +48,7 @@ _name_option = click.option("--name", metavar="NAME", help="Robot's name in the 
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
 @click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
-@click.option(
-    "--owl", type=click.Path(path_type=Path), help="Edited file of `irtwin export --owl`; FILE: the workspace."
-)
+@click.option("--owl", type=PLACE, help="Edited file of `irtwin export --owl`; FILE: the workspace.")
 @click.option("--yes", is_flag=True, help="Take the changes of --owl without asking.")
 @click.option("--author", metavar="NAME", help="Who says so, with --owl. Default: the user's name here.")
 @database_option
@@ -58,21 +57,13 @@ def import_(
     files: tuple[Path, ...],
     out: Path | None,
     robot: str | None,
-    name: str | None,
-    maps: tuple[str, ...],
-    gear_ratios: tuple[str, ...],
-    power_at: str | None,
-    topics: tuple[str, ...],
-    fixed: tuple[str, ...],
     names: str,
-    payload_mass: float | None,
-    payload_com: tuple[float, float, float],
-    repair: bool,
     owl: Path | None,
     yes: bool,
     author: str | None,
     database: str | None,
     graph_url: str | None,
+    **told: Any,
 ) -> None:
     """Make a data set of logs in other formats, a run a file; or take back an edited OWL file.
 
@@ -89,16 +80,12 @@ def import_(
     if owl is not None:
         if len(files) != 1 or out is not None or robot is not None:
             raise click.UsageError("--owl takes one FILE, the workspace, and neither --out nor --robot.")
-        return _take_edited(owl, files[0], yes, author, database, graph_url)
+        return _take_edited(owl, Location(files[0], database, graph_url), yes, author)
     if out is None:
         raise click.UsageError("Give --out, or --owl.")
     from irtwin.bring.bring import Options, bring, found_in
 
-    options = Options(
-        name=name, maps=maps, gear_ratios=gear_ratios, topics=topics, fixed=fixed, power_at=power_at,
-        names=tuple(one.strip() for one in names.split(",")) if names else (),
-        payload_mass=payload_mass, payload_com=payload_com, repair=repair,
-    )  # fmt: skip
+    options = Options(names=tuple(one.strip() for one in names.split(",")) if names else (), **told)
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
@@ -113,7 +100,7 @@ def import_(
 
 
 @click.command()
-@click.argument("dataset", type=click.Path(path_type=Path))
+@click.argument("dataset", type=PLACE)
 @click.option("--robot", metavar="ROBOT", help=_robot_help)
 @_name_option
 def init(dataset: Path, robot: str | None, name: str | None) -> None:
@@ -131,9 +118,7 @@ def init(dataset: Path, robot: str | None, name: str | None) -> None:
     click.echo(dataset)
 
 
-def _take_edited(
-    owl: Path, workspace: Path, yes: bool, author: str | None, database: str | None, graph_url: str | None
-) -> None:
+def _take_edited(owl: Path, location: Location, yes: bool, author: str | None) -> None:
     from getpass import getuser
 
     from irtwin.asserting import take_edited
@@ -148,9 +133,7 @@ def _take_edited(
             raise InputError(f"{owl}: nothing was taken: say --yes to take these changes")
         return click.confirm(f"Take these {len(edit.words)} changes", err=True)
 
-    said = take_edited(
-        owl, workspace, author=author or getuser(), agrees=agrees, database=database, graph_url=graph_url, announce=say
-    )
+    said = take_edited(owl, location, author=author or getuser(), agrees=agrees, announce=say)
     if said is None:
         say("Nothing was taken.")
     elif any(fact.place for fact in said.facts):

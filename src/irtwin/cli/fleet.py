@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import announce, base_option, say, series_option
+from irtwin.cli.options import FOLDER, announce, base_option, say, series_option
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,9 +35,7 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786, in place of processes."
         ),
         click.option("--workers", type=click.IntRange(1, 1024), help="Processes at once. Default: one a core."),
-        click.option(
-            "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the results."
-        ),
+        click.option("--out", type=FOLDER, required=True, help="Folder for the results."),
         click.argument("source"),
     ):
         command = option(command)
@@ -49,28 +47,20 @@ def _options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--batch", type=click.IntRange(1, 1000), default=100, show_default=True, help="Robots in one workspace.")
 @base_option
 @series_option
-def run(
-    source: str,
-    out: Path,
-    workers: int | None,
-    scheduler: str | None,
-    batch: int,
-    base: str | None,
-    series_url: str | None,
-) -> None:
+def run(**asked: Any) -> None:
     """Build twins, graphs and reports: one workspace for each batch of robots."""
-    _work(source, out, "run", workers, scheduler, batch, base, series_url)
+    _work("run", **asked)
 
 
 @fleet.command()
 @_options
-def diagnose(source: str, out: Path, workers: int | None, scheduler: str | None) -> None:
+def diagnose(**asked: Any) -> None:
     """Diagnose each data set: gap.json and twin.json in a folder of its own."""
-    _work(source, out, "diagnose", workers, scheduler, 20)
+    _work("diagnose", batch=20, **asked)
 
 
 @fleet.command()
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.argument("folder", type=FOLDER)
 def status(folder: Path) -> None:
     """Show how many data sets are done, refused, failed and left."""
     from irtwin.fleet.fleet import batches_of, status_of
@@ -81,30 +71,10 @@ def status(folder: Path) -> None:
     _show(status_of(batches))
 
 
-def _work(
-    source: str,
-    out: Path,
-    kind: str,
-    workers: int | None,
-    scheduler: str | None,
-    batch: int,
-    base: str | None = None,
-    series_url: str | None = None,
-) -> None:
+def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
     from irtwin.fleet.fleet import work
 
-    workers = workers or os.cpu_count() or 1
-    found = work(
-        source,
-        out,
-        kind,
-        batch=batch,
-        workers=workers,
-        scheduler=scheduler,
-        base=base,
-        series_url=series_url,
-        announce=announce,
-    )
+    found = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
     _show(found)
     if found.set_aside:
         sys.exit(3)

@@ -8,15 +8,8 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import (
-    Number,
-    announce,
-    database_option,
-    graph_option,
-    say,
-    tell_contradictions,
-    workspace_option,
-)
+from irtwin.cli.options import FILE, FOLDER, PLACE, Number, announce, located, located_graph, say, tell_contradictions
+from irtwin.location import Location
 
 
 def _known_questions(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -28,8 +21,7 @@ def _known_questions(context: click.Context, option: click.Parameter, begun: str
 @click.command()
 @click.argument("question", required=False, shell_complete=_known_questions)
 @click.option("--robot", metavar="NAME", help="Ask about this robot only.")
-@workspace_option
-@graph_option
+@located_graph
 @click.option(
     "--format",
     "form",
@@ -38,7 +30,7 @@ def _known_questions(context: click.Context, option: click.Parameter, begun: str
     show_default=True,
     help="Output format.",
 )
-def query(question: str | None, robot: str | None, workspace: Path, graph_url: str | None, form: str) -> None:
+def query(question: str | None, robot: str | None, location: Location, form: str) -> None:
     """Ask the graph a question, by name or in SPARQL.
 
     Without QUESTION, the named questions are listed by theme.
@@ -49,11 +41,11 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
     from irtwin.storage.series_place import are_elsewhere
 
     if question is None:
-        answer = asking.questions(workspace)
+        answer = asking.questions(location.folder)
     else:
-        if graph_url is None and not are_elsewhere(workspace):
+        if location.graph_url is None and not are_elsewhere(location.folder):
             leave_network()
-        answer = asking.ask(question, workspace, robot=robot, graph_url=graph_url)
+        answer = asking.ask(question, location, robot=robot)
     for fault in answer.faults:
         say(f"irtwin: {fault}")
     if form == "table":
@@ -66,11 +58,10 @@ def query(question: str | None, robot: str | None, workspace: Path, graph_url: s
 
 @click.command()
 @click.argument("triple", nargs=-1, required=True)
-@workspace_option
-@graph_option
+@located_graph
 @click.option("--json", "as_json", is_flag=True, help="Write nested JSON objects instead of an outline.")
 @click.option("--verify", is_flag=True, help="Check the files; exit status 2 unless they are the same.")
-def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_json: bool, verify: bool) -> None:
+def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: bool) -> None:
     """Explain where a triple of the graph comes from.
 
     The explanation names the rule, mapping or provider and the facts it used, down to runs, files and checksums.
@@ -85,8 +76,8 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
     from irtwin.knowledge.explain.verify import WHOLE
     from irtwin.knowledge.explain.verify import verify as verified
 
-    found = asking.explain(" ".join(triple), workspace, graph_url=graph_url)
-    files = verified(found, workspace) if verify else []
+    found = asking.explain(" ".join(triple), location)
+    files = verified(found, location.folder) if verify else []
     if as_json:
         said = [to_json(each) for each in found]
         told = {"explanations": said, "files": [asdict(each) for each in files]} if verify else said
@@ -103,8 +94,8 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
 
 
 @click.command()
-@click.argument("source", type=click.Path(path_type=Path), required=False)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="RDF file to write, with SOURCE.")
+@click.argument("source", type=PLACE, required=False)
+@click.option("--out", type=FILE, help="RDF file to write, with SOURCE.")
 @click.option(
     "--engine",
     type=click.Choice(["native", "owlrl", "hermit"]),
@@ -112,12 +103,8 @@ def explain(triple: tuple[str, ...], workspace: Path, graph_url: str | None, as_
     show_default=True,
     help="Who draws the conclusions, see above.",
 )
-@workspace_option
-@database_option
-@graph_option
-def reason(
-    source: Path | None, out: Path | None, engine: str, workspace: Path, database: str | None, graph_url: str | None
-) -> None:
+@located
+def reason(source: Path | None, out: Path | None, engine: str, location: Location) -> None:
     """Draw all conclusions from the graph, or from an RDF file.
 
     Without SOURCE, the conclusions in the workspace's graph are drawn again, by the ontology, mappings and rules that
@@ -148,35 +135,31 @@ def reason(
         else:
             from irtwin.workflow import reason_again
 
-            reason_again(workspace, engine=engine, database=database, graph_url=graph_url, announce=announce)
-            tell_contradictions(workspace, graph_url)
+            reason_again(location, engine, announce)
+            tell_contradictions(location)
     except Contradiction as clash:
-        say(f"irtwin: {source or workspace}: {clash}")
+        say(f"irtwin: {source or location.folder}: {clash}")
         sys.exit(3)
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
-@click.option("--owl", type=click.Path(path_type=Path, dir_okay=False), help="RDF/XML file to write: the whole graph.")
-@click.option("--ros", type=click.Path(path_type=Path, file_okay=False), help="Folder to write: a robot's ROS package.")
-@click.option("--urdf", type=click.Path(path_type=Path, dir_okay=False), help="URDF file to write: a robot's twin.")
-@click.option("--mjcf", type=click.Path(path_type=Path, dir_okay=False), help="The same for MuJoCo.")
-@click.option("--sdf", type=click.Path(path_type=Path, dir_okay=False), help="The same for Gazebo and Drake.")
-@click.option("--mcap", type=click.Path(path_type=Path, dir_okay=False), help="MCAP file to write: a run, for ROS 2.")
-@click.option("--bag", type=click.Path(path_type=Path), help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
+@located
+@click.option("--owl", type=FILE, help="RDF/XML file to write: the whole graph.")
+@click.option("--ros", type=FOLDER, help="Folder to write: a robot's ROS package.")
+@click.option("--urdf", type=FILE, help="URDF file to write: a robot's twin.")
+@click.option("--mjcf", type=FILE, help="The same for MuJoCo.")
+@click.option("--sdf", type=FILE, help="The same for Gazebo and Drake.")
+@click.option("--mcap", type=FILE, help="MCAP file to write: a run, for ROS 2.")
+@click.option("--bag", type=PLACE, help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
 @click.option("--robot", metavar="NAME", help="The robot; not needed where there is one alone.")
 @click.option("--run", "run_name", metavar="NAME", help="The run.")
 @click.option(
     "--twin",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="Twin that `irtwin diagnose --save-twin` wrote, instead of the workspace's.",
 )
 def export(
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
+    location: Location,
     owl: Path | None,
     ros: Path | None,
     urdf: Path | None,
@@ -207,7 +190,7 @@ def export(
     if (run_name is not None) != (form in ("mcap", "bag")):
         raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
     if form in ("urdf", "mjcf", "sdf"):
-        _export_model(form, out, workspace, robot, twin, database)
+        _export_model(form, out, location, robot, twin)
     elif twin is not None:
         raise click.UsageError("--twin goes with --urdf, --mjcf or --sdf.")
     elif owl is not None:
@@ -215,18 +198,18 @@ def export(
 
         if robot is not None:
             raise click.UsageError("--owl writes the whole graph; leave --robot out.")
-        asking.export(owl, workspace, graph_url=graph_url)
+        asking.export(owl, location)
     elif ros is not None:
         from irtwin.ros.export import export_package
 
-        for line in export_package(ros, workspace, robot, graph_url, database):
+        for line in export_package(ros, location, robot):
             say(f"irtwin: {line}")
     elif run_name is not None:
         from irtwin.ros.export import export_bag
 
         if mcap is not None and mcap.suffix.lower() != ".mcap":
             raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
-        export_bag(out, workspace, run_name, robot, database)
+        export_bag(out, location, run_name, robot)
     click.echo(out)
 
 
@@ -238,15 +221,13 @@ def _asked(every: dict[str, Path | None]) -> tuple[str, Path]:
     return found[0]
 
 
-def _export_model(
-    form: str, out: Path, workspace: Path, robot: str | None, twin: Path | None, database: str | None
-) -> None:
+def _export_model(form: str, out: Path, location: Location, robot: str | None, twin: Path | None) -> None:
     from irtwin import modelling
 
     if twin is None:
         from irtwin import plans
 
-        known = plans.robot_twin(robot, workspace, database)
+        known = plans.robot_twin(robot, location)
     else:
         known = modelling.read_twin(twin)
     for line in modelling.write_model(known, form, out):
@@ -254,9 +235,9 @@ def _export_model(
 
 
 @click.command("map")
-@click.argument("mapping", type=click.Path(path_type=Path))
+@click.argument("mapping", type=PLACE)
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="N-Quads file to write.")
+@click.option("--out", type=FILE, required=True, help="N-Quads file to write.")
 @click.option("--timeout", type=Number(min=0.1), default=600.0, show_default=True, help="Limit per triples map, s.")
 @click.option("--base", metavar="IRI", help="What relative IRIs are below. Default: the document's @base.")
 def map_database(mapping: Path, database: str, out: Path, timeout: float, base: str | None) -> None:
@@ -272,7 +253,7 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
 @click.command()
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     default=Path("irtwin-ontology.html"),
     show_default=True,
     help="HTML file to write.",
@@ -284,7 +265,7 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
 )
 @click.option(
     "--questions",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="HTML file to write the competency questions to: what the graph can be asked by name.",
 )
 def docs(out: Path, workspace: Path | None, questions: Path | None) -> None:
@@ -302,6 +283,6 @@ def docs(out: Path, workspace: Path | None, questions: Path | None) -> None:
     if workspace is None:
         questions_page.write_page(questions, known)
     else:
-        with asking.open_graph(workspace, None) as graph:
+        with asking.open_graph(Location(workspace)) as graph:
             questions_page.write_page(questions, known, graph)
     click.echo(questions)

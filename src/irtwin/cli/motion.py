@@ -7,23 +7,28 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from irtwin.cli.options import (
     DAY,
+    FILE,
+    FOLDER,
+    PLACE,
     Number,
     announce,
     database_option,
     graph_option,
+    located,
+    locating,
     payload_com_option,
     payload_mass_option,
     say,
     speech,
-    workspace_option,
 )
 from irtwin.errors import InputError
+from irtwin.location import Location
 
 if TYPE_CHECKING:
     from irtwin.planning.cycle import Cycle
@@ -35,25 +40,19 @@ _PLAN = "plan"  # name of a planned run that was given none
 _NO_POWER = "energy and power are not known; the twin has seen no power"
 
 
-def _kept(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options by which a motion is kept as a planned run."""
-    for option in (
-        graph_option,
-        database_option,
-        click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: that of --out, or plan."),
-        click.option(
-            "--workspace", type=click.Path(path_type=Path, file_okay=False), help="Keep it there, as a planned run."
-        ),
-    ):
-        command = option(command)
-    return command
+_kept = locating(
+    click.option("--workspace", type=FOLDER, help="Keep it there, as a planned run."),
+    click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: that of --out, or plan."),
+    database_option,
+    graph_option,
+)
 
 
 @click.command()
 @click.argument("source")
 @click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
 @click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV or Parquet file to write.")
+@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -90,10 +89,8 @@ def plan(
     search: float,
     payload_mass: float,
     payload_com: tuple[float, float, float],
-    workspace: Path | None,
+    location: Location | None,
     name: str | None,
-    database: str | None,
-    graph_url: str | None,
 ) -> None:
     """Plan a motion from pose to pose, around obstacles, and say what it costs.
 
@@ -108,8 +105,8 @@ def plan(
     from irtwin.planning.poses import read_target
     from irtwin.robot.collision import Obstacle
 
-    _check_kept(workspace, name, out)
-    twin = plans.robot_twin(source, workspace, database) if workspace else modelling.read_twin(Path(source))
+    _check_kept(location, name, out)
+    twin = plans.robot_twin(source, location) if location else modelling.read_twin(Path(source))
     joints = len(twin.robot.joints)
     task = Task(
         start=read_target(start, joints, "--from"),
@@ -122,20 +119,11 @@ def plan(
         payload_mass=payload_mass,
         payload_com=payload_com,
     )
-    if workspace is None:
+    if location is None:
         made, kept = modelling.plan(twin, task, out, rate), None
     else:
-        made, kept = plans.plan(
-            source,
-            task,
-            workspace,
-            name=name or (out.stem if out else _PLAN),
-            out=out,
-            rate=rate,
-            database=database,
-            graph_url=graph_url,
-            announce=say,
-        )
+        name = name or (out.stem if out else _PLAN)
+        made, kept = plans.plan(source, task, location, name=name, out=out, rate=rate, announce=say)
     _say_unchecked(made.checks_itself)
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
     click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {(kept or made).price or _NO_POWER}")
@@ -143,8 +131,8 @@ def plan(
 
 @click.command()
 @click.argument("twin")
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Parquet file to write.")
+@click.argument("run", type=PLACE)
+@click.option("--out", type=FILE, help="Parquet file to write.")
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload mass, kg. Default: from the run's data set.")
 @click.option(
     "--payload-com",
@@ -155,15 +143,7 @@ def plan(
 )
 @_kept
 def predict(
-    twin: str,
-    run: Path,
-    out: Path | None,
-    payload_mass: float | None,
-    payload_com: tuple[float, float, float] | None,
-    workspace: Path | None,
-    name: str | None,
-    database: str | None,
-    graph_url: str | None,
+    twin: str, run: Path, out: Path | None, location: Location | None, name: str | None, **payload: Any
 ) -> None:
     """Predict torque, power and energy of a run with a saved twin.
 
@@ -173,14 +153,11 @@ def predict(
     """
     from irtwin import modelling, plans
 
-    _check_kept(workspace, name, out)
-    if workspace is None:
-        expected, kept = modelling.expect(twin, run, out, payload_mass=payload_mass, payload_com=payload_com), None
+    _check_kept(location, name, out)
+    if location is None:
+        expected, kept = modelling.expect(twin, run, out, **payload), None
     else:
-        expected, kept = plans.predict(
-            twin, run, workspace, name=name or run.stem, out=out, payload_mass=payload_mass, payload_com=payload_com,
-            database=database, graph_url=graph_url, announce=say,
-        )  # fmt: skip
+        expected, kept = plans.predict(twin, run, location, name=name or run.stem, out=out, announce=say, **payload)
     _say_unchecked(expected.checks_itself)
     click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
 
@@ -191,25 +168,14 @@ def predict(
 @click.option("--cycle", type=Number(0.0, DAY, min_open=True), help="Cycle time, s. Default: as long as the run.")
 @click.option(
     "--pause",
+    "least_pause",
     type=Number(0.0, DAY),
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV or Parquet file to write.")
-@workspace_option
+@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
+@located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
-@database_option
-@graph_option
-def optimise(
-    robot: str,
-    run: str,
-    cycle: float | None,
-    pause: float | None,
-    out: Path | None,
-    workspace: Path,
-    name: str | None,
-    database: str | None,
-    graph_url: str | None,
-) -> None:
+def optimise(robot: str, run: str, out: Path | None, location: Location, name: str | None, **asked: Any) -> None:
     """Time the moves of a run so that it takes least energy, by the robot's twin.
 
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
@@ -219,10 +185,7 @@ def optimise(
     """
     from irtwin import plans
 
-    found, kept = plans.optimise(
-        robot, run, workspace, name=name or f"{run}_optimised", cycle=cycle, least_pause=pause, out=out,
-        database=database, graph_url=graph_url, announce=say,
-    )  # fmt: skip
+    found, kept = plans.optimise(robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked)
     for line in _curve_lines(found):
         click.echo(line)
     click.echo(f"{_where(out, kept)}: {_cycle_text(found.best)} than {run} (95 % interval)")
@@ -245,9 +208,9 @@ def _cycle_text(cycle: Cycle) -> str:
 
 
 @click.command()
-@click.argument("urdf", type=click.Path(path_type=Path))
+@click.argument("urdf", type=PLACE)
 @click.option("--seconds", type=Number(min=1.0), required=True, help="Duration of the motion, s.")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV file to write.")
+@click.option("--out", type=FILE, required=True, help="CSV file to write.")
 @click.option("--rate", type=Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
 @click.option(
@@ -294,10 +257,10 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     )
 
 
-def _check_kept(workspace: Path | None, name: str | None, out: Path | None) -> None:
-    if workspace is None and out is None:
+def _check_kept(location: Location | None, name: str | None, out: Path | None) -> None:
+    if location is None and out is None:
         raise InputError("nothing says where the motion is to go; give --out FILE, --workspace FOLDER, or both")
-    if workspace is None and name is not None:
+    if location is None and name is not None:
         raise InputError("--run names a planned run of a workspace; give --workspace FOLDER too")
 
 

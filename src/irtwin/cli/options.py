@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
 
+from irtwin.location import WORKSPACE, Location
+
 DAY = 86400.0  # s
-_WORKSPACE = Path("irtwin-workspace")
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+PLACE = click.Path(path_type=Path)  # of either
 
 
 class Number(click.FloatRange):
@@ -41,8 +47,8 @@ def _left_aside(context: click.Context, option: click.Parameter, workspace: Path
 
 workspace_option = click.option(
     "--workspace",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=_WORKSPACE,
+    type=FOLDER,
+    default=WORKSPACE,
     show_default=True,
     callback=_left_aside,
     help="Folder with the database, series, graph and reports.",
@@ -69,6 +75,28 @@ graph_option = click.option(
     callback=_checked_url,
     help="Query URL of a SPARQL 1.1 server for the graph. Default: a folder in the workspace.",
 )
+
+
+def locating(*options: Callable[[Any], Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a command options that say where a workspace is, and what they say: `location`, None without --workspace."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def located(
+            workspace: Path | None, database: str | None = None, graph_url: str | None = None, **said: Any
+        ) -> Any:
+            location = None if workspace is None else Location(workspace, database, graph_url)
+            return command(location=location, **said)
+
+        for option in reversed(options):
+            located = option(located)
+        return located
+
+    return decorate
+
+
+located = locating(workspace_option, database_option, graph_option)
+located_graph = locating(workspace_option, graph_option)
 base_option = click.option(
     "--base",
     metavar="IRI",
@@ -113,13 +141,13 @@ def printable(line: str) -> str:
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
 
 
-def tell_contradictions(workspace: Path, graph_url: str | None) -> None:
+def tell_contradictions(location: Location) -> None:
     """Say which statements of a workspace contradict each other; where there are any, end with status 3."""
     from irtwin.asking import contradictions
 
-    found = contradictions(workspace, graph_url)
+    found = contradictions(location)
     for line in found:
-        say(f"irtwin: {workspace}: {line}")
+        say(f"irtwin: {location.folder}: {line}")
     if found:
         sys.exit(3)
 

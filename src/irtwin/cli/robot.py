@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import say
+from irtwin.cli.options import FILE, FOLDER, PLACE, printable, say
 from irtwin.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 
 _LARGEST = 100_000_000  # bytes of a file of joint positions
 _SHOWN = 16  # solutions: a pose within reach of a six-axis arm has no more, unless they are without end
-_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
-_source = click.argument("source", type=click.Path(path_type=Path))
+_source = click.argument("source", type=PLACE)
 _link = click.option("--link", metavar="NAME", help="Take this link, not the flange (the last link).")
 _json = click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 
@@ -88,7 +87,7 @@ def _table_document(described: Robot, table: Table, end: str, apart: tuple[float
 
 def _table_lines(described: Robot, table: Table, end: str, apart: tuple[float, float]) -> Iterator[str]:
     order = {"standard": "theta, d, a, alpha", "modified": "a, alpha, theta, d"}[table.convention]
-    yield f"{_plain(described.name)}, base to {_plain(end)}: {table.convention} convention ({order})"
+    yield f"{printable(described.name)}, base to {printable(end)}: {table.convention} convention ({order})"
     head = ["joint", "a, m", "alpha, rad", "alpha, deg", "d, m", "theta, rad", "theta, deg"]
     body = []
     for name, row in zip(table.joint_names, table.rows, strict=True):
@@ -97,7 +96,7 @@ def _table_lines(described: Robot, table: Table, end: str, apart: tuple[float, f
         cells = [_number(value) for value in numbers]
         place = 3 if slides else 4
         cells[place] = "q" if cells[place] == "0" else f"{cells[place]} + q"
-        body.append([_plain(name), *cells])
+        body.append([printable(name), *cells])
     yield from _columns([head, *body])
     yield f"base: {_place_words(table.base)}"
     yield f"tool: {_place_words(table.tool)}"
@@ -106,7 +105,7 @@ def _table_lines(described: Robot, table: Table, end: str, apart: tuple[float, f
 
 @robot.command()
 @_source
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="URDF file to write.")
+@click.option("--out", type=FILE, required=True, help="URDF file to write.")
 def urdf(source: Path, out: Path) -> None:
     """Write a robot's description as URDF.
 
@@ -124,7 +123,7 @@ def urdf(source: Path, out: Path) -> None:
 
 @robot.command()
 @_source
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write.")
+@click.option("--out", type=FOLDER, required=True, help="Folder to write.")
 def ros(source: Path, out: Path) -> None:
     """Write a robot as a ROS package.
 
@@ -141,7 +140,7 @@ def ros(source: Path, out: Path) -> None:
 @robot.command(context_settings={"ignore_unknown_options": True})
 @_source
 @click.argument("q", nargs=-1, type=float)
-@click.option("--file", type=click.Path(path_type=Path), help="CSV file of joint positions: a column q_JOINT for each.")
+@click.option("--file", type=PLACE, help="CSV file of joint positions: a column q_JOINT for each.")
 @_link
 @_json
 def fk(source: Path, q: tuple[float, ...], file: Path | None, link: str | None, as_json: bool) -> None:
@@ -163,7 +162,7 @@ def fk(source: Path, q: tuple[float, ...], file: Path | None, link: str | None, 
         outside = (column < joint.lower) | (column > joint.upper)
         if outside.any():
             click.echo(
-                f"irtwin: {_plain(joint.name)} is at {column[outside][0]:g} {joint.unit}, "
+                f"irtwin: {printable(joint.name)} is at {column[outside][0]:g} {joint.unit}, "
                 f"outside its limits {joint.lower:g} to {joint.upper:g}",
                 err=True,
             )
@@ -276,7 +275,7 @@ def ik(source: Path, pose: tuple[float, ...], start: str | None, link: str | Non
         rows = [dict(zip(described.joint_names, row, strict=True)) for row in found.solutions.tolist()]
         click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
         return
-    head = [f"{_plain(joint.name)}, {joint.unit}" for joint in described.joints]
+    head = [f"{printable(joint.name)}, {joint.unit}" for joint in described.joints]
     body = [[_number(value) for value in row] for row in found.solutions[:_SHOWN]]
     click.echo("\n".join(_columns([head, *body])))
     if found.redundant or len(found.solutions) > _SHOWN:
@@ -320,7 +319,9 @@ def equations(source: Path, joint: str | None, latex: bool) -> None:
     for place, each in enumerate(described.joints):
         if joint in (None, each.name):
             unit = "N" if each.unit == "m" else "N m"
-            title = f"{'%' if latex else '#'} tau{place + 1}: {_plain(each.name)}, {unit}; q{place + 1} in {each.unit}"
+            title = (
+                f"{'%' if latex else '#'} tau{place + 1}: {printable(each.name)}, {unit}; q{place + 1} in {each.unit}"
+            )
             click.echo(f"{title}\n{found.latex(place) if latex else found.text(place)}\n")
     click.echo(f"These equations and Pinocchio differ by {found.deviation:.1e} N m (N) at most.", err=True)
 
@@ -342,8 +343,3 @@ def _place_words(place: np.ndarray) -> str:
     document = _pose_document(place)
     xyz, rpy = (", ".join(map(_number, document[key])) for key in ("position_m", "rpy_rad"))
     return f"x, y, z = {xyz} m; roll, pitch, yaw = {rpy} rad"
-
-
-def _plain(name: str) -> str:
-    """Return a name from a file without what breaks lines or steers a terminal."""
-    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in name)

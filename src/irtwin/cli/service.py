@@ -6,13 +6,12 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import DAY, Number, database_option, graph_option, say, workspace_option
+from irtwin.cli.options import DAY, PLACE, Number, located, say
+from irtwin.location import Location
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
+@located
 @click.option("--port", type=click.IntRange(0, 65535), default=7878, show_default=True, help="0 picks a free port.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--timeout", type=Number(0.1, DAY), default=30.0, show_default=True, help="Limit per query, s.")
@@ -22,11 +21,9 @@ from irtwin.cli.options import DAY, Number, database_option, graph_option, say, 
 @click.option(
     "--allow-origin", "origins", metavar="ORIGIN", multiple=True, help="Site whose pages may ask the endpoint."
 )
-@click.option("--token-file", type=click.Path(path_type=Path), help="File with the token that permits updates.")
+@click.option("--token-file", type=PLACE, help="File with the token that permits updates.")
 def serve(
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
+    location: Location,
     port: int,
     host: str,
     timeout: float,
@@ -51,19 +48,10 @@ def serve(
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
     from irtwin.serve.server import serve as serve_graph
-    from irtwin.serve.source import Source
 
     limits = Limits(seconds=timeout, memory=memory << 20)
-    serve_graph(
-        Source(workspace, graph_url),
-        host,
-        port,
-        token=read_token(token_file),
-        limits=limits,
-        announce=_announce,
-        database=database,
-        origins=origins,
-    )
+    token = read_token(token_file)
+    serve_graph(location, host, port, token=token, limits=limits, announce=_announce, origins=origins)
 
 
 def _announce(address: str) -> None:
@@ -71,19 +59,15 @@ def _announce(address: str) -> None:
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
+@located
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
-@click.option("--replay", type=click.Path(path_type=Path), help="Play this log of a robot instead.")
+@click.option("--replay", type=PLACE, help="Play this log of a robot instead.")
 @click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
 @click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the robot carries out.")
 def live(
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
+    location: Location,
     port: int | None,
     replay: Path | None,
     rtde: str | None,
@@ -111,17 +95,6 @@ def live(
         raise click.UsageError("--speed is for --replay.")
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
-    check(resources_of(workspace))
-    catch_up(workspace, database=database, graph_url=graph_url, announce=say)  # while it watches, nobody else can
-    watch(
-        workspace,
-        database=database,
-        graph_url=graph_url,
-        port=port,
-        replayed=replay,
-        rtde=rtde,
-        robot=robot,
-        speed=speed,
-        performs=performs,
-        announce=say,
-    )
+    check(resources_of(location.folder))
+    catch_up(location, say)  # while it watches, nobody else can
+    watch(location, port=port, replayed=replay, rtde=rtde, robot=robot, speed=speed, performs=performs, announce=say)

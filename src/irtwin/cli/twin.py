@@ -6,45 +6,40 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from irtwin.cli.options import (
+    FILE,
+    FOLDER,
+    PLACE,
     Number,
     announce,
     base_option,
     database_option,
     graph_option,
+    located,
+    locating,
     payload_com_option,
     payload_mass_option,
     say,
     series_option,
     tell_contradictions,
-    workspace_option,
 )
+from irtwin.location import Location
 
 if TYPE_CHECKING:
     from irtwin.signals.finding import Finding
 
 
 @click.command()
-@click.argument("dataset", type=click.Path(path_type=Path))
-@workspace_option
-@database_option
-@graph_option
+@click.argument("dataset", type=PLACE)
+@located
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @base_option
 @series_option
-def run(
-    dataset: Path,
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
-    repair: bool,
-    base: str | None,
-    series_url: str | None,
-) -> None:
+def run(dataset: Path, location: Location, **asked: Any) -> None:
     """Build a twin, a graph and a report from a data set.
 
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
@@ -55,23 +50,13 @@ def run(
     """
     from irtwin.workflow import run as run_all
 
-    report = run_all(
-        dataset,
-        workspace,
-        database=database,
-        graph_url=graph_url,
-        repair=repair,
-        base=base,
-        series_url=series_url,
-        announce=announce,
-    )
-    click.echo(report)
-    tell_contradictions(workspace, graph_url)
+    click.echo(run_all(dataset, location, announce=announce, **asked))
+    tell_contradictions(location)
 
 
 @click.command()
-@click.argument("dataset", type=click.Path(path_type=Path))
-@click.option("--json", "out", type=click.Path(path_type=Path, dir_okay=False), help="JSON file to write findings to.")
+@click.argument("dataset", type=PLACE)
+@click.option("--json", "out", type=FILE, help="JSON file to write findings to.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 def check(dataset: Path, out: Path | None, repair: bool) -> None:
     """Look for faults in a log: signs, swapped columns, units, dead channels.
@@ -93,45 +78,28 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
+@located
 @base_option
 @series_option
 @click.option("--no-open", is_flag=True, help="Do not show the report in a browser.")
-def demo(
-    workspace: Path,
-    database: str | None,
-    graph_url: str | None,
-    base: str | None,
-    series_url: str | None,
-    no_open: bool,
-) -> None:
+def demo(location: Location, base: str | None, series_url: str | None, no_open: bool) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser."""
     from irtwin.workflow import run as run_all
     from irtwin.workflow import unpack_demo
 
-    data_set = unpack_demo(workspace)
+    data_set = unpack_demo(location.folder)
     announce(f"The example data set is in {data_set}. Use it as a template for your own.")
-    report = run_all(
-        data_set,
-        workspace,
-        database=database,
-        graph_url=graph_url,
-        base=base,
-        series_url=series_url,
-        announce=announce,
-    )
+    report = run_all(data_set, location, base=base, series_url=series_url, announce=announce)
     click.echo(f"\nOpen the report in a browser: {report.resolve()}")
     if not no_open and sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
         webbrowser.open(report.resolve().as_uri())
-    click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {workspace}")
+    click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {location.folder}")
 
 
 @click.command(name="case-study")
 @click.option(
     "--workspace",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=FOLDER,
     default=Path("irtwin-case-study"),
     show_default=True,
     help="New folder to work in.",
@@ -151,39 +119,27 @@ def case_study(workspace: Path) -> None:
 
 
 @click.command()
-@click.argument("dataset", type=click.Path(path_type=Path))
-@click.option(
-    "--json",
-    "out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="JSON file to write the diagnosis to.",
-)
-@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML file to write the report to.")
-@click.option(
-    "--save-twin",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="JSON file to write the twin to, with the causes added.",
-)
-@click.option(
-    "--save-motion",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="CSV file to write the motion of the next experiment to.",
-)
+@click.argument("dataset", type=PLACE)
+@click.option("--json", "json_file", type=FILE, help="JSON file to write the diagnosis to.")
+@click.option("--report", type=FILE, help="HTML file to write the report to.")
+@click.option("--save-twin", "twin_file", type=FILE, help="JSON file to write the twin to, with the causes added.")
+@click.option("--save-motion", "motion_file", type=FILE, help="CSV file to write the motion of the next experiment to.")
 @click.option(
     "--twin",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="Twin that --save-twin wrote, to hold the data against: its effects are the baseline, its numbers the prior.",
 )
 @click.option(
     "--simulator",
     metavar="MODEL.xml",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="Model of the robot in MuJoCo, to hold the data against: what differs is said. Logs with commands and without "
     "torque are played through it. Needs irtwin[mujoco].",
 )
 @click.option(
     "--save-simulator",
-    type=click.Path(path_type=Path, dir_okay=False),
+    "simulator_file",
+    type=FILE,
     help="File to write that model to, with the numbers that the robot has; all else stays as it is.",
 )
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
@@ -195,58 +151,29 @@ def case_study(workspace: Path) -> None:
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
-@click.option("--workspace", type=click.Path(path_type=Path, file_okay=False), help="Also store the diagnosis there.")
-@database_option
-@graph_option
+@locating(
+    click.option("--workspace", type=FOLDER, help="Also store the diagnosis there."), database_option, graph_option
+)
 def diagnose(
-    dataset: Path,
-    out: Path | None,
-    report: Path | None,
-    save_twin: Path | None,
-    save_motion: Path | None,
-    twin: Path | None,
-    simulator: Path | None,
-    save_simulator: Path | None,
-    withhold: tuple[str, ...],
-    cutoff: float | None,
-    seed: int,
-    repair: bool,
-    workspace: Path | None,
-    database: str | None,
-    graph_url: str | None,
+    dataset: Path, simulator: Path | None, simulator_file: Path | None, location: Location | None, **asked: Any
 ) -> None:
     """Find where a twin, or a simulator, and its robot differ, and why.
 
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     A summary is printed; --report and --json write all of it.
     """
-    from irtwin import workflow
+    from irtwin.diagnosing import diagnose as judge
     from irtwin.report.gap import summary
     from irtwin.report.gap.headline import line, refused
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
-    if save_simulator and not simulator:
+    if simulator_file and not simulator:
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
-    if save_simulator and simulator and save_simulator.absolute() == simulator.absolute():
+    if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
         raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
-    found = workflow.diagnose(
-        dataset,
-        twin=twin,
-        simulator=simulator,
-        withhold=withhold,
-        cutoff=cutoff,
-        seed=seed,
-        repair=repair,
-        workspace=workspace,
-        database=database,
-        graph_url=graph_url,
-        json_file=out,
-        report=report,
-        twin_file=save_twin,
-        motion_file=save_motion,
-        simulator_file=save_simulator,
-        announce=announce,
+    found = judge(
+        dataset, simulator=simulator, simulator_file=simulator_file, workspace=location, announce=announce, **asked
     )
     click.echo(line(found.document, found.against))
     for said in (*refused(found.document), *summary.filtered(found.document)):
@@ -268,25 +195,13 @@ def diagnose(
 
 @click.command()
 @click.argument("robot")
-@click.argument("new_log", metavar="LOG", type=click.Path(path_type=Path))
-@workspace_option
+@click.argument("new_log", metavar="LOG", type=PLACE)
+@located
 @payload_mass_option
 @payload_com_option
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the log carried out.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
-@database_option
-@graph_option
-def improve(
-    robot: str,
-    new_log: Path,
-    workspace: Path,
-    payload_mass: float,
-    payload_com: tuple[float, float, float],
-    performs: str | None,
-    repair: bool,
-    database: str | None,
-    graph_url: str | None,
-) -> None:
+def improve(robot: str, new_log: Path, location: Location, **asked: Any) -> None:
     """Better a robot's twin by a new log.
 
     LOG is a CSV or Parquet file, such as of the motion that `irtwin run` proposed. The twin is fitted again, with the
@@ -295,10 +210,7 @@ def improve(
     """
     from irtwin import improvement
 
-    found = improvement.improve(
-        robot, new_log, workspace, payload_mass=payload_mass, payload_com=payload_com, performs=performs,
-        repair=repair, database=database, graph_url=graph_url, announce=announce,
-    )  # fmt: skip
+    found = improvement.improve(robot, new_log, location, announce=announce, **asked)
     for number, one in enumerate(found.rounds, start=1):
         click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")
     if found.within:
@@ -311,17 +223,15 @@ def improve(
 
 @click.command()
 @click.argument("robot")
-@workspace_option
-@database_option
-@graph_option
-def adopt(robot: str, workspace: Path, database: str | None, graph_url: str | None) -> None:
+@located
+def adopt(robot: str, location: Location) -> None:
     """Replace a robot's twin by the one of its diagnosis.
 
     The energy in the graph is then computed with the new twin, and the energy report is written again.
     """
     from irtwin import workflow
 
-    click.echo(workflow.adopt(robot, workspace, database=database, graph_url=graph_url, announce=say))
+    click.echo(workflow.adopt(robot, location, announce=say))
 
 
 def _state(finding: Finding) -> str:

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import database_option, graph_option, say, series_option, workspace_option
+from irtwin.cli.options import FILE, located, say, series_option
+from irtwin.location import Location
 
 
 @click.command()
 @click.argument("robot")
 @click.option("--run", metavar="NAME", help="Remove this run alone: a plan that was kept, or a live run.")
-@workspace_option
-@database_option
-@graph_option
-def drop(robot: str, run: str | None, workspace: Path, database: str | None, graph_url: str | None) -> None:
+@located
+def drop(robot: str, run: str | None, location: Location) -> None:
     """Remove a ROBOT from the workspace.
 
     Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it. With
@@ -25,16 +24,14 @@ def drop(robot: str, run: str | None, workspace: Path, database: str | None, gra
     from irtwin import upkeep
 
     if run is None:
-        upkeep.drop(robot, workspace, database=database, graph_url=graph_url, announce=say)
+        upkeep.drop(robot, location, say)
     else:
-        upkeep.drop_run(robot, run, workspace, database=database, graph_url=graph_url, announce=say)
+        upkeep.drop_run(robot, run, location, say)
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
-def repair(workspace: Path, database: str | None, graph_url: str | None) -> None:
+@located
+def repair(location: Location) -> None:
     """Rebuild a damaged or lost graph from the database.
 
     Lists the series, twins and diagnoses that are missing or altered; the exit status is then 2. A damaged database
@@ -42,8 +39,8 @@ def repair(workspace: Path, database: str | None, graph_url: str | None) -> None
     """
     from irtwin import upkeep
 
-    upkeep.repair(workspace, database=database, graph_url=graph_url, announce=say)
-    click.echo(workspace)
+    upkeep.repair(location, say)
+    click.echo(location.folder)
 
 
 @click.command()
@@ -71,10 +68,8 @@ def trust(workspace: Path, withdraw: bool) -> None:
 
 
 @click.command()
-@workspace_option
-@database_option
-@graph_option
-def status(workspace: Path, database: str | None, graph_url: str | None) -> None:
+@located
+def status(location: Location) -> None:
     """Show how a workspace stands.
 
     Lists robots and runs, tables, the graph's size, the files that extend what ships, and damage; where there is any,
@@ -82,7 +77,7 @@ def status(workspace: Path, database: str | None, graph_url: str | None) -> None
     """
     from irtwin import status as of_workspace
 
-    found = of_workspace.status(workspace, database=database, graph_url=graph_url)
+    found = of_workspace.status(location)
     for line in found.lines():
         click.echo(line)
     if found.faults:
@@ -90,35 +85,29 @@ def status(workspace: Path, database: str | None, graph_url: str | None) -> None
 
 
 @click.command()
-@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
-@workspace_option
-@database_option
-@graph_option
-def backup(archive: Path, workspace: Path, database: str | None, graph_url: str | None) -> None:
+@click.argument("archive", type=FILE)
+@located
+def backup(archive: Path, location: Location) -> None:
     """Write a workspace into one ARCHIVE, even while others write to it.
 
     It holds graph, database (also the rows of a server), series, twins, diagnoses and reports, with checksums.
     """
     from irtwin import workflow
 
-    workflow.backup(archive, workspace, database=database, graph_url=graph_url)
+    workflow.backup(archive, location)
     click.echo(archive)
 
 
 @click.command()
-@click.argument("archive", type=click.Path(path_type=Path, dir_okay=False))
-@workspace_option
-@database_option
-@graph_option
+@click.argument("archive", type=FILE)
+@located
 @series_option
-def restore(
-    archive: Path, workspace: Path, database: str | None, graph_url: str | None, series_url: str | None
-) -> None:
+def restore(archive: Path, location: Location, series_url: str | None) -> None:
     """Create a new workspace from an ARCHIVE that `backup` wrote.
 
     A damaged archive restores nothing, and nothing is overwritten.
     """
     from irtwin.knowledge.store.backup import restore as restore_all
 
-    restore_all(archive, workspace, database, graph_url, series_url)
-    click.echo(workspace)
+    restore_all(archive, location, series_url)
+    click.echo(location.folder)

@@ -10,8 +10,8 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from irtwin import __version__
 from irtwin.errors import InputError, WorkspaceFault
@@ -53,6 +53,19 @@ _USUAL = Record("", BEGUN)  # whose fields have their types
 
 
 @dataclass(frozen=True)
+class Sets:
+    """What a batch is for, `run` or `diagnose`, and its data sets.
+
+    `base`: what the IRIs of its workspace begin with; `series`: where in object storage its series go; if said.
+    """
+
+    kind: str
+    data_sets: list[str]
+    base: str | None = None
+    series: str | None = None
+
+
+@dataclass(frozen=True)
 class Batch:
     """A folder of a fleet: `sets.json`, `records/`, and the results, a workspace or `diagnoses/`."""
 
@@ -60,49 +73,25 @@ class Batch:
 
     @classmethod
     def create(
-        cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None, series_url: str | None = None
+        cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None, series: str | None = None
     ) -> Batch:
         """Write down which data sets a new batch has, what its IRIs begin with, and where its series go."""
-        said = {"kind": kind, "base": base, "series": series_url, "data_sets": list(places)}
-        write(folder / _SETS, json.dumps(said, indent=1).encode())
+        write(folder / _SETS, json.dumps(asdict(Sets(kind, list(places), base, series)), indent=1).encode())
         return cls(folder)
 
-    @property
-    def kind(self) -> str:
-        """`run` or `diagnose`."""
-        return str(self._said("kind"))
-
-    @property
-    def base(self) -> str | None:
-        """What the IRIs of its workspace begin with, where that was said."""
-        return self._said("base")
-
-    @property
-    def series_url(self) -> str | None:
-        """Where in object storage the series of its workspace go, where that was said."""
-        return self._said("series")
-
-    @property
-    def places(self) -> list[str]:
-        """Its data sets."""
-        return list(map(str, self._sets()["data_sets"]))
-
-    def _said(self, what: str) -> str | None:
-        found = self._sets().get(what)
-        return None if found is None else str(found)
-
-    def _sets(self) -> dict[str, Any]:
+    @cached_property
+    def sets(self) -> Sets:
+        """What it was made of. Raises InputError where that cannot be read."""
         file = self._inside(_SETS)
         try:
-            found = parse_json(read_input(file, _MOST_BYTES))
-            sound = isinstance(found, dict) and isinstance(found.get("data_sets"), list)
-            if not (sound and found.get("kind") in (RUN, DIAGNOSE)):
+            found = Sets(**parse_json(read_input(file, _MOST_BYTES)))
+            if not isinstance(found.data_sets, list) or found.kind not in (RUN, DIAGNOSE):
                 raise ValueError("it says no data sets, or not what for")
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             raise InputError(
                 f"{file}: cannot be read ({error}); remove its folder, and its sets are taken again"
             ) from None
-        return dict(found)
+        return found
 
     def record(self, place: str) -> Record | None:
         """Return what is known of a data set; None where it was never begun, or its record is damaged."""
@@ -116,7 +105,7 @@ class Batch:
 
     def records(self) -> Iterator[Record | None]:
         """Yield the record of each data set."""
-        yield from map(self.record, self.places)
+        yield from map(self.record, self.sets.data_sets)
 
     def _inside(self, path: str) -> InsidePath:
         """Return a file of the batch. Raises InputError where a link leads out of it."""
@@ -134,9 +123,8 @@ class Batch:
         A data set that is refused or fails costs no other. Where the process ends, the next one goes on from there.
         """
         with self._alone():
-            kind = self.kind
-            for place in self.places:
-                self._take(kind, place)
+            for place in self.sets.data_sets:
+                self._take(place)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -148,7 +136,7 @@ class Batch:
             fcntl.flock(lock, fcntl.LOCK_EX)  # a scheduler may take a worker for lost that is still at work
             yield
 
-    def _take(self, kind: str, place: str) -> None:
+    def _take(self, place: str) -> None:
         before, began = self.record(place), time.monotonic()
         attempts = 1
         try:
@@ -162,23 +150,26 @@ class Batch:
                     said = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
                     return self._write(Record(place, FAILED, said, attempts=attempts, checksum=now))
                 self._write(Record(place, BEGUN, attempts=attempts, checksum=now))
-                state, said = self._done(kind, place, data_set)
+                state, said = self._done(place, data_set)
         except OSError as error:  # a storage that does not answer
             now, state, said = "", FAILED, str(error)
         self._write(Record(place, state, said, time.monotonic() - began, attempts, now))
 
-    def _done(self, kind: str, place: str, data_set: Path) -> tuple[str, str]:
+    def _done(self, place: str, data_set: Path) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
-        from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
-
         trace = self._inside(f"records/{key(place)}.traceback.txt")
         trace.unlink(missing_ok=True)
         try:
-            if kind == RUN:
-                workflow.run(data_set, self._inside("workspace"), base=self.base, series_url=self.series_url)
+            if self.sets.kind == RUN:
+                from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
+
+                said = self.sets
+                workflow.run(data_set, self._inside("workspace"), base=said.base, series_url=said.series)
             else:
+                from irtwin import diagnosing
+
                 results = self._inside(f"diagnoses/{key(place)}")
-                workflow.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
+                diagnosing.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
         except WorkspaceFault as error:  # no fault of the data set: the next call tries again
             return FAILED, str(error)
         except InputError as error:

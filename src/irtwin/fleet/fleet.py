@@ -55,7 +55,7 @@ def work(
     base = None if base is None else base_iri.checked(base, "--base")
     series_url = _place_of_series(folder, series_url)
     _plan(find_data_sets(source), folder, kind, batch, workers, base, series_url)
-    batches = [one for one in batches_of(folder) if one.kind == kind]
+    batches = [one for one in batches_of(folder) if one.sets.kind == kind]
     ended = count(1)
 
     def tell(one: Batch) -> None:
@@ -93,7 +93,7 @@ def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
 def _place_of_series(folder: Path, series_url: str | None) -> str | None:
     """Return where in object storage a fleet's series go: what is asked for, or what was said before."""
     there = batches_of(folder)
-    before = there[0].series_url.rpartition("/")[0] if there and there[0].series_url else None
+    before = there[0].sets.series.rpartition("/")[0] if there and there[0].sets.series else None
     if series_url is None:
         return before
     series_url = checked_url(series_url)
@@ -117,16 +117,16 @@ def _plan(
 ) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
     there = batches_of(folder)
-    if there and {one.kind for one in there} != {kind}:
-        raise InputError(f"{folder}: holds a fleet of `{there[0].kind}`; give `{kind}` a folder of its own")
-    if there and {one.base for one in there} != {base}:
-        said = there[0].base
+    if there and {one.sets.kind for one in there} != {kind}:
+        raise InputError(f"{folder}: holds a fleet of `{there[0].sets.kind}`; give `{kind}` a folder of its own")
+    if there and {one.sets.base for one in there} != {base}:
+        said = there[0].sets.base
         raise InputError(
             f"{folder}: the IRIs of this fleet begin with {said or base_iri.DEFAULT}; "
             + (f"give --base {said}" if said else "leave --base away")
             + ", or another --out"
         )
-    known = {place for one in there for place in one.places}
+    known = {place for one in there for place in one.sets.data_sets}
     new = [place for place in places if place not in known]
     share = max(1, min(size, -(-len(new) // max(workers, 1))))
     for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):

@@ -38,7 +38,7 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
         known = session.get(RunEnergy, header.run_id) is not None
     if not kept:  # else a crash came right here
         run, activity, made = live_run.records(tables)
-        place.keep_live_run(run, series, activity, made)
+        place.keep_run(run, series, [activity, *made])
     if twin is not None and not known:
         tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
     return tables

@@ -10,9 +10,9 @@ from irtwin.errors import InputError
 from irtwin.live.joint_stream import State
 from irtwin.live.stored_times import StoredTimes
 from irtwin.providers.live_energy import KnownTwin, known_twin
-from irtwin.providers.records import find_plan
+from irtwin.providers.records import find_run
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Joint, Robot
+from irtwin.storage.schema import PLANNED_RUN, Joint, Robot
 
 
 class KnownRobots:
@@ -49,5 +49,5 @@ class KnownRobots:
             return None
         of = (state.robot_id, state.performs)
         if of not in self._plans:
-            self._plans[of] = find_plan(self._place, *of).run_id
+            self._plans[of] = find_run(self._place, *of, PLANNED_RUN).run_id
         return self._plans[of]

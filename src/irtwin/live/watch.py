@@ -19,11 +19,12 @@ from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.refusals import Refusals
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
-from irtwin.providers.records import find_plan, find_robot, load_robot
+from irtwin.location import Location
+from irtwin.providers.records import find_robot, find_run, load_robot
 from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
-from irtwin.storage.schema import LIVE, LIVE_RUN, REPLAYED_RUN
+from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
 from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
@@ -31,10 +32,8 @@ Announce = Callable[[str], None]
 
 
 def watch(
-    workspace: Path,
+    location: Location,
     *,
-    database: str | None = None,
-    graph_url: str | None = None,
     port: int | None = None,
     replayed: Path | None = None,
     rtde: str | None = None,
@@ -60,17 +59,17 @@ def watch(
         signal.signal(number, lambda *_: done.set())
 
     with (
-        told_when_full(workspace),
-        Workspace.existing(workspace, database) as place,
-        _alone(place, graph_url),
-        KnowledgeGraph.of_workspace(_checked(place), graph_url) as graph,
+        told_when_full(location.folder),
+        Workspace.existing(location) as place,
+        _alone(place),
+        KnowledgeGraph.of_workspace(_checked(place)) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replayed is None else REPLAYED_RUN) as twin,
     ):
         replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
         receive: Callable[[State], None] = twin.receive
         if performs is not None and robot is not None:
-            find_plan(place, find_robot(place, robot), performs)
+            find_run(place, find_robot(place, robot), performs, PLANNED_RUN)
             receive = _performing(receive, performs)
         reader = StateReader(twin.robots.joints, twin.robots.names)
 
@@ -89,9 +88,9 @@ def watch(
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
 
 
-def _alone(place: Workspace, graph_url: str | None) -> AbstractContextManager[None]:
+def _alone(place: Workspace) -> AbstractContextManager[None]:
     """Keep others from a server's graph, as the lock of a folder's store does by itself."""
-    return nullcontext() if graph_url is None else rewriting_alone(place.engine, place.folder)
+    return nullcontext() if place.location.graph_url is None else rewriting_alone(place.engine, place.folder)
 
 
 def _checked(place: Workspace) -> Workspace:

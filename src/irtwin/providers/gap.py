@@ -21,7 +21,7 @@ from irtwin.providers import gap_rows
 from irtwin.providers.gap_rows import Of
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
-from irtwin.providers.provider import Made, software
+from irtwin.providers.provider import Made, activity
 from irtwin.providers.records import identifier, inputs, robot_iri, rows_of
 from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
@@ -70,10 +70,10 @@ def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[
     robot, parts, runs = rows_of(data_set, {})
     joints = [part for part in parts if isinstance(part, schema.Joint)]
     row, own, documents = _rows(robot.robot_id, joints, runs, diagnosis, curves)
-    activity = _activity(robot.robot_id, "diagnosis", started)
+    judged = activity("diagnosis", robot.robot_id, robot_iri(robot.robot_id), started)
     for one in (row, *own):
-        one.activity_id = activity.activity_id  # type: ignore[attr-defined]
-    return [robot, *parts, *runs, activity, row, *own], documents
+        one.activity_id = judged.activity_id  # type: ignore[attr-defined]
+    return [robot, *parts, *runs, judged, row, *own], documents
 
 
 def adopt(workspace: Workspace, robot_id: str) -> str:
@@ -108,20 +108,8 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
 
 
 def _keep(workspace: Workspace, provider: str, made: Made, started: datetime, instead_of: str | None = None) -> None:
-    activity = _activity(made.robot_id, provider, started)
-    workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of=instead_of)
-
-
-def _activity(robot_id: str, provider: str, started: datetime) -> schema.Activity:
-    return schema.Activity(
-        activity_id=f"{provider}.{robot_id}.{started:%Y%m%dT%H%M%S%f}",
-        robot_id=robot_id,
-        provider=provider,
-        subject=robot_iri(robot_id),
-        started=started,
-        ended=datetime.now(UTC),
-        software=software(),
-    )
+    done = activity(provider, made.robot_id, robot_iri(made.robot_id), started)
+    workspace.replace_activity(done, made.used, made.rows, documents=made.documents, instead_of=instead_of)
 
 
 def _rows(

@@ -20,7 +20,7 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import fitted_data_set, twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
-from irtwin.providers.provider import Made, software
+from irtwin.providers.provider import Made, activity
 from irtwin.providers.records import inputs, load_twin, robot_iri, twin_iri
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -139,8 +139,8 @@ class _Loop:
         read = {motion.run for motion in (*parts.fit, *parts.held_out)}
         run_ids = [run_id for name, run_id in self.known.keys.items() if name in read]
         used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
-        activity = _activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
-        self.workspace.replace_activity(activity, used, [row])
+        done = activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
+        self.workspace.replace_activity(done, used, [row])
 
     def _row(self, tried: Round, earlier: str, found: _Twin) -> schema.ImprovementRound:
         of_robot = schema.ImprovementRound.robot_id == self.robot_id
@@ -212,18 +212,5 @@ def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, 
 def _keep_twin(workspace: Workspace, robot_id: str, known: RobotMotions, best: _Twin) -> None:
     """Make a twin the robot's, with the parts that runs now take in it."""
     _, made = _made(workspace, robot_id, known, best.twin, best.parts)
-    started = datetime.now(UTC)
-    activity = _activity("identification", robot_id, robot_iri(robot_id), started)
-    workspace.replace_activity(activity, made.used, made.rows, documents=made.documents, instead_of="adoption")
-
-
-def _activity(provider: str, robot_id: str, subject: str, started: datetime) -> schema.Activity:
-    return schema.Activity(
-        activity_id=f"{provider}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
-        robot_id=robot_id,
-        provider=provider,
-        subject=subject,
-        started=started,
-        ended=datetime.now(UTC),
-        software=software(),
-    )
+    done = activity("identification", robot_id, robot_iri(robot_id), datetime.now(UTC))
+    workspace.replace_activity(done, made.used, made.rows, documents=made.documents, instead_of="adoption")

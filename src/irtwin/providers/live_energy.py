@@ -19,13 +19,12 @@ from sqlalchemy import select
 
 from irtwin.errors import InputError
 from irtwin.identification.validation import APART, energy_error
+from irtwin.providers import records
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, run_iri, twin_iri
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import live_schema, schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.files import inside
-from irtwin.twin.files import from_json
 from irtwin.twin.gap_watch import ROBOT, GapWatch, PlaceState, Windows, band
 from irtwin.twin.so_far import EnergySoFar, Stretch
 from irtwin.twin.twin import Twin
@@ -55,13 +54,8 @@ class KnownTwin:
 
 def known_twin(workspace: Workspace, robot_id: str) -> KnownTwin | None:
     """Return a robot's twin; None where it has none. Raises InputError where its file is gone or another."""
-    with workspace.reading() as session:
-        row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
-    if row is None:
-        return None
-    document = workspace.read_document(row.file, row.sha256)
-    twin = from_json(document, inside(workspace.folder, row.file))
-    return KnownTwin(row.twin_id, twin, _bands(workspace, row.twin_id, twin.robot.joint_names))
+    found = records.known_twin(workspace, robot_id)
+    return None if found is None else KnownTwin(*found, _bands(workspace, found[0], found[1].robot.joint_names))
 
 
 class LiveEnergy:

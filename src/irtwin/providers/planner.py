@@ -9,9 +9,9 @@ from graphlib import CycleError, TopologicalSorter
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.providers.provider import Made, load_provider, software_of
+from irtwin.providers.provider import activity, load_provider, software_of
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import METER, Activity
+from irtwin.storage.schema import METER
 
 _DECLARATIONS = """
 PREFIX irt: <https://w3id.org/irtwin#>
@@ -83,27 +83,16 @@ def populate(
                 set_aside(_robot_id(subject), error)
                 continue
             below = subject.removeprefix(graph.base)
-            activity = _activity(declaration.name, below, made, started, software_of(declaration.name))
-            meter = _activity(METER, below, made, started, activity.software)
+            package = software_of(declaration.name)
+            worked = activity(declaration.name, made.robot_id, below, started, package)
+            meter = activity(METER, made.robot_id, below, started, package)
             metered = (meter, made.metered) if made.metered else None
-            workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents, metered=metered)
+            workspace.replace_activity(worked, made.used, made.rows, made.series, made.documents, metered=metered)
             count += 1
         if count:
             made_something = True
             refresh()
     return made_something
-
-
-def _activity(provider: str, subject: str, made: Made, started: datetime, software: str) -> Activity:
-    return Activity(
-        activity_id=f"{provider}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
-        robot_id=made.robot_id,
-        provider=provider,
-        subject=subject,
-        started=started,
-        ended=datetime.now(UTC),
-        software=software,
-    )
 
 
 def _robot_id(subject: str) -> str:

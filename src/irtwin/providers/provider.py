@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from importlib.metadata import EntryPoint, entry_points, version
 
 import pyarrow as pa
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Base
+from irtwin.storage.schema import Activity, Base
 
 GROUP = "irtwin.providers"
 
@@ -52,6 +53,22 @@ def software_of(name: str) -> str:
 def software() -> str:
     """Return irtwin's own name and version."""
     return f"irtwin {version('irtwin')}"
+
+
+def activity(provider: str, robot_id: str, subject: str, started: datetime, by: str | None = None) -> Activity:
+    """Return the activity of a provider, which ends now, on a subject, by its IRI below the base.
+
+    by: name and version of the package that did it, irtwin's if None.
+    """
+    return Activity(
+        activity_id=f"{provider}.{subject.rpartition('/')[2]}.{started:%Y%m%dT%H%M%S%f}",
+        robot_id=robot_id,
+        provider=provider,
+        subject=subject,
+        started=started,
+        ended=datetime.now(UTC),
+        software=by or software(),
+    )
 
 
 def _entry_point(name: str) -> EntryPoint:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from sqlalchemy import ColumnElement, select
+from sqlalchemy import select
 
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.json_text import parse_json
@@ -137,7 +137,7 @@ def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], ru
     row = _run_row(robot_id, run, datetime.now(UTC))
     row.role = None
     if run.performs is not None:
-        find_plan(workspace, robot_id, run.performs)
+        find_run(workspace, robot_id, run.performs, PLANNED_RUN)
     workspace.keep_run(row, pa.table(columns_of(run.signals, joint_names)))
     return row.run_id
 
@@ -207,31 +207,25 @@ def find_robot(workspace: Workspace, name: str | None) -> str:
     raise InputError(f'{workspace.folder}: no robot "{name}" here; {hint}')
 
 
-def find_run(workspace: Workspace, robot_id: str, name: str) -> Run:
-    """Return a robot's run by its name. Raises InputError, with the nearest name, where there is none."""
-    return _run_of(workspace, name, "run", Run.robot_id == robot_id)
+_CALLED = {None: "run", PLANNED_RUN: "planned run", MEASURED_RUN: "measured run"}
 
 
-def find_plan(workspace: Workspace, robot_id: str, name: str) -> Run:
-    """Return a robot's planned run by its name. Raises InputError, with the nearest name, where there is none."""
-    return _run_of(workspace, name, "planned run", Run.robot_id == robot_id, Run.kind == PLANNED_RUN)
+def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = None) -> Run:
+    """Return a robot's run, of a kind if one is given, by its name; InputError, with the nearest, where there is none.
 
-
-def find_measured(workspace: Workspace, robot_id: str, name: str) -> Run:
-    """Return a robot's measured run by its name. Raises InputError, with the nearest name, where there is none."""
-    return _run_of(workspace, name, "measured run", Run.robot_id == robot_id, Run.kind == MEASURED_RUN)
-
-
-def _run_of(workspace: Workspace, name: str, what: str, *where: ColumnElement[bool]) -> Run:
+    kind: PLANNED_RUN or MEASURED_RUN.
+    """
+    of_robot = select(Run).where(Run.robot_id == robot_id)
     with workspace.reading() as session:
-        known = {row.name: row for row in session.scalars(select(Run).where(*where))}
+        rows = session.scalars(of_robot if kind is None else of_robot.where(Run.kind == kind))
+        known = {row.name: row for row in rows}
         session.expunge_all()
     for row in known.values():
         if name == row.run_id or identifier(row.name) == identifier(name):
             return row
     near = difflib.get_close_matches(name, known, 1, 0.0)
     hint = f'the nearest is "{near[0]}"' if near else "it has none"
-    raise InputError(f'{workspace.folder}: the robot has no {what} "{name}"; {hint}')
+    raise InputError(f'{workspace.folder}: the robot has no {_CALLED[kind]} "{name}"; {hint}')
 
 
 def check_name(workspace: Workspace, name: str) -> None:

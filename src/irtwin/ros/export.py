@@ -12,6 +12,7 @@ from sqlalchemy import select
 from irtwin.asking import open_graph
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import robot_named
+from irtwin.location import Location
 from irtwin.providers.mesh_files import mesh_copies_of_graph
 from irtwin.providers.records import find_robot, known_twin, load_robot, load_run
 from irtwin.providers.robot_of_graph import robot_of_graph
@@ -26,41 +27,39 @@ from irtwin.twin.described import described
 _NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
 
 
-def export_package(
-    out: Path, workspace: Path, robot: str | None, graph_url: str | None = None, database: str | None = None
-) -> list[str]:
+def export_package(out: Path, location: Location, robot: str | None) -> list[str]:
     """Write the ROS package of a robot of the graph into a folder; return what one should know of it.
 
     Where the workspace has a twin of the robot, the package has the twin's bodies and friction. robot: its name; the
     only one's where None. Raises InputError where there is no such robot, or no place to write, or a copy of a mesh is
     gone from the workspace.
     """
-    with open_graph(workspace, graph_url) as graph:
+    with open_graph(location) as graph:
         iri = robot_named(graph, robot)
         found = robot_of_graph(graph, iri)
-        copies = mesh_copies_of_graph(graph, iri, partial(read_document, workspace))
-    found = _as_identified(found, workspace, database)
+        copies = mesh_copies_of_graph(graph, iri, partial(read_document, location.folder))
+    found = _as_identified(found, location)
     return write_package(found, out, {name: copy.content for name, copy in copies.items()})
 
 
-def export_bag(out: Path, workspace: Path, run: str, robot: str | None, database: str | None = None) -> None:
+def export_bag(out: Path, location: Location, run: str, robot: str | None) -> None:
     """Write a stored run, by its name, as a bag: FILE.mcap, FILE.bag of ROS 1, else the folder of a ROS 2 bag.
 
     robot: the name of the run's robot; needed where runs of several have the name. Raises InputError where there is no
     such run, or no place to write.
     """
-    with Workspace.existing(workspace, database) as place:
+    with Workspace.existing(location) as place:
         row = _run(place, run, None if robot is None else find_robot(place, robot))
         owner = load_robot(place, row.robot_id)
         stored = load_run(place, owner, row.run_id)
     write_bag(out, owner, stored.signals, row.start_time or _NO_START)
 
 
-def _as_identified(robot: Robot, workspace: Path, database: str | None) -> Robot:
+def _as_identified(robot: Robot, location: Location) -> Robot:
     """Return a robot as its twin has it, where the workspace has one."""
-    if not Workspace.is_there(workspace, database):
+    if not Workspace.is_there(location):
         return robot
-    with Workspace.existing(workspace, database) as place:
+    with Workspace.existing(location) as place:
         twin = known_twin(place, find_robot(place, robot.name))
     return robot if twin is None else described(twin[1], robot)
 

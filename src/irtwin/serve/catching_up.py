@@ -8,9 +8,9 @@ import os
 import sys
 
 from irtwin.asking import BEHIND
+from irtwin.location import Location
 from irtwin.serve.asking import Asking
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import Source
 
 LOOK = 5.0  # s between two looks
 LONGEST = 600.0  # s between two tries, where they fail
@@ -18,18 +18,17 @@ _CONTRADICTIONS = 3  # the exit status of `irtwin reason` that has concluded all
 _log = logging.getLogger(__name__)
 
 
-async def catch_up(asking: Asking, source: Source, database: str | None) -> None:
+async def catch_up(asking: Asking, location: Location) -> None:
     """Look how the graph stands, again and again, and have `irtwin reason` catch up where nobody is at work on it.
 
-    `database` is the URL of the workspace's, SQLite in its folder if None. What fails is said once, and tried again
-    ever more seldom.
+    What fails is said once, and tried again ever more seldom.
     """
     pause, said = LOOK, ""
     while True:
         fault = ""
         try:
             if await asking.standing() == BEHIND:
-                fault = await _caught_up(source, database)
+                fault = await _caught_up(location)
         except Refusal:
             pass  # all workers are taken, or one was lost: the next look tells
         if fault and fault != said:
@@ -38,12 +37,12 @@ async def catch_up(asking: Asking, source: Source, database: str | None) -> None
         await asyncio.sleep(pause)
 
 
-async def _caught_up(source: Source, database: str | None) -> str:
+async def _caught_up(location: Location) -> str:
     """Bring the graph up to date in a process of its own; return what hindered it, in one line."""
-    places = {"IRTWIN_DATABASE": database, "IRTWIN_GRAPH": source.url}  # a URL may hold a password
+    places = {"IRTWIN_DATABASE": location.database, "IRTWIN_GRAPH": location.graph_url}  # a URL may hold a password
     environment = {name: value for name, value in {**os.environ, **places}.items() if value is not None}
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "irtwin", "reason", "--quiet", "--workspace", str(source.workspace)),
+        *(sys.executable, "-m", "irtwin", "reason", "--quiet", "--workspace", str(location.folder)),
         stdout=asyncio.subprocess.DEVNULL,
         stderr=asyncio.subprocess.PIPE,
         env=environment,

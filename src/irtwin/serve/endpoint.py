@@ -13,6 +13,7 @@ from starlette.types import Receive, Scope, Send
 
 from irtwin.serve import description, negotiation, page
 from irtwin.serve.answer import Answer, Answers
+from irtwin.serve.asking import Asking
 from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
 from irtwin.serve.shares import client
@@ -28,8 +29,8 @@ _log = logging.getLogger(__name__)
 class Endpoint:
     """An ASGI application that speaks the SPARQL 1.1 Protocol."""
 
-    def __init__(self, pool: Pool, updates: Updates, limits: Limits):
-        self._pool = pool
+    def __init__(self, pool: Pool, updates: Updates, limits: Limits, asking: Asking):
+        self._pool, self._asking = pool, asking
         self._updates = updates
         self._limits = limits
         self._answers = Answers(_ROOM * limits.answer)
@@ -90,8 +91,9 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        graphs = await self._named_graphs(request)
-        return description.response(accept, _address(request), graphs, self._updates.allowed)
+        _, graphs = await self._asking.written(request, description.NAMED_GRAPHS, "text/csv")
+        named = graphs.decode().splitlines()[1:]
+        return description.response(accept, _address(request), named, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
         said = request.headers
@@ -145,16 +147,6 @@ class Endpoint:
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
         note(request, head.standing)
         return head
-
-    async def _named_graphs(self, request: Request) -> list[str]:
-        async with self._pool.worker(client(request)) as worker:
-            deadline = time.monotonic() + self._limits.seconds
-            try:
-                await self._ask(worker, Operation("query", description.NAMED_GRAPHS), request, "text/csv", deadline)
-            except NotBegun:
-                raise Refusal(503, "the graph cannot be read just now", {"Retry-After": "2"}) from None
-            body = b"".join([piece async for piece in worker.pieces()])
-        return body.decode().splitlines()[1:]
 
 
 def refused(refusal: Refusal) -> Response:

@@ -16,6 +16,7 @@ from starlette.types import Receive, Scope, Send
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.sparql_server import ServerFault
+from irtwin.location import Location
 from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.records import robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
@@ -23,7 +24,7 @@ from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
 from irtwin.serve.shares import client
-from irtwin.serve.source import Source
+from irtwin.serve.source import reading
 from irtwin.serve.worker import SERVER_FAILS
 from irtwin.storage.files import read_document
 from irtwin.virtual.robot_data import robot_data
@@ -38,9 +39,9 @@ _POSES = """SELECT ?run ?name ?q {
 class LivePages:
     """The pages of a workspace."""
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
-        self.samples = Samples(source.workspace)
+    def __init__(self, location: Location) -> None:
+        self._location = location
+        self.samples = Samples(location.folder)
         self._robots: dict[str, bytes] = {}
         self._drawing = asyncio.Lock()
 
@@ -63,7 +64,7 @@ class LivePages:
                 if len(self._robots) >= _MOST_ROBOTS:
                     self._robots.clear()
                 try:
-                    self._robots[robot_id] = await asyncio.to_thread(_drawn, self._source, robot_id)
+                    self._robots[robot_id] = await asyncio.to_thread(_drawn, self._location, robot_id)
                 except ServerFault:
                     raise Refusal(502, SERVER_FAILS) from None
                 except InputError as error:
@@ -90,15 +91,15 @@ def _page(name: str) -> Response:
     return Response((FOLDER / name).read_bytes(), media_type="text/html", headers={"Content-Security-Policy": POLICY})
 
 
-def _drawn(source: Source, robot_id: str) -> bytes:
+def _drawn(location: Location, robot_id: str) -> bytes:
     """Return what robot.js builds a robot of, made of what the graph says of it, as JSON. Raises InputError."""
-    with source.reading() as current:
+    with reading(location) as current:
         graph = current(False)
         iri = graph.iri(robot_iri(robot_id))
         if any(sign in iri for sign in '<>"{}|\\^` '):
             raise InputError(f"no robot {robot_id!r} here")
         robot = robot_of_graph(graph, iri)
-        meshes = meshes_of_graph(graph, iri, partial(read_document, source.workspace))
+        meshes = meshes_of_graph(graph, iri, partial(read_document, location.folder))
         poses = _poses(graph, iri, robot.joint_names)
     return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
 

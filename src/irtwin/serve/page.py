@@ -26,23 +26,7 @@ POLICY = (
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 FOLDER = Path(__file__).parent / "assets"
-_TYPES = {
-    "answer.js": "text/javascript",
-    "curves.js": "text/javascript",
-    "live.css": "text/css",
-    "live.js": "text/javascript",
-    "live_list.js": "text/javascript",
-    "meshcat.js": "text/javascript",
-    "plant.css": "text/css",
-    "plot.js": "text/javascript",
-    "plotly.js": "text/javascript",
-    "plotting.js": "text/javascript",
-    "query.css": "text/css",
-    "query.js": "text/javascript",
-    "robot.js": "text/javascript",
-    "yasqe.min.css": "text/css",
-    "yasqe.min.js": "text/javascript",
-}
+_TYPES = {".css": "text/css", ".js": "text/javascript"}
 _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
     "meshcat.js": viewer_script,
     "plant.css": plant_style,
@@ -52,6 +36,13 @@ _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
 }
 
 
+@cache
+def _names() -> frozenset[str]:
+    """Return the names of the page's files: those that ship, and those that are made."""
+    names = {file.name.removesuffix(".gz") for file in FOLDER.iterdir()} | _MADE.keys()
+    return frozenset(name for name in names if Path(name).suffix in _TYPES)
+
+
 def response() -> Response:
     """Return the page."""
     headers = {"Content-Security-Policy": POLICY, "Vary": "Accept"}
@@ -59,15 +50,15 @@ def response() -> Response:
 
 
 def asset(request: Request) -> Response:
-    """Return one of the page's files: those that are listed, so that no path leads elsewhere."""
+    """Return one of the page's files: those that are there, so that no path leads elsewhere."""
     name = request.path_params["name"]
-    if name not in _TYPES:
+    if name not in _names():
         raise Refusal(404, "no such file")
     content = _read(name)
     headers = {"Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     if "gzip" in request.headers.get("accept-encoding", ""):
         content, headers["Content-Encoding"] = _packed(name), "gzip"
-    return Response(content, media_type=_TYPES[name], headers=headers)
+    return Response(content, media_type=_TYPES[Path(name).suffix], headers=headers)
 
 
 def questions(resources: Resources, base: str, request: Request) -> Response:

@@ -15,9 +15,9 @@ from typing import Any
 
 from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.knowledge.store.readable import NOT_READABLE
+from irtwin.location import Location
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import Displaced
-from irtwin.serve.source import Source
 from irtwin.serve.turns import Turns
 from irtwin.serve.worker import FRAME
 
@@ -61,7 +61,7 @@ class Worker:
         self.idle = True  # nothing of an answer is on its way
 
     @classmethod
-    async def start(cls, source: Source, limits: Limits) -> Worker:
+    async def start(cls, location: Location, limits: Limits) -> Worker:
         """Start a process, and wait until it has opened the graph."""
         arguments = map(str, (limits.memory, limits.seconds, limits.answer))
         process = await asyncio.create_subprocess_exec(
@@ -73,7 +73,7 @@ class Worker:
             start_new_session=True,  # Ctrl-C in the terminal is the server's alone
         )
         worker = cls(process, limits)
-        worker._write(source.telling())
+        worker._write(location.telling())
         await worker._frame()
         return worker
 
@@ -147,8 +147,8 @@ class Pool:
     A worker that a query ended counts as its client's until another stands in its place.
     """
 
-    def __init__(self, source: Source, size: int, limits: Limits):
-        self._source = source
+    def __init__(self, location: Location, size: int, limits: Limits):
+        self._location = location
         self._size = size
         self._limits = limits
         self._idle: Turns[Worker] = Turns(limits.waiting, max(1, size - 1))
@@ -164,7 +164,7 @@ class Pool:
         for task in self._starting:
             task.cancel()
         await asyncio.gather(*(worker.end() for worker in self.workers))
-        remove_left_behind(self._source.folder)
+        remove_left_behind(self._location.graph_folder)
 
     @asynccontextmanager
     async def worker(self, client: str) -> AsyncIterator[Worker]:
@@ -209,6 +209,6 @@ class Pool:
         task.add_done_callback(self._starting.discard)
 
     async def _start(self) -> None:
-        worker = await Worker.start(self._source, self._limits)
+        worker = await Worker.start(self._location, self._limits)
         self.workers.add(worker)
         self._idle.add(worker)

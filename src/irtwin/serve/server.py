@@ -26,6 +26,7 @@ from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
+from irtwin.location import Location
 from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
@@ -38,7 +39,7 @@ from irtwin.serve.plant_pages import PlantPages
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
-from irtwin.serve.source import Source
+from irtwin.serve.source import reading
 from irtwin.serve.standing import Standing
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
@@ -50,37 +51,28 @@ _LATE = "Cancel %s running task(s), timeout graceful shutdown exceeded"  # uvico
 
 
 def serve(
-    source: Source,
+    location: Location,
     host: str,
     port: int,
     *,
     token: str | None,
     limits: Limits,
     announce: Callable[[str], None],
-    database: str | None = None,
     origins: Sequence[str] = (),
 ) -> None:
     """Serve a workspace's graph until SIGINT or SIGTERM.
 
     Pages of other sites may ask the endpoint where their origin is one of `origins`. Port 0 takes a free one;
-    `announce` is told the endpoint's address once it answers; `database` is the URL of the workspace's database, which
-    the graph is held against first.
+    `announce` is told the endpoint's address once it answers. The graph is held against a database elsewhere first.
     Raises InputError where the graph is missing, the port is taken, or the tariff cannot be used.
     """
-    base = _base(source, database)  # what cannot be read is said here, once, rather than by each worker
-    read_tariff(source.workspace)  # likewise: later, a page would say it
+    base = _base(location)  # what cannot be read is said here, once, rather than by each worker
+    read_tariff(location.folder)  # likewise: later, a page would say it
     listening = _bind(host, port)
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
     app = application(
-        source,
-        host,
-        token=token,
-        limits=limits,
-        base=base,
-        opened=lambda: announce(address),
-        database=database,
-        origins=origins,
+        location, host, token=token, limits=limits, base=base, opened=lambda: announce(address), origins=origins
     )
     config = uvicorn.Config(
         app,
@@ -100,23 +92,24 @@ def serve(
     server.run(sockets=[listening])
 
 
-def _base(source: Source, database: str | None) -> str:
+def _base(location: Location) -> str:
     """Return the base of the graph's individuals.
 
-    Raises InputError where the graph cannot be read or, with the URL of a workspace's database, where that knows of
-    robots and the graph does not.
+    Raises InputError where the graph cannot be read or, with a database elsewhere, where that knows of robots and the
+    graph does not.
     """
-    if database is not None:
-        with Workspace.existing(source.workspace, database) as place:
+    knows = False
+    if location.database is not None:
+        with Workspace.existing(location) as place:
             knows = place.knows_robots()
-            if source.url is None:
+            if location.graph_url is None:
                 place.check_graph()
-    with source.reading() as current:
+    with reading(location) as current:
         graph = current(False)
-        if database is not None and knows and not graph.graphs(GRAPH_SOURCE):
+        if knows and not graph.graphs(GRAPH_SOURCE):
             raise InputError(
                 f"{graph.shown}: the graph is empty, though the database knows of robots; "
-                f"`irtwin repair --workspace {source.workspace}` with the same --database and --graph fills it"
+                f"`irtwin repair --workspace {location.folder}` with the same --database and --graph fills it"
             )
         return graph.base
 
@@ -158,35 +151,33 @@ def read_token(file: Path | None) -> str | None:
 
 
 def application(
-    source: Source,
+    location: Location,
     host: str,
     *,
     token: str | None,
     limits: Limits,
     base: str = ID,
     opened: Callable[[], None] = lambda: None,
-    database: str | None = None,
     origins: Sequence[str] = (),
 ) -> Starlette:
     """Return the ASGI application; its workers live between its start-up and its shutdown.
 
-    base: what the IRIs of the graph's individuals begin with; database: the URL of the workspace's, for updates and
-    `catch_up`; origins: of other sites whose pages may ask the endpoint.
+    base: what the IRIs of the graph's individuals begin with; origins: of other sites whose pages may ask the endpoint.
     """
-    pool = Pool(source, 1 + max(2, os.cpu_count() or 2), limits)
-    updates = Updates(source, token, limits, database)
-    live = LivePages(source)
-    resources = checked(source.workspace)
+    pool = Pool(location, 1 + max(2, os.cpu_count() or 2), limits)
+    updates = Updates(location, token, limits)
+    live = LivePages(location)
+    resources = checked(location.folder)
     asking = Asking(pool, updates, limits, base)
-    reports = ReportFiles(source.workspace)
-    plant = PlantPages(source.workspace, asking, reports)
+    reports = ReportFiles(location.folder)
+    plant = PlantPages(location.folder, asking, reports)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         try:
             await pool.open()
             opened()
-            catching_up = asyncio.create_task(catch_up(asking, source, database))
+            catching_up = asyncio.create_task(catch_up(asking, location))
             yield
             catching_up.cancel()
             await asyncio.gather(catching_up, return_exceptions=True)
@@ -198,7 +189,7 @@ def application(
         routes=[
             *plant.routes(),
             Route("/query", lambda request: page.response(), methods=["GET"]),
-            Route("/sparql", Endpoint(pool, updates, limits)),
+            Route("/sparql", Endpoint(pool, updates, limits, asking)),
             Route("/questions", partial(ontology.questions, resources), methods=["GET"]),
             Route("/questions.json", partial(page.questions, resources, base), methods=["GET"]),
             *reports.routes(),

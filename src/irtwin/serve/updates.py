@@ -13,9 +13,9 @@ import time
 from dataclasses import asdict
 
 from irtwin.knowledge.store.snapshot import OLDEST
+from irtwin.location import Location
 from irtwin.serve.pool import Limits
 from irtwin.serve.protocol import Operation, Refusal
-from irtwin.serve.source import Source
 
 NOBODY = "who has the token"  # where the request has no From
 _LONGEST_NAME = 200  # characters
@@ -24,8 +24,8 @@ _LONGEST_NAME = 200  # characters
 class Updates:
     """The way in for updates; closed where there is no token."""
 
-    def __init__(self, source: Source, token: str | None, limits: Limits, database: str | None = None):
-        self._places = {**source.telling(), "database": database}
+    def __init__(self, location: Location, token: str | None, limits: Limits):
+        self._location = location
         self._token = token
         self._limits = limits
         self._turn = asyncio.Lock()
@@ -51,7 +51,9 @@ class Updates:
         if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
             raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
         async with self._turn:
-            await self._run({**asdict(operation), **self._places, "base": base, "author": _named(author)})
+            await self._run(
+                {**asdict(operation), "location": self._location.telling(), "base": base, "author": _named(author)}
+            )
             self._last = time.monotonic()
 
     async def _run(self, request: dict[str, object]) -> None:

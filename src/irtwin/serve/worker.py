@@ -23,9 +23,10 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.limits import limit_memory, limit_processor_time
+from irtwin.location import Location
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import Source
+from irtwin.serve.source import needs_network, reading
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
@@ -80,10 +81,10 @@ class _Sink:
 def main(memory: int, seconds: float, most_bytes: int) -> None:
     """Answer queries until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
-    source = Source.told(json.loads(sys.stdin.buffer.readline()))
-    if not source.needs_network:
+    location = Location.told(json.loads(sys.stdin.buffer.readline()))
+    if not needs_network(location):
         leave_network()
-    with source.reading() as current:
+    with reading(location) as current:
         limit_memory(memory)
         _frame(out, b"H", b"{}")
         for line in sys.stdin.buffer:
@@ -93,7 +94,7 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
             try:
                 graph = current(request["at_once"])
                 _frame(out, b"B", b"")
-                sink.standing = standing(graph, source.workspace)
+                sink.standing = standing(graph, location.folder)
                 _answer_once(graph, request, sink)
             except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
                 if sink.begun:

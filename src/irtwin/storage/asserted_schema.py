@@ -25,8 +25,6 @@ FILLED = {
 class AssertedFact(Base):
     """A statement of a user. One that a row follows says which; any other is a triple of the graph as it stands."""
 
-    __tablename__ = "asserted_fact"
-
     fact_id: Mapped[str] = mapped_column(primary_key=True)
     about_robot: Mapped[str | None] = mapped_column(ForeignKey("robot.robot_id", ondelete="CASCADE"))
     subject: Mapped[str]  # whole IRIs

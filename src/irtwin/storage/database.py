@@ -12,6 +12,7 @@ from sqlalchemy import URL, Inspector, Table, exists, func, inspect, select, upd
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
+from irtwin.location import Location
 from irtwin.resources import Resources, resources_of
 from irtwin.storage import asserted, base_iri, engine, files, series_place
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
@@ -86,16 +87,18 @@ class Workspace:
         resources: Resources | None = None,
         base: str | None = None,
         series_url: str | None = None,
+        graph_url: str | None = None,
     ) -> None:
         """Open a workspace, or make one. Raises InputError where the database cannot be opened.
 
         `resources` are those that hold for it; its own and those of installed packages if None. `base` is what the IRIs
         of its individuals begin with, else what `plant.toml` says; it stays once a robot is there. `series_url` says
-        which object storage is to hold the series; it is remembered, and stays once there are any.
+        which object storage is to hold the series; it is remembered, and stays once there are any. `graph_url` is that
+        of the SPARQL server that keeps the graph, if not the folder does.
         """
         if series_url is not None:
             series_place.look(series_url)
-        self.folder = folder
+        self.location, self.folder = Location(folder, url, graph_url), folder
         self.resources = resources or resources_of(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -122,23 +125,31 @@ class Workspace:
             series_place.choose(folder, series_url, has_series)
 
     @classmethod
-    def is_there(cls, folder: Path, url: str | None = None) -> bool:
-        """Whether a folder has a workspace, or one may be in the database of a URL."""
-        file = folder / _DATABASE
-        return url is not None or file.is_file() or file.is_symlink()  # opening says where a link leads
+    def is_there(cls, where: Location | Path) -> bool:
+        """Whether a folder has a workspace, or one may be in a database elsewhere."""
+        location = Location.of(where)
+        file = location.folder / _DATABASE
+        return location.database is not None or file.is_file() or file.is_symlink()  # opening says where a link leads
 
     @classmethod
-    def existing(cls, folder: Path, url: str | None = None) -> Self:
+    def at(cls, location: Location, base: str | None = None, series_url: str | None = None) -> Self:
+        """Open a workspace, or make one, with its database and graph where a location says."""
+        return cls(location.folder, location.database, None, base, series_url, location.graph_url)
+
+    @classmethod
+    def existing(cls, where: Location | Path) -> Self:
         """Open a workspace that must be there already. Raises InputError where it is not."""
-        if not cls.is_there(folder, url):
+        location = Location.of(where)
+        if not cls.is_there(location):
+            folder = location.folder
             _check_that_nothing_is_lost(folder)
             raise InputError(f"{folder}: no workspace here; run `irtwin run DATASET --workspace {folder}` first")
-        return cls(folder, url)
+        return cls.at(location)
 
     @property
     def graph_folder(self) -> Path:
         """Where the graph's store lies."""
-        return self.folder / "graph"
+        return self.location.graph_folder
 
     def check_graph(self) -> None:
         """Raise InputError where the graph's folder is not there, though the database knows of robots."""
@@ -256,15 +267,8 @@ class Workspace:
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
-    def keep_live_run(self, run: Run, series: pa.Table, activity: Activity, rows: Sequence[Base]) -> Series:
-        """Keep a run that was watched live, with its samples and what is known of it; return where they lie."""
-        return self._keep_run(run, series, [activity, *rows])
-
-    def keep_run(self, run: Run, series: pa.Table) -> None:
-        """Keep a run of no data set, planned or measured, with its samples."""
-        self._keep_run(run, series, [])
-
-    def _keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base]) -> Series:
+    def keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base] = ()) -> Series:
+        """Keep a run of no data set with its samples, and further rows about it; return where the samples lie."""
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)
             run.file, run.sha256 = stored.path, stored.series_id

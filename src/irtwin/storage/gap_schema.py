@@ -14,7 +14,7 @@ from sqlalchemy import Boolean, Double, ForeignKey, Integer, String
 from sqlalchemy.orm import Mapped, MappedColumn, mapped_column
 
 from irtwin.document.tables import DOCUMENT, TABLES, Column, Table
-from irtwin.storage.schema import Base
+from irtwin.storage.schema import Base, Made
 
 _TYPES = {str: String, float: Double, int: Integer, bool: Boolean}
 
@@ -38,13 +38,12 @@ class GapDiagnosis(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class OfDiagnosis(Base):
+class OfDiagnosis(Made):
     """What each further table begins and ends with."""
 
     __abstract__ = True
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("gap_diagnosis.diagnosis_id"), primary_key=True, sort_order=-1)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), sort_order=100)
 
 
 def _class(table: Table) -> type[OfDiagnosis]:

@@ -7,13 +7,11 @@ from datetime import datetime
 from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
 
-from irtwin.storage.schema import Base
+from irtwin.storage.schema import Made
 
 
-class GapState(Base):
+class GapState(Made):
     """How far a live run's torque at a joint, or its power, is from its twin now, beside what is usual for it."""
-
-    __tablename__ = "gap_state"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     place: Mapped[str] = mapped_column(primary_key=True)  # the joint whose torque it is of, or "robot": its power
@@ -27,13 +25,10 @@ class GapState(Base):
     ratio: Mapped[float]  # residual / band
     state: Mapped[str]  # "inside" or "outside"
     since: Mapped[datetime]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class GapExcursion(Base):
+class GapExcursion(Made):
     """A time that the gap of a live run was outside its band."""
-
-    __tablename__ = "gap_excursion"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     place: Mapped[str] = mapped_column(primary_key=True)
@@ -48,4 +43,3 @@ class GapExcursion(Base):
     lasted_s: Mapped[float]  # so far
     peak_residual: Mapped[float]
     peak_ratio: Mapped[float]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

@@ -43,13 +43,8 @@ class ObjectStorage:
 
     def owner(self) -> str | None:
         """Return who said that these are its files, None where nobody did."""
-        with self._told():
-            try:
-                return str(self.files.cat_file(self._at(_OWNER)).decode("utf-8", "replace"))
-            except FileNotFoundError as error:
-                if _code(error) == "NoSuchBucket":
-                    raise
-                return None
+        said = self.content(_OWNER)
+        return None if said is None else said.decode("utf-8", "replace")
 
     def claim(self, owner: str) -> None:
         """Say whose files these are. Raises InputError where they are another's."""
@@ -98,12 +93,8 @@ class ObjectStorage:
 
     def checksum(self, path: str) -> str | None:
         """Return the SHA-256 of an object's bytes, in hexadecimal; None where there is none."""
-        with self._told():
-            try:
-                with self.files.open(self._at(path), "rb") as stream:
-                    return _sha256(stream)
-            except FileNotFoundError:
-                return None
+        with self.opened(path) as stream:
+            return None if stream is None else _sha256(stream)
 
     @contextmanager
     def opened(self, path: str) -> Iterator[IO[bytes] | None]:

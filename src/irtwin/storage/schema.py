@@ -6,11 +6,12 @@ so that they can be dropped and made again.
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 from typing import Any, ClassVar
 
 from sqlalchemy import DateTime, Dialect, ForeignKey
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
 from sqlalchemy.types import TypeDecorator
 
 LIVE = "live"  # provider of what is known of runs that are watched
@@ -20,6 +21,7 @@ PLANNED_RUN, MEASURED_RUN, LIVE_RUN, REPLAYED_RUN = "Planned_Run", "Measured_Run
 WATCHED_RUNS = (LIVE_RUN, REPLAYED_RUN)
 SIMULATED = "simulated"  # the role of a run whose log a simulator wrote
 MEASURED, PLANNED, MODELLED = "measured", "planned", "modelled"  # kinds of series
+_WORD = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")  # between two words of a class's name
 
 
 class Moment(TypeDecorator[datetime]):
@@ -50,19 +52,28 @@ class Base(DeclarativeBase):
 
     type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: Moment}
 
+    @declared_attr.directive
+    def __tablename__(cls) -> str:
+        """Return what a class's table is called: run_energy of RunEnergy, dh_table of DHTable."""
+        return _WORD.sub("_", cls.__name__).lower()
+
+
+class Made(Base):
+    """A row that a provider made, with its activity."""
+
+    __abstract__ = True
+
+    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), sort_order=100)
+
 
 class Individuals(Base):
     """What the IRIs of all individuals begin with: one row, or none where it is the default."""
-
-    __tablename__ = "individuals"
 
     base_iri: Mapped[str] = mapped_column(primary_key=True)
 
 
 class Robot(Base):
     """An industrial robot; `robot_id` is the end of its IRI."""
-
-    __tablename__ = "robot"
 
     robot_id: Mapped[str] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -85,8 +96,6 @@ class Robot(Base):
 class RobotNote(Base):
     """A thing that a data set says of its robot beside the contract: one value under one name."""
 
-    __tablename__ = "robot_note"
-
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     name: Mapped[str] = mapped_column(primary_key=True)  # of a table within the table: "supply.voltage"
     number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on, of the values in a list
@@ -95,8 +104,6 @@ class RobotNote(Base):
 
 class SourceFile(Base):
     """A file of a data set that says what its runs are of; `source_file_id` is `robot_id.` and a name of its path."""
-
-    __tablename__ = "source_file"
 
     source_file_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
@@ -108,8 +115,6 @@ class SourceFile(Base):
 
 class Joint(Base):
     """A moving joint of a robot, with its limits and data sheet."""
-
-    __tablename__ = "joint"
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     name: Mapped[str] = mapped_column(primary_key=True)
@@ -128,8 +133,6 @@ class Joint(Base):
 
 class Run(Base):
     """One motion, recorded or planned; `run_id` is `robot_id.name`."""
-
-    __tablename__ = "run"
 
     run_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
@@ -168,8 +171,6 @@ class Run(Base):
 class Series(Base):
     """A Parquet file of a run's samples: as measured or planned, or as a twin models them."""
 
-    __tablename__ = "series"
-
     series_id: Mapped[str] = mapped_column(primary_key=True)  # sha256 of the Parquet file
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     kind: Mapped[str]  # MEASURED, PLANNED or MODELLED
@@ -181,8 +182,6 @@ class Series(Base):
 
 class Activity(Base):
     """One execution of a provider on one individual."""
-
-    __tablename__ = "activity"
 
     activity_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))  # the robot that it was about
@@ -204,28 +203,21 @@ def relation_to(read: str) -> str:
 class ActivityUse(Base):
     """What an activity read: a run, a run's series or a twin, by its IRI below the workspace's base."""
 
-    __tablename__ = "activity_use"
-
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), primary_key=True)
     entity: Mapped[str] = mapped_column(primary_key=True)
     relation: Mapped[str]  # as PROV names it, see `relation_to`
 
 
-class RunState(Base):
+class RunState(Made):
     """How a run passed, and the robot's state at its last sample."""
-
-    __tablename__ = "run_state"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     current_state: Mapped[str]  # "moving" or "standstill"
     idle_share: Mapped[float]  # of the run's time, 0 to 1
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class JointState(Base):
+class JointState(Made):
     """A joint at the last sample of a run."""
-
-    __tablename__ = "joint_state"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
@@ -235,13 +227,10 @@ class JointState(Base):
     joint_acc_rad_s2: Mapped[float | None]
     joint_torque_nm: Mapped[float | None]
     joint_temperature_degc: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class LiveState(Base):
+class LiveState(Made):
     """How far a live run is, and how well the graph kept up with it."""
-
-    __tablename__ = "live_state"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     state_time: Mapped[datetime]  # of the joint states that the graph shows
@@ -252,13 +241,10 @@ class LiveState(Base):
     stream_state: Mapped[str]  # "flowing", "stale" or "ended"
     stale_since: Mapped[datetime | None]  # by this machine's clock, as are the next: of the last good state
     stale_reason: Mapped[str | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class Twin(Base):
+class Twin(Made):
     """An identified twin of a robot; `twin_id` is `robot_id.` and a hash of what made it."""
-
-    __tablename__ = "twin"
 
     twin_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
@@ -272,16 +258,13 @@ class Twin(Base):
     split: Mapped[str]  # in words: which data were fitted, which held out
     torque_scale_uncertainty: Mapped[float | None]  # a share, half a 95 % interval; none where no torque was fitted
     torque_scale_why: Mapped[str | None]  # in words
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class ImprovementRound(Base):
+class ImprovementRound(Made):
     """A try to better a robot's twin by what was logged since; `round_id` is `robot_id.` and its number.
 
     Twins are named by their ids alone: one that was replaced has no row any more.
     """
-
-    __tablename__ = "improvement_round"
 
     round_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))
@@ -294,26 +277,20 @@ class ImprovementRound(Base):
     error_after_percent: Mapped[float]
     limit_percent: Mapped[float]
     outcome: Mapped[str]  # "within the limit", "better" or "no better"
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class TwinEffect(Base):
+class TwinEffect(Made):
     """An effect that a twin is made of."""
-
-    __tablename__ = "twin_effect"
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class TwinChoice(Base):
+class TwinChoice(Made):
     """An effect that was chosen by what the fitted runs show, or that they could not tell, and what it is worth.
 
     Worth is on groups of runs left out of the fit in turn, without the effect and with it.
     """
-
-    __tablename__ = "twin_choice"
 
     choice_id: Mapped[str] = mapped_column(primary_key=True)  # `twin_id.effect.` and "chosen" or "open"
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
@@ -327,25 +304,19 @@ class TwinChoice(Base):
     rmse_with: Mapped[float | None]
     energy_error_without_percent: Mapped[float | None]
     energy_error_with_percent: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class TwinRun(Base):
+class TwinRun(Made):
     """The part that a run took in a twin: "fit", "held_out", "both" where it was cut in time, "apart" where neither."""
-
-    __tablename__ = "twin_run"
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     part: Mapped[str]
     held_out_from_s: Mapped[float | None]  # of the log's time, where the run was cut in time
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class Parameter(Base):
+class Parameter(Made):
     """An identified parameter with its 95 % interval."""
-
-    __tablename__ = "parameter"
 
     parameter_id: Mapped[str] = mapped_column(primary_key=True)  # twin_id.effect.joint or link.name
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"))
@@ -359,13 +330,10 @@ class Parameter(Base):
     upper: Mapped[float | None]
     scaled_lower: Mapped[float | None]  # with the scale of torque in it; none where it does not go with that
     scaled_upper: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class BaseParameter(Base):
+class BaseParameter(Made):
     """A combination of torque coefficients that the measured torque shows, with its 95 % interval."""
-
-    __tablename__ = "base_parameter"
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)
@@ -376,13 +344,10 @@ class BaseParameter(Base):
     upper: Mapped[float]
     scaled_lower: Mapped[float | None]  # as a parameter's
     scaled_upper: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class TorqueFit(Base):
+class TorqueFit(Made):
     """How well a twin's torque follows the measured one, per run, joint and part."""
-
-    __tablename__ = "torque_fit"
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -391,17 +356,14 @@ class TorqueFit(Base):
     robot_id: Mapped[str]
     rmse_nm: Mapped[float]
     r_squared: Mapped[float | None]  # none where the measured torque does not vary
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
 def _own_activity(context: Any) -> str:
     return str(context.get_current_parameters()["activity_id"])
 
 
-class RunEnergy(Base):
+class RunEnergy(Made):
     """Energy and power of a run: as measured and as its twin models them."""
-
-    __tablename__ = "run_energy"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     twin_id: Mapped[str | None] = mapped_column(ForeignKey("twin.twin_id"))  # none of a live run of a robot without one
@@ -417,18 +379,17 @@ class RunEnergy(Base):
     standby_energy_j: Mapped[float | None]
     standby_share: Mapped[float | None]  # of the modelled energy, 0 to 1
     returned_energy_j: Mapped[float | None]  # mechanical energy that the joints gave back while they braked, positive
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
     # whose work the energy taken is: of who read the meter, else of who asked the twin
-    taken_activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"), default=_own_activity)
+    taken_activity_id: Mapped[str] = mapped_column(
+        ForeignKey("activity.activity_id"), default=_own_activity, sort_order=101
+    )
 
 
-class RunPrice(Base):
+class RunPrice(Made):
     """What a planned run will take by its robot's twin, with 95 % intervals.
 
     The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
     """
-
-    __tablename__ = "run_price"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     twin_id: Mapped[str]
@@ -445,13 +406,10 @@ class RunPrice(Base):
     saving_j: Mapped[float | None]  # of a time scaling, against the motion as it was with waiting after it
     saving_lower_j: Mapped[float | None]
     saving_upper_j: Mapped[float | None]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class EnergyShare(Base):
+class EnergyShare(Made):
     """The ledger: energy of one effect, in one joint where it has one, over a run."""
-
-    __tablename__ = "energy_share"
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -463,13 +421,10 @@ class EnergyShare(Base):
     lower_j: Mapped[float | None]  # of the 95 % interval; none of a live run
     upper_j: Mapped[float | None]
     inseparable: Mapped[int | None]  # number of the InseparableEnergy that it is part of
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class InseparableEnergy(Base):
+class InseparableEnergy(Made):
     """Energy of shares of a run that the data do not part, with its 95 % interval."""
-
-    __tablename__ = "inseparable_energy"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
@@ -477,13 +432,10 @@ class InseparableEnergy(Base):
     energy_j: Mapped[float]
     lower_j: Mapped[float]
     upper_j: Mapped[float]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class MeteredLoad(Base):
+class MeteredLoad(Made):
     """What the power of a run says that a meter alone logged: its standby, the cycles in it, its energy by hour."""
-
-    __tablename__ = "metered_load"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     standby_power_w: Mapped[float | None]  # none where no lower level of power was found
@@ -492,13 +444,10 @@ class MeteredLoad(Base):
     cycle_energy_j: Mapped[float | None]
     first_hour: Mapped[datetime]  # begin of the hour of the clock in which the run began
     energy_by_hour_j: Mapped[str]  # from then on, comma separated
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class SupplyState(Base):
+class SupplyState(Made):
     """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
-
-    __tablename__ = "supply_state"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)  # from 1 on
@@ -510,16 +459,12 @@ class SupplyState(Base):
     modelled_power_lower_w: Mapped[float | None]
     modelled_power_upper_w: Mapped[float | None]
     differs: Mapped[bool]  # the log's power lies outside the twin's interval
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class JointEnergy(Base):
+class JointEnergy(Made):
     """The ledger summed over effects: what one joint took over a run."""
-
-    __tablename__ = "joint_energy"
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
     joint: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str]
     energy_j: Mapped[float]
-    activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))

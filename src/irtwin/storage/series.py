@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
+from irtwin.input_file import checksum
 from irtwin.storage import files
 from irtwin.storage.files import inside
 from irtwin.storage.object_storage import ObjectStorage, StorageFault
@@ -80,12 +81,6 @@ def is_whole(workspace: Path, path: str, sha256: str) -> bool:
     if storage is not None:
         return storage.checksum(path) == sha256
     return file.is_file() and checksum(file) == sha256
-
-
-def checksum(file: Path) -> str:
-    """Return the sha256 of a file's bytes, in hexadecimal."""
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def storage_of(workspace: Path, path: str) -> ObjectStorage | None:

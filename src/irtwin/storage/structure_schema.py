@@ -11,8 +11,6 @@ from irtwin.storage.schema import Base
 class Link(Base):
     """A rigid body; mass, centre of mass and inertia (about it) in the link's own axes, none where nobody said."""
 
-    __tablename__ = "link"
-
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     name: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int]  # 0 for the base; a link comes after the one that carries it
@@ -30,8 +28,6 @@ class Link(Base):
 
 class LinkJoint(Base):
     """How a joint, moving or fixed, holds one link to another: its frame at zero in the parent's, and its axis."""
-
-    __tablename__ = "link_joint"
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     name: Mapped[str] = mapped_column(primary_key=True)
@@ -51,8 +47,6 @@ class LinkJoint(Base):
 
 class LinkShape(Base):
     """A shape of a link: sizes by its kind."""
-
-    __tablename__ = "link_shape"
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     link: Mapped[str] = mapped_column(primary_key=True)
@@ -82,8 +76,6 @@ class LinkShape(Base):
 class DHTable(Base):
     """A Denavit-Hartenberg table from base to flange, with the frames before and after its rows."""
 
-    __tablename__ = "dh_table"
-
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     convention: Mapped[str] = mapped_column(primary_key=True)  # "standard" or "modified"
     end_link: Mapped[str]
@@ -106,8 +98,6 @@ class DHTable(Base):
 class DHRow(Base):
     """A row of a Denavit-Hartenberg table, with its joint at zero."""
 
-    __tablename__ = "dh_row"
-
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     convention: Mapped[str] = mapped_column(primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True)  # from 1, base to flange
@@ -121,8 +111,6 @@ class DHRow(Base):
 class Device(Base):
     """What measures a robot: its controller, a meter, or a sensor of one joint."""
 
-    __tablename__ = "device"
-
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     device_id: Mapped[str] = mapped_column(primary_key=True)  # its kind, and its joint where it has one
     kind: Mapped[str]
@@ -131,8 +119,6 @@ class Device(Base):
 
 class DeviceChannel(Base):
     """A column of the robot's logs, and the device that it comes from."""
-
-    __tablename__ = "device_channel"
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     column_name: Mapped[str] = mapped_column(primary_key=True)

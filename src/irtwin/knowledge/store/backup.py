@@ -28,6 +28,7 @@ from irtwin.knowledge.mapping.source import snapshot_options
 from irtwin.knowledge.store.damage import told
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE
+from irtwin.location import Location
 from irtwin.resources import KINDS
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
@@ -88,19 +89,15 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
             raise InputError(_incomplete(place.folder, lost, "altered", "nothing was written"))
 
 
-def restore(
-    archive: Path,
-    folder: Path,
-    database: str | None = None,
-    graph_url: str | None = None,
-    series_url: str | None = None,
-) -> None:
+def restore(archive: Path, where: Location | Path, series_url: str | None = None) -> None:
     """Make a workspace of an archive, whole or not at all, where there is none.
 
-    With `database` the rows go there, into tables that must be empty; with `graph_url` the graph goes to that server;
-    with `series_url` the series go to object storage, which must hold no other workspace's.
+    Rows go to the location's database, into tables that must be empty, and the graph to its server, where there are
+    such; with `series_url` the series go to object storage, which must hold no other workspace's.
     Raises InputError where the archive is damaged or not ours, or where there is something already.
     """
+    location = Location.of(where)
+    folder = location.folder
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"{folder}: already exists; restore into a new folder")
     if series_url is not None:
@@ -108,9 +105,9 @@ def restore(
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
     with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
         held = working / "workspace"
-        with Workspace(held, database) as place:
+        with Workspace(held, location.database) as place:
             sums = dict(unpack(archive, held, _NAMES))
-            with KnowledgeGraph(graph_url or place.graph_folder, held) as graph:
+            with KnowledgeGraph(location.graph_url or place.graph_folder, held) as graph:
                 if graph.graphs():
                     raise InputError(f"{graph.shown}: the server holds a graph already; give an empty one")
                 with engine.writing(place.engine) as session:

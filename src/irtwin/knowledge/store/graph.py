@@ -88,11 +88,11 @@ class KnowledgeGraph:
             old.unlink(missing_ok=True)
 
     @classmethod
-    def of_workspace(cls, place: Workspace, url: str | None = None) -> Self:
+    def of_workspace(cls, place: Workspace) -> Self:
         """Open a workspace's graph: in its folder, or on a SPARQL server. InputError where it is damaged or lost."""
-        if url is None:
+        if place.location.graph_url is None:
             place.check_graph()
-        return cls(url or place.graph_folder, place.folder, place.resources, place.base)
+        return cls(place.location.graph_url or place.graph_folder, place.folder, place.resources, place.base)
 
     @classmethod
     def as_it_stands(cls, path: Path, workspace: Path | None = None, resources: Resources | None = None) -> Self:

@@ -118,44 +118,15 @@ def effect_names(answers: Answers) -> dict[str, str]:
 
 def follows(curve: Followed, unit: str, names: Mapping[str, str]) -> Figure:
     """Draw the residual, of this unit, against the variable that it follows, and the effect's curve on it."""
-    x = list(curve.x)
-    edge = {
-        "type": "scatter",
-        "mode": "lines",
-        "x": x,
-        "line": {"width": 0},
-        "hoverinfo": "skip",
-        "showlegend": False,
-    }
-    band = {"fill": "tonexty", "fillcolor": f"rgba(95,109,122,{_BANDED})", "name": "spread", "showlegend": True}
-    data = [{**edge, "y": list(curve.low)}, {**edge, "y": list(curve.high), **band}]
-    left = f"%{{y:.3~g}} {unit}<extra></extra>"
-    data.append(
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": "residual",
-            "x": x,
-            "y": list(curve.residual),
-            "marker": {"color": MEASURED, "size": 5},
-            "hovertemplate": f"residual {left}",
-        }
-    )
+    data = [
+        *band(curve.x, curve.low, curve.high, f"rgba(95,109,122,{_BANDED})", name="spread", showlegend=True),
+        _trace("residual", curve.x, curve.residual, unit, mode="markers", marker={"color": MEASURED, "size": 5}),
+    ]
     if curve.fitted is not None:
         effect = curve.effect or "fitted_curve"
         name = plain(names.get(effect, effect.replace("_", " ")))
         line = {"color": effect_colour(effect), "width": 2.5}
-        data.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": name,
-                "x": x,
-                "y": list(curve.fitted),
-                "line": line,
-                "hovertemplate": f"{name} {left}",
-            }
-        )
+        data.append(_trace(name, curve.x, curve.fitted, unit, line=line))
     variable = curve.variable.replace("_", " ")
     unit_of_x = wording.unit_symbol(curve.unit)
     title = f"{variable}, {unit_of_x}" if unit_of_x else variable
@@ -169,29 +140,13 @@ def runs(rows: Sequence[Row]) -> Figure | None:
         return None
     unit = rows[0]["unit"]
     names = _numbered([plain(row["run_name"]) for row in rows])
-    data: list[dict[str, Any]] = [
-        {
-            "type": "bar", "name": name, "x": names, "y": values, "marker": {"color": colour},
-            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
-        }
-        for name, values, colour in (
-            ("before", [row["before"] for row in rows], BEFORE),
-            ("with the causes added", [row["after"] for row in rows], AFTER),
-        )
-    ]  # fmt: skip
+    data = [
+        _bars("before", names, [row["before"] for row in rows], unit, BEFORE),
+        _bars("with the causes added", names, [row["after"] for row in rows], unit, AFTER),
+    ]
     if any(row["floor"] is not None for row in rows):
         marker = {"symbol": "line-ew", "size": 34, "line": {"color": FLOOR, "width": 2}}
-        data.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": "noise floor",
-                "x": names,
-                "y": [row["floor"] for row in rows],
-                "marker": marker,
-                "hovertemplate": f"noise floor %{{y:.3~g}} {unit}<extra></extra>",
-            }
-        )
+        data.append(_trace("noise floor", names, [row["floor"] for row in rows], unit, mode="markers", marker=marker))
     yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}
 
@@ -201,14 +156,11 @@ def horizons(rows: Sequence[Row]) -> Figure | None:
     if not rows:
         return None
     unit = rows[0]["unit"]
+    seconds = [row["seconds"] for row in rows]
     data = [
-        {
-            "type": "scatter", "mode": "lines+markers", "name": name, "x": [row["seconds"] for row in rows],
-            "y": [row[part] for row in rows], "line": {"color": colour, "width": 2.5},
-            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
-        }
+        _trace(name, seconds, [row[part] for row in rows], unit, "lines+markers", line={"color": colour, "width": 2.5})
         for name, part, colour in (("simulator", "before", BEFORE), ("with the robot’s numbers", "after", AFTER))
-    ]  # fmt: skip
+    ]
     xaxis = {"type": "linear", "title": {"text": "time since begun anew, s"}, "rangemode": "tozero"}
     yaxis = {"title": {"text": f"tracking error, {unit}"}, "rangemode": "tozero"}
     return {"data": data, "layout": {"xaxis": xaxis, "yaxis": yaxis}}
@@ -229,12 +181,8 @@ def by_cause(answers: Answers) -> Figure | None:
     data = []
     for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
-        bars = {
-            "type": "bar", "name": name, "x": [plain(f"{place_of[row['cause']]}. {row['label']}") for row in of_part],
-            "y": [row["after"] for row in of_part], "marker": {"color": colour},
-            "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
-        }  # fmt: skip
-        data.append(bars)
+        causes = [plain(f"{place_of[row['cause']]}. {row['label']}") for row in of_part]
+        data.append(_bars(name, causes, [row["after"] for row in of_part], unit, colour))
     line = {"color": BEFORE, "width": 1.5, "dash": "dash"}
     before = rows[0]["before"]
     shape = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": before, "y1": before, "line": line}
@@ -279,23 +227,37 @@ def budget(answers: Answers) -> Figure | None:
 
 def experiment(curve: PlannedMotion) -> Figure:
     """Draw the positions that the proposed experiment commands."""
+    drawn = list(zip(curve.joints, curve.units, curve.q, strict=True))[:_JOINTS_DRAWN]
     lines = [
-        {
-            "type": "scatter", "mode": "lines", "name": plain(joint), "x": curve.time, "y": q,
-            "line": {"width": 1.5, "color": PALETTE[place % len(PALETTE)]},
-            "hovertemplate": f"{plain(joint)} %{{y:.3~g}} {unit}<extra></extra>",
-        }
-        for place, (joint, unit, q) in enumerate(zip(curve.joints, curve.units, curve.q, strict=True))
-        if place < _JOINTS_DRAWN
-    ]  # fmt: skip
+        _trace(plain(joint), curve.time, q, unit, line={"width": 1.5, "color": PALETTE[place % len(PALETTE)]})
+        for place, (joint, unit, q) in enumerate(drawn)
+    ]
     xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
+    units = " or ".join(sorted(set(curve.units), reverse=True))
+    return {"data": lines, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"position, {units}"}}}}
+
+
+def band(x: Sequence[Any], low: Sequence[Any], high: Sequence[Any], colour: str, **more: Any) -> list[Figure]:
+    """Return the traces of the area between two curves."""
+    edge = {
+        "type": "scatter", "mode": "lines", "x": list(x), "line": {"width": 0}, "hoverinfo": "skip",
+        "showlegend": False,
+    }  # fmt: skip
+    return [{**edge, "y": list(low)}, {**edge, "y": list(high), "fill": "tonexty", "fillcolor": colour, **more}]
+
+
+def _trace(name: str, x: Sequence[Any], y: Sequence[Any], unit: str, mode: str = "lines", **look: Any) -> Figure:
     return {
-        "data": lines,
-        "layout": {
-            "xaxis": xaxis,
-            "yaxis": {"title": {"text": f"position, {' or '.join(sorted(set(curve.units), reverse=True))}"}},
-        },
-    }
+        "type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), **look,
+        "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+    }  # fmt: skip
+
+
+def _bars(name: str, x: Sequence[str], y: Sequence[Any], unit: str, colour: str) -> Figure:
+    return {
+        "type": "bar", "name": name, "x": x, "y": y, "marker": {"color": colour},
+        "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
+    }  # fmt: skip
 
 
 def _numbered(names: Sequence[str]) -> list[str]:

@@ -10,6 +10,7 @@ from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE
 from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.energy.tables import Cell, Line, is_unsure
+from irtwin.report.gap.figures import band
 
 _BANDED = "33"  # how opaque a band is, in hexadecimal
 
@@ -57,12 +58,8 @@ def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[dict[str, A
     """Return the traces of one side: the band, the curve in it, and what was measured."""
     x = list(curve.speed)
     at = f"%{{y:.3~g}} {curve.unit} at %{{x:.3~g}} {curve.speed_unit}<extra></extra>"
-    edge = {
-        "type": "scatter", "mode": "lines", "x": x, "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False,
-    }  # fmt: skip
     traces: list[dict[str, Any]] = [
-        {**edge, "y": list(curve.low)},
-        {**edge, "y": list(curve.high), "fill": "tonexty", "fillcolor": colour + _BANDED},
+        *band(x, curve.low, curve.high, colour + _BANDED),
         {
             "type": "scatter", "mode": "lines", "name": curve.role, "x": x, "y": list(curve.torque),
             "line": {"color": colour, "width": 2}, "hovertemplate": f"twin {at}",

@@ -1,0 +1,161 @@
+"""A diagnosis, end to end: a data set is read and judged; what is found is kept in a workspace, and written into files.
+
+Graph, database and pages are imported where a workspace or a report is asked for: a diagnosis alone is physics.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from irtwin.errors import InputError
+from irtwin.gap import diagnosis as gap
+from irtwin.gap.diagnosis import Diagnosis
+from irtwin.identification.progress import telling
+from irtwin.location import Location
+from irtwin.modelling import Announce, clocked, read_sound
+from irtwin.proposed_motion import save_motion
+from irtwin.resources import resources_of
+from irtwin.signals.log import DataSet
+from irtwin.signals.sampling import checked_cutoff
+from irtwin.simulator.differences import written
+from irtwin.simulator.model import Model, read_model, with_simulated_runs
+from irtwin.simulator.playing import Playing
+from irtwin.simulator.playing import diagnose as diagnose_by_playing
+from irtwin.storage.files import check_place, write
+from irtwin.twin.files import load, to_json
+from irtwin.twin.twin import Twin
+
+
+def diagnose(
+    dataset: Path | str,
+    *,
+    twin: Twin | Path | str | None = None,
+    simulator: Path | str | None = None,
+    withhold: Sequence[str] = (),
+    cutoff: float | None = None,
+    seed: int = 0,
+    repair: bool = False,
+    workspace: Location | Path | str | None = None,
+    json_file: Path | str | None = None,
+    report: Path | str | None = None,
+    twin_file: Path | str | None = None,
+    motion_file: Path | str | None = None,
+    simulator_file: Path | str | None = None,
+    announce: Announce = lambda line: None,
+) -> Diagnosis | Playing:
+    """Diagnose the gap between a robot's twin, or its simulator, and its runs.
+
+    `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
+    in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
+    observed motions is held against the robot, as runs of a simulator are; of runs with commands and no torque, these
+    are played through it (channel "position"). `withhold` takes effects out of the twin and leaves them in the
+    catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
+    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
+    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
+    motion of the next experiment, where one is designed, `simulator_file` the simulator's model with the numbers that
+    the robot has.
+    The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
+    """
+    announce = clocked(announce)
+    location = None if workspace is None else Location.of(workspace)
+    files = _Files.checked(json_file, report, twin_file, motion_file, simulator_file)
+    if location is not None or files.report is not None:
+        from irtwin.report.extensions import check
+
+        check(resources_of(None if location is None else location.folder))
+    given = load(Path(twin)) if isinstance(twin, Path | str) else twin
+    announce("Reading the data set")
+    data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
+    model = None if simulator is None else read_model(Path(simulator), data_set.robot)
+    lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
+    _check_asked(data_set, lacking | {"an effect to withhold": withhold or None})
+    data_set = _with_cutoff(data_set, cutoff)
+    if location is not None:
+        from irtwin.workflow import as_asserted
+
+        data_set = as_asserted(location, data_set)
+    with telling(announce):
+        data_set, found = _found(data_set, model, given, withhold, seed)
+    if location is not None:  # first, as a damaged workspace is to leave no file beside its error
+        from irtwin.workflow import keep_diagnosis
+
+        keep_diagnosis(location, data_set, found, announce)
+    files.write(data_set, found, model, location, announce)
+    return found
+
+
+@dataclass(frozen=True)
+class _Files:
+    """Where what is found is to be written."""
+
+    json: Path | None
+    report: Path | None
+    twin: Path | None
+    motion: Path | None
+    simulator: Path | None
+
+    @classmethod
+    def checked(cls, *files: Path | str | None) -> _Files:
+        """Take files as they are asked for. Raises InputError where one cannot be written."""
+        places = [None if file is None else Path(file) for file in files]
+        for file in filter(None, places):
+            check_place(file)
+        return cls(*places)
+
+    def write(
+        self,
+        data_set: DataSet,
+        found: Diagnosis | Playing,
+        model: Model | None,
+        location: Location | None,
+        announce: Announce,
+    ) -> None:
+        """Write the files that are asked for."""
+        if model and self.simulator:
+            write(self.simulator, found.written() if isinstance(found, Playing) else written(model, found.document))
+        if self.json is not None:
+            write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
+        if self.twin is not None and found.twin is not None:
+            if found.twin.doubt_of_bodies:
+                announce(f"  {found.twin.doubt_of_bodies}")
+            write(self.twin, to_json(found.twin).encode())
+        if self.motion is not None and isinstance(found, Diagnosis):
+            announce(f"  {save_motion(found, self.motion)}")
+        if self.report is not None:
+            from irtwin.report.gap.page import render_alone
+
+            announce("Writing the report")
+            resources = resources_of(None if location is None else location.folder)
+            render_alone(data_set, found.document, found.curves, self.report, resources)
+
+
+def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:
+    """Return the data set with a cutoff, Hz, in place of its own, if one is given. Raises InputError by `cutoff`."""
+    if cutoff is None:
+        return data_set
+    signals = [run.signals for run in data_set.runs]
+    return replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
+
+
+def _check_asked(data_set: DataSet, lacking: Mapping[str, object]) -> None:
+    """Raise InputError where something is given or asked for that a diagnosis by playing lacks."""
+    for name, value in lacking.items():
+        if data_set.is_commanded and value is not None:
+            raise InputError(
+                f"{data_set.folder}: has commands and no torque: {name} is of no use for it; leave that out"
+            )
+
+
+def _found(
+    data_set: DataSet, model: Model | None, twin: Twin | None, withhold: Sequence[str], seed: int
+) -> tuple[DataSet, Diagnosis | Playing]:
+    """Return the diagnosis, and the data set with the runs of a simulator, if any were made."""
+    if model is not None and data_set.is_commanded:
+        return data_set, diagnose_by_playing(data_set, model)
+    if model is not None:
+        data_set = with_simulated_runs(data_set, model)
+    found = gap.diagnose(data_set, twin=twin, simulator=model, withhold=withhold, seed=seed)
+    return data_set, found
