@@ -80,16 +80,16 @@ def known(data_set: DataSet, model: Model) -> None:
         file = Path(folder) / "base.xml"
         file.write_bytes(own.written(start, start != servos(model).numbers))
         base = read_model(file, data_set.robot)
-    for changes in _CHANGES:
-        true = start.copy()
-        for name, joint, times, more in changes:
-            true[NAMES.index(name), joint] = true[NAMES.index(name), joint] * times + more
-        rng, runs = np.random.default_rng(1), []
-        for run in data_set.runs[:6]:
-            q = play(own, [true], [whole(run)])[0][0]
-            runs.append(replace(run, signals=replace(run.signals, q=q + _NOISE * rng.standard_normal(q.shape))))
-        found = diagnose(replace(data_set, runs=tuple(runs)), base)
-        print(f"  {_judged(found, data_set, changes, true)}", flush=True)
+        for changes in _CHANGES:
+            true = start.copy()
+            for name, joint, times, more in changes:
+                true[NAMES.index(name), joint] = true[NAMES.index(name), joint] * times + more
+            rng, runs = np.random.default_rng(1), []
+            for run in data_set.runs[:6]:
+                q = play(own, [true], [whole(run)])[0][0]
+                runs.append(replace(run, signals=replace(run.signals, q=q + _NOISE * rng.standard_normal(q.shape))))
+            found = diagnose(replace(data_set, runs=tuple(runs)), base)
+            print(f"  {_judged(found, data_set, changes, true)}", flush=True)
 
 
 def _judged(

@@ -37,7 +37,7 @@ def _read_what_ships() -> None:
         importlib.import_module(name)
     graph = KnowledgeGraph()
     graph.load_ontology()
-    _ = Ontology.of(graph).borders
+    _ = Ontology.of(graph).schema
     reason(graph)
     validate(graph)
     with tempfile.TemporaryDirectory() as folder, Workspace(Path(folder)) as place:
