@@ -151,7 +151,7 @@ def state(server) -> tuple[int, int, int] | None:
 def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph, start) -> None:
     folder = new_graph()
     with start(folder) as running:
-        command = [sys.executable, "-c", WRITER, str(folder), "20", "0.05"]
+        command = [sys.executable, "-c", WRITER, str(folder), "20", "0.2"]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as writer:
             assert writer.stdout is not None and writer.stdin is not None
             assert writer.stdout.readline() == "open\n"
