@@ -15,7 +15,7 @@ from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.knowledge.asserted.statements import map_facts
 from irtwin.knowledge.engines import NATIVE
-from irtwin.knowledge.explain.explain import explain_one
+from irtwin.knowledge.explain.explain import Explainer
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.reasoning import reason
@@ -320,5 +320,5 @@ def write_report(place: Workspace, robot_id: str) -> Path:
         if is_described(place, robot_id):
             meshes = meshes_of_graph(graph, robot, place.read_document)
             scene = partial(draw_scene, robot_of_graph(graph, robot), meshes)
-        render(graph, robot, place.read_file, out, scene, partial(explain_one, graph), place.resources)
+        render(graph, robot, place.read_file, out, scene, Explainer(graph).of_iris, place.resources)
     return out

@@ -107,6 +107,17 @@ def test_a_conclusion_names_its_rule_and_premises() -> None:
     assert closed.why(*triples("ex:a a ex:F .")) is None
 
 
+def test_a_copy_is_added_to_apart() -> None:
+    given = triples("ex:p rdfs:domain ex:C . ex:a ex:p ex:b ; owl:sameAs ex:c .")
+    more = triples("ex:C rdfs:subClassOf ex:D . ex:c owl:sameAs ex:d .")
+    closed = Closure(given)
+    before = set(closed.inferred())
+    other = closed.copy()
+    other.add(more)
+    assert triples("ex:d a ex:D .") <= set(other.inferred()) == set(Closure(given | more).inferred())
+    assert set(closed.inferred()) == before
+
+
 def test_explosion_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(owl_rl, "MOST_CONCLUSIONS", 10_000)
     chain = " ".join(f"ex:a{i} owl:sameAs ex:a{i + 1} ." for i in range(100))

@@ -156,6 +156,7 @@ def test_hermit_finds_two_robots_consistent(graph: KnowledgeGraph) -> None:
     owl_dl.classify(asserted(graph))
 
 
+@pytest.mark.nightly
 def test_hermit_finds_the_kr6_sheet_consistent(graph: KnowledgeGraph) -> None:
     sheet = set(read_turtle(folder("ontology") / "robots" / "kuka_kr6_r700.ttl"))
     owl_dl.classify(graph.triples(GRAPH_ONTOLOGY) | sheet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TypeGuard, cast
 
 from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Triple
@@ -16,6 +16,7 @@ from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.explain.mapping import mapping_of
 from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
+from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
@@ -53,23 +54,28 @@ def explain(graph: KnowledgeGraph, pattern: str) -> tuple[Explanation, ...]:
         raise InputError(f"the graph has no triple {pattern}; see what it has with `irtwin query`")
     if len(triples) > MOST_TRIPLES:
         raise InputError(f"more than {MOST_TRIPLES} triples fit {pattern}: be more specific")
-    return tuple(Explainer(graph).triple(triple) for triple in sorted(triples, key=str))
-
-
-def explain_one(graph: KnowledgeGraph, subject: str, predicate: str, object: str) -> Explanation | None:
-    """Explain one triple of IRIs; None where the graph does not hold it."""
-    triple = Triple(NamedNode(subject), NamedNode(predicate), NamedNode(object))
-    return Explainer(graph).triple(triple) if graph.holds(triple) else None
+    explainer = Explainer(graph)
+    return tuple(map(explainer.anew, sorted(triples, key=str)))
 
 
 class Explainer:
-    """Explains triples of one graph. What it has explained once it refers to after that."""
+    """Explains triples of one graph. What it has explained once it refers to after that, unless it begins anew."""
 
     def __init__(self, graph: KnowledgeGraph):
         self._graph = graph
         self._told: set[object] = set()
-        self._closures: list[Closure] = []
+        self._near: set[Triple] = set()
         self._has_whole = False
+
+    def of_iris(self, subject: str, predicate: str, object: str) -> Explanation | None:
+        """Explain a triple of IRIs anew; None where the graph does not hold it."""
+        triple = Triple(NamedNode(subject), NamedNode(predicate), NamedNode(object))
+        return self.anew(triple) if self._graph.holds(triple) else None
+
+    def anew(self, triple: Triple) -> Explanation:
+        """Explain a triple without reference to what was explained before."""
+        self._told.clear()
+        return self.triple(triple)
 
     def triple(self, triple: Triple) -> Explanation:
         """Explain a triple that the graph holds."""
@@ -141,7 +147,7 @@ class Explainer:
 
     def _inferred(self, statement: Statement) -> Explanation:
         """Explain what OWL 2 RL inferred; steps that are the rules' own way to walk a list are left out."""
-        for closure in self._closures_for(statement):
+        for closure in self._growing(statement):
             derivation = closure.why(statement)
             if derivation is not None:
                 said = _without_helpers(closure, derivation.premises)
@@ -159,21 +165,25 @@ class Explainer:
         kept_in = self._graph.graphs_with(Triple(subject, predicate, object))
         return GRAPH_OWL_RL in kept_in and engine_of(self._graph) == HERMIT
 
-    def _closures_for(self, statement: Statement) -> Iterator[Closure]:
-        """Yield closures that may hold a statement: of the graph around the first one's terms, then of all of it."""
-        yield from self._closures
-        if not self._closures:
-            ontology, near = self._graph.triples(GRAPH_ONTOLOGY), set[Triple]()
-            nodes = {term for term in statement if isinstance(term, NamedNode)}
-            for _ in range(HOPS):
-                near |= around(self._graph, nodes)
-                self._closures.append(Closure(ontology | near))
-                yield self._closures[-1]
-                nodes = {term for triple in near for term in triple if self._is_individual(term)}
+    @cached_property
+    def _closure(self) -> Closure:
+        return Ontology.of(self._graph).schema.closure.copy()
+
+    def _growing(self, statement: Statement) -> Iterator[Closure]:
+        """Yield the closure: as it is, with more and more of the graph around a statement's terms, then with all."""
+        yield self._closure
+        nodes = {term for term in statement if isinstance(term, NamedNode)}
+        for _ in range(0 if self._has_whole else HOPS):
+            near = around(self._graph, nodes)
+            if near - self._near:
+                self._near |= near
+                self._closure.add(near)
+                yield self._closure
+            nodes = {term for triple in near for term in triple if self._is_individual(term)}
         if not self._has_whole:
             self._has_whole = True
-            self._closures.append(Closure(not_closed(self._graph)))
-            yield self._closures[-1]
+            self._closure.add(not_closed(self._graph))
+            yield self._closure
 
     def _premise(self, statement: Statement) -> Explanation:
         if statement in self._told:

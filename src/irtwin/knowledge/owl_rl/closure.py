@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, product
+from typing import Self
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
@@ -74,6 +76,18 @@ class Closure:
         self._saturate([*facts, *self._types_of_mentioned()])
         self._add_reflexives()
         self._refuse_contradictions()
+
+    def copy(self) -> Self:
+        """Return the same, to be added to apart."""
+        other = copy.copy(self)
+        other._terms, other._facts = self._terms.copy(), self._facts.copy((None,))
+        other._round, other._groups = dict(self._round), copy.deepcopy(self._groups)
+        other._named_values, other._triples, other._given = (
+            set(self._named_values),
+            set(self._triples),
+            set(self._given),
+        )
+        return other
 
     def inferred(self) -> Iterator[Triple]:
         """Return every triple that follows and was not given. What RDF cannot write, of literals, is left out."""
