@@ -104,6 +104,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     file = done[1] / "reports" / "case_study.html"
     assert file.stat().st_size < 3_000_000
     page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.set_default_timeout(90_000)  # ms; without a graphics card the scene's pictures take their time
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
