@@ -25,7 +25,7 @@ RULES = {
     "twin to identify again": "twin_to_reidentify",
 }
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.nightly]
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,6 @@ def found(graph: KnowledgeGraph, tmp_path_factory: pytest.TempPathFactory) -> di
     return json.loads(done.stdout)
 
 
-@pytest.mark.nightly
 def test_the_rules_are_in_the_file_which_is_owl_2_dl(found: dict) -> None:
     assert set(found["rules"]) == set(RULES)
     assert found["violations"] == []

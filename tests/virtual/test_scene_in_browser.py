@@ -61,7 +61,7 @@ def open_page(
     path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
     for earlier in browser.contexts:
         earlier.close()  # which would draw on
-    page = browser.new_page(viewport={"width": 960, "height": 540})
+    page = browser.new_page(viewport={"width": 720, "height": 420})
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
     page.on("pageerror", lambda error: complaints.append(str(error)))
