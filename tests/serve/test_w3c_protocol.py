@@ -27,16 +27,21 @@ BOTH = f"ASK {{ <{DATA1}> a ?type . <{DATA2}> a ?type . }}"
 
 
 @pytest.fixture(scope="module")
-def served(new_graph: Callable[[], Path], start) -> Iterator[Server]:
+def w3c(new_graph: Callable[[], Path], start) -> Iterator[Server]:
     with start(new_graph()) as running:
+        fill(running)
         yield running
 
 
-@pytest.fixture
-def w3c(served: Server) -> Server:
-    done = served.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
+def fill(server: Server) -> None:
+    done = server.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
     assert done.status_code == 204, done.text
-    return served
+
+
+@pytest.fixture
+def writable(w3c: Server) -> Iterator[Server]:
+    yield w3c
+    fill(w3c)
 
 
 def send(server: Server, method: str, parameters: str = "", kind: str | None = None, body: bytes | str = ""):
@@ -168,10 +173,10 @@ TWO_OF_THREE = f"ASK {{ {IS_RESOURCE[DATA1]} {IS_RESOURCE[DATA2]} FILTER NOT EXI
         ),
     ],
 )
-def test_an_update_asks_the_graphs_of_its_request(w3c: Server, parameters: str, update: str, then: str) -> None:
-    response = send(w3c, "POST", parameters, UPDATE, update)
+def test_an_update_asks_the_graphs_of_its_request(writable: Server, parameters: str, update: str, then: str) -> None:
+    response = send(writable, "POST", parameters, UPDATE, update)
     assert response.status_code == 204, response.text
-    assert is_true(send(w3c, "POST", "", QUERY, then))
+    assert is_true(send(writable, "POST", "", QUERY, then))
 
 
 @pytest.mark.parametrize(
@@ -181,20 +186,20 @@ def test_an_update_asks_the_graphs_of_its_request(w3c: Server, parameters: str, 
         pytest.param(UPDATE, "CLEAR ALL", id="update_post_direct"),
     ],
 )
-def test_an_update_is_done(w3c: Server, kind: str, body: str) -> None:
-    assert send(w3c, "POST", "", kind, body).status_code == 204
-    assert not is_true(send(w3c, "POST", "", QUERY, "ASK { ?s ?p ?o }"))
+def test_an_update_is_done(writable: Server, kind: str, body: str) -> None:
+    assert send(writable, "POST", "", kind, body).status_code == 204
+    assert not is_true(send(writable, "POST", "", QUERY, "ASK { ?s ?p ?o }"))
 
 
-def test_update_base_uri(w3c: Server) -> None:
+def test_update_base_uri(writable: Server) -> None:
     place = "http://example.org/protocol-base-test/"
-    assert w3c.update(f"CREATE SILENT GRAPH <{place}>").status_code == 204
+    assert writable.update(f"CREATE SILENT GRAPH <{place}>").status_code == 204
     said = "<http://example.org/s> <http://example.org/p> <test>"
     update = f"CLEAR GRAPH <{place}> ;\nINSERT DATA {{ GRAPH <{place}> {{ {said} }} }}"
-    assert send(w3c, "POST", "", UPDATE, update).status_code == 204
+    assert send(writable, "POST", "", UPDATE, update).status_code == 204
     query = f"SELECT ?o WHERE {{ GRAPH <{place}> {{ <http://example.org/s> <http://example.org/p> ?o }} }}"
-    (row,) = send(w3c, "POST", "", QUERY, query).json()["results"]["bindings"]
-    assert row["o"] == {"type": "uri", "value": f"{w3c.url}/test"}
+    (row,) = send(writable, "POST", "", QUERY, query).json()["results"]["bindings"]
+    assert row["o"] == {"type": "uri", "value": f"{writable.url}/test"}
 
 
 @pytest.mark.parametrize(
