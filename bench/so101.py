@@ -100,7 +100,7 @@ def _judged(
     within = 0
     numbers = [one for cause in found.document.causes for one in cause.parameters]
     for one in numbers:
-        change = true[NAMES.index(one.name), data_set.robot.joint_names.index(one.joint)] - one.simulator
+        change = true[NAMES.index(one.name), data_set.robot.joint_names.index(one.joint)] - (one.simulator or 0.0)
         within += one.interval95 is not None and one.interval95[0] <= change <= one.interval95[1]
     says = ", ".join(f"{name} of {joint}" for joint, name in sorted(wanted)) or "no difference"
     extra = _named(found) - wanted
