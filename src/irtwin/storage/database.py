@@ -19,7 +19,7 @@ from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables a
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.files import InsidePath, inside
-from irtwin.storage.migration import migrate, stamp
+from irtwin.storage.migration import VERSION_TABLE, migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_rows
 from irtwin.storage.rows import (
@@ -113,8 +113,10 @@ class Workspace:
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
         size = engine.check(self.engine)
-        engine.check_schema(self.engine, Base.metadata.tables)
+        tables = {*Base.metadata.tables, VERSION_TABLE}
+        engine.check_schema(self.engine, tables, is_current=False)
         self._make_tables()
+        engine.check_schema(self.engine, tables, is_current=True)
         if size <= _MOST_OF_ROWS:  # whoever wrote them: the folder may come from elsewhere
             with self.engine.connect() as connection:
                 check_rows(connection, engine.shown(self.engine.url))

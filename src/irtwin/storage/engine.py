@@ -200,10 +200,11 @@ def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> float:
     return float(size)
 
 
-def check_schema(engine: Engine, tables: Container[str]) -> None:
+def check_schema(engine: Engine, tables: Container[str], *, is_current: bool) -> None:
     """Raise WorkspaceFault where an SQLite database has a view in place of a table, or another's trigger on one.
 
-    Each is a query of somebody else's, which runs whenever the table is read or written, and may never end.
+    Each is a query of somebody else's, which runs whenever the table is read or written, and may never end. Before it
+    `is_current`, triggers that are called as an older irtwin's may be there.
     """
     if engine.dialect.name != "sqlite":
         return
@@ -212,7 +213,8 @@ def check_schema(engine: Engine, tables: Container[str]) -> None:
             "SELECT type, name, tbl_name FROM sqlite_master WHERE type IN ('view', 'trigger')"
         ).all()
     for kind, name, table in found:
-        if table in tables and not (kind == "trigger" and name.startswith(TRIGGERS)):
+        is_old = kind == "trigger" and name.startswith(TRIGGERS) and not is_current
+        if table in tables and not is_old:
             raise WorkspaceFault(
                 f"{engine.url.database}: holds the {kind} {name!r}, which irtwin did not make; drop it, or restore a "
                 "backup by `irtwin restore ARCHIVE --workspace NEW`"

@@ -15,7 +15,7 @@ from irtwin.storage import engine as engines
 from irtwin.storage.row_rules import check_rows
 
 REVISIONS = Path(__file__).parent / "revisions"
-_TABLE = "alembic_version"
+VERSION_TABLE = "alembic_version"
 _FILE = re.compile(r"r(\d{4})_\w+\.py")
 
 
@@ -31,9 +31,9 @@ def known() -> set[str]:
 
 def revision(connection: Connection) -> str | None:
     """Return the revision that a database says, None where it says none."""
-    if not inspect(connection).has_table(_TABLE):
+    if not inspect(connection).has_table(VERSION_TABLE):
         return None
-    said = connection.execute(text(f"SELECT version_num FROM {_TABLE}")).scalar()
+    said = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar()
     return None if said is None else str(said)
 
 
@@ -41,8 +41,8 @@ def stamp(connection: Connection) -> None:
     """Say in a database whose tables were just made that they are of the newest revision."""
     if revision(connection) is not None:
         return  # another process made them at the same time
-    connection.execute(text(f"CREATE TABLE {_TABLE} (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
-    connection.execute(text(f"INSERT INTO {_TABLE} VALUES (:revision)"), {"revision": newest()})
+    connection.execute(text(f"CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+    connection.execute(text(f"INSERT INTO {VERSION_TABLE} VALUES (:revision)"), {"revision": newest()})
 
 
 def migrate(engine: Engine) -> None:
