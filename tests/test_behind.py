@@ -108,7 +108,8 @@ def without_notes(quads: set[Quad]) -> set[Quad]:
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("moment", [6, *(pytest.param(moment, marks=pytest.mark.nightly) for moment in (2, 10))])
+@pytest.mark.nightly
+@pytest.mark.parametrize("moment", [2, 6, 10])
 def test_on_servers_as_well(tmp_path: Path, new_postgresql_database: Callable[[], str], moment: int) -> None:
     database = new_postgresql_database()
     with sparql_servers.oxigraph() as server:

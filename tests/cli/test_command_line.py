@@ -245,6 +245,7 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
     assert not (tmp_path / "x.nq").exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_any_database_and_any_sparql_server_serve(small_data_set, tmp_path, new_postgresql_database):
     url = new_postgresql_database()

@@ -148,6 +148,7 @@ def state(server) -> tuple[int, int, int] | None:
     return (int(row["n"]["value"]), int(row["low"]["value"]), int(row["high"]["value"])) if "low" in row else None
 
 
+@pytest.mark.nightly
 def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph, start) -> None:
     folder = new_graph()
     with start(folder) as running:
