@@ -181,8 +181,8 @@ class Explainer:
                 yield self._closure
             nodes = {term for triple in near for term in triple if self._is_individual(term)}
         if not self._has_whole:
-            self._has_whole = True
             self._closure.add(not_closed(self._graph))
+            self._has_whole = True
             yield self._closure
 
     def _premise(self, statement: Statement) -> Explanation:
