@@ -121,6 +121,17 @@ def test_rivals_of_a_diagnosis_that_says_no_probability_are_named_alone(tmp_path
     assert "probability of rivals" not in page
 
 
+def test_a_floor_that_no_channel_has_takes_no_column(tmp_path: Path, pages: dict[str, Path]) -> None:
+    said = gap_cases.diagnosis("attributed")
+    for size in said["gap"]["torque"].values():
+        size |= {"noise_floor": None, "excess": None, "sensor_noise": None}
+    size_of_gap = re.compile(r"<caption>Size of the gap before.*?</table>", re.DOTALL)
+    (without,) = size_of_gap.findall(page_of(tmp_path, said))
+    (with_floor,) = size_of_gap.findall(pages["attributed"].read_text())
+    assert "RMSE" in without and "Noise floor" not in without and "Excess" not in without
+    assert "Noise floor" in with_floor and "Excess" in with_floor
+
+
 def test_the_gap_is_parted_into_causes_what_has_no_name_and_the_rest(pages: dict[str, Path]) -> None:
     page = pages["attributed"].read_text().replace("\N{NO-BREAK SPACE}", " ")
     assert "the causes close 90 % of the gap above the floor; another 4.0 % could be closed, but no known" in page
