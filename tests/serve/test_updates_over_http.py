@@ -152,16 +152,16 @@ def state(server) -> tuple[int, int, int] | None:
 def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph, start) -> None:
     folder = new_graph()
     with start(folder) as running:
-        command = [sys.executable, "-c", WRITER, str(folder), "20", "0.2"]
+        command = [sys.executable, "-c", WRITER, str(folder), "8", "0.2"]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as writer:
             assert writer.stdout is not None and writer.stdin is not None
             assert writer.stdout.readline() == "open\n"
             seen = []
-            while not (line := writer.stdout.readline()).startswith("19 "):
+            while not (line := writer.stdout.readline()).startswith("7 "):
                 assert line, "the writer ended"
                 seen.append(state(running))
             written = float(line.split()[1])
-            while state(running) != (50, 19, 19):
+            while state(running) != (50, 7, 7):
                 assert time.time() - written < 30
             writer.stdin.close()
         whole = [found for found in seen if found is not None]
