@@ -89,7 +89,7 @@ def read(data: Path, model: Path) -> tuple[DataSet, Model, Servos]:
 
 
 def changed(own: Servos, **changes: tuple[float, float]) -> np.ndarray:
-    """Return the servos' numbers (9, 2) with some of them others."""
+    """Return the servos' numbers (k, 2) with some of them others."""
     numbers = own.numbers.copy()
     for name, values in changes.items():
         numbers[NAMES.index(name)] = values

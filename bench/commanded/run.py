@@ -71,12 +71,13 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
     wanted = {EFFECTS[one["kind"]]: one for one in label["differences"]}
     first = causes[0] if causes else None
     right = (first["effect"] in wanted) if first and wanted else not first and not wanted
-    joint = bool(first and right and first["joints"] == [wanted[first["effect"]]["joint"]])
+    joint = bool(first and right and first["joints"] == [one for one in [wanted[first["effect"]]["joint"]] if one])
     within = [
         number["interval95"][0] <= wanted[cause["effect"]]["robot"] - number["simulator"] <= number["interval95"][1]
         for cause in causes
         for number in cause["parameters"]
         if cause["effect"] in wanted and number["joint"] == wanted[cause["effect"]]["joint"] and number["interval95"]
+        if not number["name"].startswith("c_")  # where a payload is: of its mass alone there is a label
     ]
     return {
         "first": right,

@@ -10,6 +10,7 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import choose
 from irtwin.simulator.fit import Fit
 from irtwin.simulator.play import each
+from irtwin.simulator.servos import NAMES, OF_ROBOT
 
 pytestmark = pytest.mark.slow
 
@@ -47,3 +48,18 @@ def test_the_numbers_that_differ_are_found_with_their_values(arm):
     np.testing.assert_allclose(found.numbers, true, rtol=0.1)
     left_out = np.array([False, False, True, True])
     np.testing.assert_allclose(found.without(left_out), true, rtol=0.2)
+
+
+def test_a_payload_is_found_with_its_mass_and_no_joint_is_blamed(arm):
+    found = chosen(arm, servo_arm.changed(arm[2], payload=(0.1, 0.1)))
+    named = {name for name, row in zip(NAMES, found.differs, strict=True) if row.any()}
+    assert named == set(OF_ROBOT)
+    row = NAMES.index("payload")
+    assert (found.interval[0, row] <= 0.1).all() and (found.interval[1, row] >= 0.1).all()
+    assert found.numbers[row] == pytest.approx(0.1, rel=0.2)
+
+
+def test_more_friction_is_no_dead_band(arm):
+    true = servo_arm.changed(arm[2], friction=(0.15, 0.05))
+    found = chosen(arm, true)
+    assert (found.differs == (true != arm[2].numbers)).all()

@@ -9,15 +9,22 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.signal import savgol_filter
 
 from irtwin.signals.sampling import interval
+from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import Stretch
-from irtwin.simulator.servos import NAMES, Servos
+from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos
+
+if TYPE_CHECKING:
+    import mujoco
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
+_ASIDE = 0.01  # m from the flange, for what a payload's place changes
 _AT_ONCE = 3_000_000  # positions that are held at a time
 
 
@@ -25,8 +32,8 @@ _AT_ONCE = 3_000_000  # positions that are held at a time
 class Alone:
     """What stretches of runs are to a joint by itself, at steps of `step` s.
 
-    `load` (steps, p, n): torque of bodies and of the other joints, N m; `inertia` of the bodies likewise, kg m^2;
-    `begun` (2, p, n): position and speed.
+    `load` (5, steps, p, n): torque of bodies and of the other joints, N m, what each kg at the flange adds, and each
+    kg m from it along three axes; `inertia` of the bodies likewise, kg m^2; `begun` (2, p, n): position and speed.
     """
 
     servos: Servos
@@ -37,15 +44,15 @@ class Alone:
     begun: np.ndarray
 
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
-        """Return, for each set of numbers (9, n) and each stretch, the positions (N, n) at its samples."""
-        most = max(1, _AT_ONCE // self.load.size)
+        """Return, for each set of numbers (k, n) and each stretch, the positions (N, n) at its samples."""
+        most = max(1, _AT_ONCE // self.load[0].size)
         found: list[list[np.ndarray]] = []
         for first in range(0, len(numbers), most):
             found += self._some(np.array(numbers[first : first + most]))
         return found
 
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
-        steps = len(self.load)
+        steps = self.load.shape[1]
         begin = np.arange(steps) * self.step
         told = np.array([[one.commands(begin, self.step, each) for one in self.stretches] for each in numbers])
         positions = self._moved(numbers, np.moveaxis(told, 2, 0))
@@ -59,15 +66,17 @@ class Alone:
         """Return positions (steps + 1, v, p, n) under the commands told (steps, v, p, n)."""
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at, dof = servos.actuators, servos.model.speeds
-        stiffness, damping, friction, holding, armature, _, _, limit, band = np.moveaxis(numbers, 1, 0)[:, :, None, :]
+        own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
+        stiffness, damping, friction, holding, armature, _, _, limit, band = own[: len(OF_JOINTS)]
+        mass, place = own[len(OF_JOINTS)], own[len(OF_JOINTS) + 1 :]
+        moments = np.array([mass, *(mass * place)])
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
         changed = holding != servos.numbers[NAMES.index("holding")]
         firm = np.where(changed, holding, compiled.dof_solimp[dof, 1])
         back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
-        own = compiled.dof_armature[dof]
-        bodies = 1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - own
-        soft = (1 - holding) / holding / np.maximum(bodies + armature, 1e-9)
+        free = 1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - compiled.dof_armature[dof]
+        soft = (1 - holding) / holding / np.maximum(free + armature, 1e-9)
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
@@ -75,12 +84,16 @@ class Alone:
         positions = np.empty((len(told) + 1, *told.shape[1:]))
         positions[0] = q
         for row in range(len(told)):
-            inverse = 1 / (self.inertia[row] + armature)
+            load, bodies = self.load[0, row], self.inertia[0, row]
+            if mass.any():
+                load = load + (moments * self.load[1:, row, None]).sum(axis=0)
+                bodies = bodies + (moments * self.inertia[1:, row, None]).sum(axis=0)
+            inverse = 1 / (bodies + armature)
             followed += share * (told[row] - followed)
             off = followed - q
             off -= np.minimum(np.maximum(off, -band), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
-            force -= joint * v + self.load[row]
+            force -= joint * v + load
             held = (force * inverse + back * v) / (inverse + soft)
             force -= np.minimum(np.maximum(held, -friction), friction)
             v = v + step * force * inverse / (1 + step * damping * inverse)
@@ -92,25 +105,28 @@ class Alone:
 def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
     """Return stretches of runs as each joint by itself is played over them."""
     steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
-    shape = (steps, len(stretches), len(servos.model.joints))
+    shape = (1 + len(OF_ROBOT), steps, len(stretches), len(servos.model.joints))
     load, inertia = np.empty(shape), np.empty(shape)
+    own, flange = servos.model.compiled, servos.model.flange
+    models = [own, *(loaded(own, flange, 1.0, _ASIDE * off) for off in np.vstack([np.zeros(3), np.eye(3)]))]
     for place, one in enumerate(stretches):
-        torque, bodies = _bodies(servos, one)
-        for joint in range(shape[2]):
-            times = np.arange(steps) * step
-            load[:, place, joint] = np.interp(times, one.time, torque[:, joint])
-            inertia[:, place, joint] = np.interp(times, one.time, bodies[:, joint])
+        found = np.array([_bodies(servos, compiled, one) for compiled in models])
+        found[2:] = (found[2:] - found[1]) / _ASIDE
+        found[1] -= found[0]
+        between = make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
+        times = np.minimum(np.arange(steps) * step, one.time[-1])
+        load[:, :, place], inertia[:, :, place] = np.moveaxis(between(times), 2, 0).swapaxes(1, 2)
     return Alone(
         servos, tuple(stretches), step, load, inertia, np.array([one.state() for one in stretches]).swapaxes(0, 1)
     )
 
 
-def _bodies(servos: Servos, stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
+def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
     """Return at a stretch's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
     import mujoco
 
     dof, at = servos.model.speeds, servos.model.positions
-    bare = copy.copy(servos.model.compiled)
+    bare = copy.copy(compiled)
     bare.dof_armature[dof] = bare.dof_damping[dof] = bare.dof_frictionloss[dof] = 0.0
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)

@@ -1,4 +1,9 @@
-"""Which numbers of servos differ from the simulator's: those without whose change the evidence is worse."""
+"""Which numbers of servos differ from the simulator's: those without whose change the evidence is worse.
+
+Two ways lead there: all numbers are fitted and given back, the least first; and numbers are added to the simulator's,
+the most first. The first needs no order in which numbers explain, the second ends in no valley of many numbers that
+stand for one. Each joint has the way with more evidence.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +14,25 @@ from scipy.special import expit
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.simulator.fit import LIKELY, SMOOTH, Fit, Played, Slopes
-from irtwin.simulator.servos import NAMES
+from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Equations, Fit, Played, Slopes, of_robot
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS
 
-_HOLDING = NAMES.index("holding")
-_LEAST = 2e-3  # rad (m), a misfit that is none
+_HOLDING, _PAYLOAD = NAMES.index("holding"), NAMES.index("payload")
+_ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
+_LEAST = 2e-4  # rad (m), a misfit that is none: less than encoders resolve
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
-_AGAIN = 2  # passes after numbers were given back
+_AGAIN, _PASSES = 2, 4  # passes after numbers were given back, and when one was added
+_FEW = 2  # numbers of a joint that may stand for many
+_BEGINS = {"dead_band": (0.003, 0.01), "holding": (HOLDS,)}  # where a number is begun that has no slope at first
 _NEARLY = 3.0  # times what a number has to gain, by its slopes: beyond, it is not tried without
 _SAME = 1e-9  # of the chart
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Numbers of the robot and which of them differ: `differs` (9, n); `odds` (9, n), natural logarithms, that they do.
+    """Numbers of the robot and which of them differ: `differs` (k, n); `odds` (k, n), natural logarithms, that they do.
 
-    `interval` (2, 9, n): ends of 95 % of each number, the number itself where it is the simulator's.
+    `interval` (2, k, n): ends of 95 % of each number, the number itself where it is the simulator's.
     """
 
     fit: Fit
@@ -36,11 +44,11 @@ class Choice:
 
     @property
     def numbers(self) -> np.ndarray:
-        """The robot's numbers (9, n)."""
+        """The robot's numbers (k, n)."""
         return self.fit.servos.of_chart(self.played.at)
 
     def without(self, left_out: np.ndarray) -> np.ndarray:
-        """Return the numbers (9, n) that fit when stretches (p,) are left out, by one step from those of all."""
+        """Return the numbers (k, n) that fit when stretches (p,) are left out, by one step from those of all."""
         at = self.played.at.copy()
         for joint in range(at.shape[1]):
             rows, normal, right = _equations(self.fit, self.played, self.slopes, self.differs, joint, ~left_out)
@@ -49,9 +57,46 @@ class Choice:
 
 
 def choose(fit: Fit) -> Choice:
-    """Fit all numbers, then give back to the simulator what the evidence is no worse without, the least first."""
+    """Return the numbers with most evidence."""
     fit, best = _all_free(fit)
-    own = fit.servos.chart(fit.servos.numbers)
+    best, odds_of_payload = _loaded(fit, best)
+    loaded = odds_of_payload > 0
+    fit = _judged(fit, best) if loaded else fit
+    for _ in range(1 + loaded):  # what made up for a part of the payload is given back
+        fit, best, differs = _given_back(fit, best)
+        best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
+    if (differs.sum(axis=0) > 1).any():
+        fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
+        best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
+    differs |= _ROBOTS & loaded
+    slopes = fit.slopes(best)
+    loss, worth = _weighed(fit, best, slopes, differs)
+    odds = np.where(differs, loss - worth, -np.inf)
+    odds = np.where(_ROBOTS, odds_of_payload, odds)
+    return Choice(fit, best, slopes, differs, odds, _interval(fit, best, slopes, differs))
+
+
+def _loaded(fit: Fit, best: Played) -> tuple[Played, float]:
+    """Return numbers with a payload, where it has evidence, and the odds that there is one, natural logarithms.
+
+    It is fitted to the model as it is, and beside what explains most without it: either may be in the other's way.
+    """
+    alone = np.isin(np.arange(len(NAMES)), _PAYLOAD)[:, None] & np.ones(best.at.shape, dtype=bool)
+    free = _free(fit) | _ROBOTS
+    own = fit.played(fit.servos.chart(fit.servos.numbers))
+    tried = [fit.solved(fit.solved(one, alone, _PASSES), free) for one in (best, own)]
+    found = fit.best(tried, together=True)
+    empty = fit.solved(fit.played(np.where(_ROBOTS, fit.servos.chart(fit.servos.numbers), found.at)), _free(fit))
+    best = fit.best([best, empty])  # what came with it may be as good without
+    normal, _ = _of_robot(fit, found, free)
+    worth = np.log(len(NAMES)) + np.linalg.slogdet(normal * LIKELY[SHARED, 0] * LIKELY[SHARED, 0, None])[1] / 2
+    odds = float(fit.cost(best).sum() - fit.cost(found).sum() - worth)
+    return (found, odds) if odds > 0 else (best, -np.inf)
+
+
+def _given_back(fit: Fit, best: Played) -> tuple[Fit, Played, np.ndarray]:
+    """Give numbers back to the simulator that the evidence is no worse without, the least first."""
+    own = np.where(_ROBOTS, best.at, fit.servos.chart(fit.servos.numbers))
     differs = ~np.isclose(best.at, own, rtol=0, atol=_SAME)
     needed = np.zeros_like(differs)
     while True:
@@ -62,29 +107,94 @@ def choose(fit: Fit) -> Choice:
         weakest = np.arange(len(NAMES))[:, None] == np.argmin(loss - worth, axis=0)
         some = weakest & (loss < _NEARLY * worth)
         if not some.any():
-            break
+            return fit, best, differs
         tried = fit.solved(fit.played(np.where(some, own, best.at)), differs & ~some, _AGAIN)
         given = some & (fit.cost(fit.rolled(tried.at)) - fit.cost(best) < worth)
         differs &= ~given
         needed |= some & ~given
         best = fit.played(np.where(given.any(axis=0), tried.at, best.at))
-    best = fit.solved(best, differs, _AGAIN)
+
+
+def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Add to the simulator's numbers of each joint a few of most evidence, beside what joints share as it is `found`.
+
+    Return where they are, and which differ.
+    """
+    at = np.where(_ROBOTS, found, fit.servos.chart(fit.servos.numbers))
+    differs = np.zeros(at.shape, dtype=bool)
+    for _ in range(_FEW):
+        fit = fit.about(at)
+        best = fit.played(at)
+        evidence = _evidence(fit, best, differs)
+        tried = [_with(fit, best, differs, row) for row in range(len(OF_JOINTS))]
+        evidences = [_evidence(fit, one, more) for one, more in tried]
+        chosen = np.argmin(evidences, axis=0)
+        better = np.min(evidences, axis=0) < evidence
+        for joint in np.flatnonzero(better):
+            one, more = tried[chosen[joint]]
+            at[:, joint], differs[:, joint] = one.at[:, joint], more[:, joint]
+        if not better.any():
+            break
+    return at, differs
+
+
+def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played, np.ndarray]:
+    """Return numbers fitted with one more of each joint, and which differ."""
+    more = differs.copy()
+    more[row] |= fit.servos.can_differ[row]
+    begins = [best]
+    for value in _BEGINS.get(NAMES[row], ()):
+        at = best.at.copy()
+        at[row] = np.where(differs[row] | ~more[row], at[row], value)
+        begins.append(fit.played(at))
+    begun = begins[-1] if row == _HOLDING else fit.best(begins)
+    if NAMES[row] == "torque_limit":
+        begun = fit.limited(begun)
+    return fit.solved(begun, more, _PASSES), more
+
+
+def _better(fit: Fit, ways: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Fit, Played, np.ndarray]:
+    """Return each joint as the way has it that has more evidence, by the whole model."""
+    evidences = []
+    for at, differs in ways:
+        about = fit.about(at)
+        evidences.append(_evidence(about, about.played(at), differs))
+    chosen = np.argmin(evidences, axis=0)
+    at, differs = (np.choose(chosen, [way[part] for way in ways]) for part in (0, 1))
+    fit = fit.about(at)
+    return fit, fit.played(at), differs
+
+
+def _evidence(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
+    """Return how bad numbers (n,) are with what those that differ could have been besides."""
     slopes = fit.slopes(best)
-    loss, worth = _weighed(fit, best, slopes, differs)
-    return Choice(
-        fit, best, slopes, differs, np.where(differs, loss - worth, -np.inf), _interval(fit, best, slopes, differs)
-    )
+    found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
+    for joint in range(differs.shape[1]):
+        rows, normal, _ = _equations(fit, best, slopes, differs, joint)
+        found[joint] += np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2
+    return found
 
 
 def _all_free(fit: Fit) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted."""
-    free = np.isin(np.arange(len(NAMES)), SMOOTH)[:, None] & fit.servos.can_differ
-    best = fit.begun()
+    free, own = _free(fit), fit.servos.chart(fit.servos.numbers)
+    best = fit.best([fit.rolled(at) for at in (own, fit.begun().at)])
     for _ in range(2):
-        usual = np.sqrt(np.median(best.squares, axis=0))
-        fit = replace(fit, floor=np.maximum(usual, _LEAST), certainty=_certainty(best)).about(best.at)
+        fit = _judged(fit, best)
         best = fit.solved(fit.limited(fit.played(best.at)), free)
     return fit, best
+
+
+def _judged(fit: Fit, best: Played) -> Fit:
+    """Return the fit about numbers, what they leave taken for what is left at best."""
+    usual = np.sqrt(np.median(best.squares, axis=0))
+    return replace(fit, floor=np.maximum(usual, _LEAST), certainty=_certainty(best)).about(best.at)
+
+
+def _free(fit: Fit) -> np.ndarray:
+    found = fit.servos.can_differ.copy()
+    found[_HOLDING] = False
+    return found
 
 
 def _certainty(best: Played) -> np.ndarray:
@@ -100,7 +210,7 @@ def _certainty(best: Played) -> np.ndarray:
 
 
 def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much the cost rises (9, n) where a number is given back, and by how much it has to, to differ.
+    """Return by how much the cost rises (k, n) where a number is given back, and by how much it has to, to differ.
 
     The latter is what the number could have been besides, and which of all numbers it is.
     """
@@ -119,7 +229,7 @@ def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tup
 
 
 def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np.ndarray:
-    """Return the ends of 95 % (2, 9, n) of the numbers, by how stretches disagree, and by what is left of each.
+    """Return the ends of 95 % (2, k, n) of the numbers, by how stretches disagree, and by what is left of each.
 
     Numbers that were given back may differ all the same: without gravity's load, motion alone says little of the scale
     of stiffness, damping and friction together.
@@ -133,7 +243,34 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
         between = inverse @ (each.T @ each) @ inverse * count / max(count - len(rows), 1)
         doubt = _doubt(fit, best, slopes, differs, joint)
         spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)) + doubt)
+    if differs[_PAYLOAD].any():
+        spread[list(SHARED)] = _spread_of_payload(fit, best, differs)[:, None]
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
+
+
+def _spread_of_payload(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
+    """Return the standard deviations of what joints share: by how stretches disagree, and by what is left of each."""
+    normal, each = _of_robot(fit, best, differs)
+    inverse, count = np.linalg.inv(normal), len(each)
+    between = inverse @ (each.T @ each) @ inverse * count / max(count - 1, 1)
+    return np.asarray(np.sqrt(np.maximum(np.diag(between), np.diag(inverse))))
+
+
+def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal equations of what joints share, beside what is free (k, n), and each stretch's right side."""
+    rows = (*SMOOTH, *SHARED)
+    slopes = fit.slopes(best, rows)
+    joints = [
+        fit.equations(best.at, slopes, rows, [row for row in rows if free[row, joint]], joint)
+        for joint in range(free.shape[1])
+    ]
+    rights = []
+    for each in slopes.right:
+        parts = [
+            one._replace(right=each[joint, [rows.index(row) for row in one.rows]]) for joint, one in enumerate(joints)
+        ]
+        rights.append(of_robot(parts, SHARED)[1])
+    return of_robot(joints, SHARED)[0], np.array(rights)
 
 
 def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:
@@ -157,11 +294,6 @@ def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: i
 
 def _equations(
     fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int, chosen: np.ndarray | slice = slice(None)
-) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """Return a joint's numbers that differ and are smooth, and the normal equations of a step from them."""
-    rows = [row for row in SMOOTH if differs[row, joint]]
-    own = [SMOOTH.index(row) for row in rows]
-    likely = LIKELY[rows, 0]
-    normal = slopes.normal[chosen, joint].sum(axis=0)[np.ix_(own, own)] + np.diag(likely**-2.0)
-    right = slopes.right[chosen, joint].sum(axis=0)[own] - fit.away(best.at)[rows, joint] / likely
-    return rows, normal, right
+) -> Equations:
+    """Return a joint's own numbers that differ and are smooth, and the normal equations of a step from them."""
+    return fit.equations(best.at, slopes, SMOOTH, [row for row in SMOOTH if differs[row, joint]], joint, chosen)

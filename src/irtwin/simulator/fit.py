@@ -4,35 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from irtwin.identification.progress import tell_step
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import Stretch, play
-from irtwin.simulator.servos import HOLDS, NAMES, Servos
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, Servos
 
-SMOOTH = tuple(NAMES.index(name) for name in NAMES if name != "holding")  # rows that least squares finds
 _HOLDING = NAMES.index("holding")
+SMOOTH = tuple(NAMES.index(name) for name in OF_JOINTS if name != "holding")  # rows of joints that least squares finds
+SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
 _STEP = {
     "offset": 0.002,
     "delay": 0.004,
     "dead_band": 0.001,
+    **dict.fromkeys(OF_ROBOT[1:], 0.01),
 }  # of a difference quotient; 0.05 of the others, in the chart
-_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01}  # that one step goes; 1 of the others
+_FARTHEST = {
+    "offset": 0.05,
+    "delay": 0.02,
+    "dead_band": 0.01,
+    **dict.fromkeys(OF_ROBOT[1:], 0.05),
+}  # that one step goes; 1 of the others
 _LIKELY = {
     "offset": 0.1,
     "delay": 0.05,
     "armature": 0.5,
     "dead_band": 0.02,
+    "payload": 9.0,
+    **dict.fromkeys(OF_ROBOT[1:], 0.2),
 }  # standard deviation from the simulator's; 3 of the others
 _TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
 _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
 _DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
 _PASSES, _WORTH = 12, 0.05
-_LIMITS = (0.9, 0.6, 0.4, 0.25, 0.15)  # of the torque that a servo without limit would have given, tried as limits
+_LIMITS = (0.9, 0.6, 0.4, 0.25, 0.15)  # of the limit, or what a servo without any would have given, tried as limits
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
@@ -45,9 +55,9 @@ STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKEL
 
 @dataclass(frozen=True)
 class Played:
-    """What is left of stretches beside numbers (9, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
+    """What is left of stretches beside numbers (k, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
 
-    at: np.ndarray  # (9, n), in the chart
+    at: np.ndarray  # (k, n), in the chart
     remainders: tuple[np.ndarray, ...]  # a stretch: (N, n), robot less model
     squares: np.ndarray
 
@@ -58,6 +68,32 @@ class Slopes:
 
     normal: np.ndarray
     right: np.ndarray
+
+
+class Equations(NamedTuple):
+    """Normal equations for a step of some `rows` of the numbers at a joint: `normal` (j, j), `right` (j,)."""
+
+    rows: Sequence[int]
+    normal: np.ndarray
+    right: np.ndarray
+
+
+def of_robot(joints: Sequence[Equations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal equations of rows that joints share, each joint's own numbers fitted beside."""
+    normal, right = np.zeros((len(rows), len(rows))), np.zeros(len(rows))
+    for one in joints:
+        places = [one.rows.index(row) for row in rows]
+        others = [place for place, row in enumerate(one.rows) if row not in rows]
+        cross = one.normal[np.ix_(others, places)]
+        beside = np.column_stack([cross, one.right[others]])
+        found = np.linalg.solve(one.normal[np.ix_(others, others)], beside)
+        normal += one.normal[np.ix_(places, places)] - cross.T @ found[:, :-1]
+        right += one.right[places] - cross.T @ found[:, -1]
+    return normal, right
+
+
+def _no_farther(step: np.ndarray, rows: Sequence[int]) -> np.ndarray:
+    return np.asarray(step / max(1.0, np.abs(step / FARTHEST[rows, 0]).max(initial=0.0)))
 
 
 @dataclass(frozen=True)
@@ -84,7 +120,7 @@ class Fit:
         return self.alone.stretches
 
     def played(self, at: np.ndarray) -> Played:
-        """Play numbers (9, n) of the chart."""
+        """Play numbers (k, n) of the chart."""
         return self.all_played([at])[0]
 
     def all_played(self, many: Sequence[np.ndarray]) -> list[Played]:
@@ -97,11 +133,11 @@ class Fit:
         ]
 
     def rolled(self, at: np.ndarray) -> Played:
-        """Play numbers (9, n) of the chart by the whole model."""
+        """Play numbers (k, n) of the chart by the whole model."""
         return self._left(at, play(self.servos, [self.servos.of_chart(at)], self.stretches)[0])
 
     def about(self, at: np.ndarray) -> Fit:
-        """Return the fit that plays as the whole model at numbers (9, n) of the chart, with slopes of single joints."""
+        """Return the fit that plays as the whole model at numbers (k, n) of the chart, with slopes of single joints."""
         whole = play(self.servos, [self.servos.of_chart(at)], self.stretches)[0]
         single = self.alone.play([self.servos.of_chart(at)])[0]
         return replace(self, beyond=tuple(one - other for one, other in zip(whole, single, strict=True)))
@@ -122,7 +158,7 @@ class Fit:
         return np.asarray(self.certainty / 2 * np.log1p(one.squares / self.floor**2).sum(axis=0))
 
     def away(self, at: np.ndarray) -> np.ndarray:
-        """Return how far numbers (9, n) are from the simulator's, in standard deviations of what is likely."""
+        """Return how far numbers (k, n) are from the simulator's, in standard deviations of what is likely."""
         off = (at - self.servos.chart(self.servos.numbers)) / LIKELY
         off[_HOLDING] = 0.0
         return np.asarray(off)
@@ -141,18 +177,19 @@ class Fit:
         return Slopes(np.array(normal), np.array(right))
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
-        """Return numbers with those that are free (9, n) fitted, by Levenberg's way, each joint with its own damping.
+        """Return numbers with those that are free (k, n) fitted, by Levenberg's way, each joint with a damping.
 
-        A joint keeps what it has where nothing better is found.
+        A joint keeps what it has where nothing better is found; all of them do where what they share is free.
         """
-        rows = [row for row in SMOOTH if free[row].any()]
+        rows = [row for row in (*SMOOTH, *SHARED) if free[row].any()]
+        together = any(row in SHARED for row in rows)
         damping = np.full(free.shape[1], 1e-2)
         for number in range(passes if rows else 0):
             slopes, before = self.slopes(best, rows), self.cost(best)
             steps = [self._steps(best.at, slopes, rows, free, damping * times) for times in _DAMPINGS]
             tried = self.all_played([self.servos.chart(self.servos.of_chart(best.at + step)) for step in steps])
-            chosen = np.argmin([self.cost(one) for one in tried], axis=0)
-            best = self.best((best, *tried))
+            chosen = np.argmin(self._costs(tried, together), axis=0)
+            best = self.best((best, *tried), together)
             damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
             tell_step(f"  numbers of servos, pass {number + 1}: {1e3 * np.sqrt(best.squares.mean()):.3g} mrad left")
             if (before - self.cost(best) < _WORTH).all():
@@ -162,20 +199,42 @@ class Fit:
     def _steps(
         self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], free: np.ndarray, damping: np.ndarray
     ) -> np.ndarray:
-        """Return the step (9, n) of all numbers, none of those that are not free."""
-        likely, steps = LIKELY[rows, 0], np.zeros(at.shape)
+        """Return the step (k, n) of all numbers, none of those that are not free."""
+        steps, equations = np.zeros(at.shape), []
         for joint in range(at.shape[1]):
-            own = np.flatnonzero(free[rows, joint])
-            normal = (slopes.normal[:, joint].sum(axis=0) + np.diag(likely**-2.0))[np.ix_(own, own)]
-            right = (slopes.right[:, joint].sum(axis=0) - self.away(at)[rows, joint] / likely)[own]
-            step = np.linalg.solve(normal + damping[joint] * np.diag(np.diag(normal)), right)
-            some = np.array(rows)[own]
-            steps[some, joint] = step / max(1.0, np.abs(step / FARTHEST[some, 0]).max(initial=0.0))
+            one = self.equations(at, slopes, rows, [row for row in rows if free[row, joint]], joint)
+            equations.append(one._replace(normal=one.normal + damping[joint] * np.diag(np.diag(one.normal))))
+        alike = [row for row in rows if row in SHARED]
+        if alike:
+            steps[alike] = _no_farther(np.linalg.solve(*of_robot(equations, alike)), alike)[:, None]
+        for joint, (own, normal, right) in enumerate(equations):
+            of_joint = [place for place, row in enumerate(own) if row not in SHARED]
+            right = (right - normal @ steps[own, joint])[of_joint]  # beside the step of what joints share
+            step = np.linalg.solve(normal[np.ix_(of_joint, of_joint)], right)
+            some = [own[place] for place in of_joint]
+            steps[some, joint] = _no_farther(step, some)
         return steps
 
-    def best(self, tried: Sequence[Played]) -> Played:
-        """Return of each joint the numbers that cost least; one joint's play is nothing to another's."""
-        chosen = np.argmin([self.cost(one) for one in tried], axis=0)
+    def equations(
+        self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], own: Sequence[int], joint: int,
+        chosen: np.ndarray | slice = slice(None),
+    ) -> Equations:  # fmt: skip
+        """Return a joint's equations for a step of its `own` of the slopes' rows, from stretches that are chosen."""
+        places, likely = [list(rows).index(row) for row in own], LIKELY[own, 0]
+        normal = slopes.normal[chosen, joint].sum(axis=0)[np.ix_(places, places)] + np.diag(likely**-2.0)
+        right = slopes.right[chosen, joint].sum(axis=0)[places] - self.away(at)[own, joint] / likely
+        return Equations(own, normal, right)
+
+    def _costs(self, tried: Sequence[Played], together: bool) -> np.ndarray:
+        costs = np.array([self.cost(one) for one in tried])
+        return np.broadcast_to(costs.sum(axis=1, keepdims=True), costs.shape) if together else costs
+
+    def best(self, tried: Sequence[Played], together: bool = False) -> Played:
+        """Return of each joint, or of all `together`, the numbers that cost least.
+
+        One joint's play is nothing to another's.
+        """
+        chosen = np.argmin(self._costs(tried, together), axis=0)
 
         def mixed(parts: Sequence[np.ndarray]) -> np.ndarray:
             return np.column_stack([parts[one][:, joint] for joint, one in enumerate(chosen)])
@@ -191,8 +250,8 @@ class Fit:
         """Return numbers with the limits of torque that are better, if any: one that is never reached has no slope."""
         numbers, row = self.servos.of_chart(best.at), NAMES.index("torque_limit")
         off = [np.abs(one.commands(one.time, 1e-3, numbers) - one.q).max(axis=0) for one in self.stretches]
-        found = best
-        for shares, about in ((_LIMITS, numbers[0] * np.max(off, axis=0)), (_NEARER, None)):
+        found, most = best, np.minimum(numbers[row], numbers[0] * np.max(off, axis=0))
+        for shares, about in ((_LIMITS, most), (_NEARER, None)):
             middle = self.servos.of_chart(found.at)[row] if about is None else about
             tried = [np.where(np.arange(len(NAMES))[:, None] == row, middle * share, numbers) for share in shares]
             found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))

@@ -64,6 +64,15 @@ class MjcfFile:
             f'{self.path}: has no <{elements[0]} {key}="{value}"> of its own; give the file that defines it'
         )
 
+    def inertial(self, body: str) -> Tag | None:
+        """Return the tag of a body's own inertial, None where the file has none: included, or taken from geoms."""
+        of = ""
+        for one in self.tags:
+            of = one.attributes.get("name", "") if one.element == "body" else of
+            if one.element == "inertial" and of == body:
+                return one
+        return None
+
 
 def read_mjcf(path: Path) -> MjcfFile:
     """Read a model file, and look at those that it names.

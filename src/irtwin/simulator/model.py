@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,16 @@ if TYPE_CHECKING:
     import mujoco
 
 _SECOND = " beside its servo"
+_APART = 1e-3  # m, frames that are at one place
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
+
+
+@dataclass(frozen=True)
+class Flange:
+    """Where a payload is held: a body and a place (3,) in its frame, m."""
+
+    body: int
+    place: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,22 @@ class Model:
     def name(self) -> str:
         """The file's name without its ending."""
         return self.file.path.stem
+
+    @cached_property
+    def flange(self) -> Flange:
+        """The frame fixed to the last body that is farthest from its joint; its centre of mass where there is none."""
+        import mujoco
+
+        compiled, data = self.compiled, mujoco.MjData(self.compiled)
+        mujoco.mj_forward(compiled, data)
+        joint = compiled.joint(self.joints[-1]).id
+        body = int(compiled.jnt_bodyid[joint])
+        fixed = np.flatnonzero(compiled.body_weldid == compiled.body_weldid[body])
+        places = np.vstack([data.xpos[fixed], data.site_xpos[np.isin(compiled.site_bodyid, fixed)]])
+        away = np.linalg.norm(places - data.xanchor[joint], axis=1)
+        centre = compiled.body_ipos[body]
+        own = data.xmat[body].reshape(3, 3).T @ (places[np.argmax(away)] - data.xpos[body])
+        return Flange(body, own if away.max() > _APART else centre.copy())
 
     def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the (N, n) torque, N m, that a motion (N, n) takes: bodies, armature, damping, springs, dry friction.

@@ -44,7 +44,7 @@ class Stretch:
     def commands(self, begin: np.ndarray, step: float, numbers: np.ndarray) -> np.ndarray:
         """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
 
-        Each command is in force until the next comes; delay and offset of `numbers` (9, n) are in them.
+        Each command is in force until the next comes; delay and offset of `numbers` (k, n) are in them.
         """
         time, told = self.run.signals.time, self.run.signals.command
         assert told is not None
@@ -77,7 +77,7 @@ def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
 def play(
     servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], step: float | None = None
 ) -> list[list[np.ndarray]]:
-    """Return, for each set of numbers (9, n) and each stretch, the positions (N, n) of the model at its samples.
+    """Return, for each set of numbers (k, n) and each stretch, the positions (N, n) of the model at its samples.
 
     `step`, s, is that of the simulation, None the model's own. Joints that the robot lacks are told zero.
     """

@@ -19,7 +19,7 @@ from irtwin.simulator.choice import choose
 from irtwin.simulator.fit import Fit
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import Stretch, each
-from irtwin.simulator.servos import NAMES, Servos, servos
+from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
@@ -30,7 +30,7 @@ _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 
 @dataclass(frozen=True)
 class Playing:
-    """A diagnosis by playing: its document, what a page draws, the robot's numbers (9, n), which of them differ."""
+    """A diagnosis by playing: its document, what a page draws, the robot's numbers (k, n), which of them differ."""
 
     document: Document
     curves: Curves
@@ -67,7 +67,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
     after = tracked(data_set.robot, own, runs, numbers)
-    differing = [name for row, name in enumerate(NAMES) if chosen.differs[row].any()]
+    differing = sorted({part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()}, key=NAMES.index)
     closed = parts(chosen, numbers, writing.families(differing))
     horizons = restarted(own, runs, numbers)
     return Playing(

@@ -13,11 +13,14 @@ import numpy as np
 from irtwin.errors import InputError
 from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Model, Paired, pair
+from irtwin.simulator.payload import load, loaded_tag
 
 if TYPE_CHECKING:
     import mujoco
 
-NAMES = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band")
+OF_JOINTS = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band")
+OF_ROBOT = ("payload", "payload_x", "payload_y", "payload_z")  # the same at all joints
+NAMES = (*OF_JOINTS, *OF_ROBOT)
 _IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
 _UNLIMITED = np.array([[-1e12], [1e12]])  # N m
 _FARTHEST = 2 * np.pi  # rad that a joint is off: a servo without limit gives no more torque than there
@@ -29,28 +32,31 @@ _NEAR_ZERO = {
     "armature": 0.01,
     "torque_limit": 0.01,
 }  # times inertia, s^-2, s^-1, s^-2, 1, s^-2
+_LIGHT = 0.01  # of the arm's mass: a payload near zero
 
 
 @dataclass(frozen=True)
 class Servos:
-    """A model's servos in the order of its joints; numbers of them are (9, n), a row a name of NAMES.
+    """A model's servos in the order of its joints; numbers of them are (k, n), a row a name of NAMES.
 
     stiffness N m/rad; damping N m s/rad, of servo and joint together; friction N m; holding: the impedance of that
     friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s; torque_limit N m, the most of the servo;
-    dead_band rad, how far a joint is off before its servo pulls. N and m where a joint slides.
+    dead_band rad, how far a joint is off before its servo pulls; payload kg, the same in
+    all columns, as where it is: payload_x, payload_y, payload_z m from the flange, in the frame of its body. N and m
+    where a joint slides.
     """
 
     model: Model
     actuators: np.ndarray  # (n,)
-    numbers: np.ndarray  # (9, n), the model's own
-    scale: np.ndarray  # (9, n), below which a number is as good as zero
+    numbers: np.ndarray  # (k, n), the model's own
+    scale: np.ndarray  # (k, n), below which a number is as good as zero
 
     def chart(self, numbers: np.ndarray) -> np.ndarray:
-        """Return numbers (..., 9, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
+        """Return numbers (..., k, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
         return np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
 
     def of_chart(self, coordinates: np.ndarray) -> np.ndarray:
-        """Return the numbers of coordinates (..., 9, n); those that cannot be below zero are not."""
+        """Return the numbers of coordinates (..., k, n); those that cannot be below zero are not."""
         free = np.isnan(self.scale)
         free[[NAMES.index("delay"), NAMES.index("dead_band")]] = False
         held = np.where(free, coordinates, np.maximum(coordinates, 0.0))
@@ -58,8 +64,8 @@ class Servos:
 
     @cached_property
     def can_differ(self) -> np.ndarray:
-        """Whether numbers (9, n) can be others: a servo whose commands are filtered has no dead band here."""
-        found = np.ones(self.numbers.shape, dtype=bool)
+        """Whether numbers (k, n) of joints can be others: a servo whose commands are filtered has no dead band."""
+        found = np.repeat(np.isin(NAMES, OF_JOINTS)[:, None], self.numbers.shape[1], axis=1)
         found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
         return found
 
@@ -76,7 +82,7 @@ class Servos:
         return np.array([np.where(changed, side * torque_limit, end) for side, end in zip((-1, 1), own, strict=True)])
 
     def compiled(self, numbers: np.ndarray, step: float, paired: bool) -> mujoco.MjModel:
-        """Return the compiled model with numbers (9, n) of its own; offset and delay are the commands' to have.
+        """Return the compiled model with numbers (k, n) of its own; offset and delay are the commands' to have.
 
         A dead band needs the model that is `paired`.
         """
@@ -88,7 +94,10 @@ class Servos:
             self.model.speeds,
         )
         one.opt.timestep = step
-        stiffness, damping, friction, holding, armature, _, _, limit, band = numbers
+        stiffness, damping, friction, holding, armature, _, _, limit, band = numbers[: len(OF_JOINTS)]
+        mass, *off = numbers[len(OF_JOINTS) :, 0]
+        if mass:
+            load(one, self.model.flange, float(mass), np.array(off))
         ends = self.limits(limit)
         if paired:
             second, joints = self.paired.second, self.paired.joints
@@ -116,7 +125,7 @@ class Servos:
         return kept, damping - kept
 
     def written(self, numbers: np.ndarray, differs: np.ndarray) -> bytes:
-        """Return the model's file with those of numbers (9, n) that differ (9, n); all else stays, byte for byte."""
+        """Return the model's file with those of numbers (k, n) that differ (k, n); all else stays, byte for byte."""
         changes: dict[Tag, dict[str, float | str | None]] = {}
         file = self.model.file
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
@@ -134,6 +143,9 @@ class Servos:
             if any(own[name] for name in ("stiffness", "damping", "offset", "delay", "torque_limit")):
                 tag = file.tag(["position", "general"], "joint", joint)
                 changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
+        if differs[NAMES.index("payload")].any():
+            mass, *off = numbers[len(OF_JOINTS) :, 0]
+            changes |= loaded_tag(self.model, float(mass), np.array(off))
         return file.changed(changes)
 
     def _of_servo(
@@ -170,6 +182,11 @@ class Servos:
         return {joint: float(share) for joint, share in shares if share > 0}
 
 
+def part_of(name: str) -> str:
+    """Return what a number is told as: a payload and its place are one thing."""
+    return OF_ROBOT[0] if name in OF_ROBOT else name
+
+
 def servos(model: Model) -> Servos:
     """Return the servos of a model. Raises InputError where a joint is not driven by one position servo."""
     import mujoco
@@ -188,7 +205,7 @@ def servos(model: Model) -> Servos:
         found.append(drives[0])
     at, dof = np.array(found), model.speeds
     stiffness = compiled.actuator_gainprm[at, 0]
-    own = np.array(
+    own = np.vstack(
         [
             stiffness,
             compiled.dof_damping[dof] - compiled.actuator_biasprm[at, 2],
@@ -200,15 +217,16 @@ def servos(model: Model) -> Servos:
             np.where(
                 compiled.actuator_forcelimited[at] == 1, compiled.actuator_forcerange[at, 1], _FARTHEST * stiffness
             ),
-            np.zeros(len(at)),
+            np.zeros((1 + len(OF_ROBOT), len(at))),
         ]
     )
     data = mujoco.MjData(compiled)
     mujoco.mj_forward(compiled, data)
     inertia = np.zeros((compiled.nv, compiled.nv))
     mujoco.mj_fullM(compiled, data, inertia)
-    near_zero = np.array([_NEAR_ZERO.get(name, np.nan) for name in NAMES])
-    return Servos(model, at, own, near_zero[:, None] * np.diag(inertia)[dof])
+    scale = np.array([_NEAR_ZERO.get(name, np.nan) for name in NAMES])[:, None] * np.diag(inertia)[dof]
+    scale[NAMES.index("payload")] = _LIGHT * compiled.body_subtreemass[compiled.jnt_bodyid[compiled.dof_jntid[dof[0]]]]
+    return Servos(model, at, own, scale)
 
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:

@@ -15,14 +15,14 @@ from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
 from irtwin.simulator.choice import Choice
 from irtwin.simulator.play import Stretch, each, play, whole
-from irtwin.simulator.servos import NAMES, Servos
+from irtwin.simulator.servos import NAMES, Servos, part_of
 
 _FOLDS = 3
 _BEGUN_ANEW, _MOST = 0.5, 60  # s; how often in a run
 _HORIZONS = (0.1, 0.2, 0.3, 0.4, 0.5)  # s
 _POSES = 500  # of a run, of which the flange's place is told
 
-OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (9, n)
+OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _alike(stretches: Sequence[Stretch], numbers: OfRun) -> list[list[int]]:
 
 
 def _rows(names: frozenset[str]) -> np.ndarray:
-    return np.array([name in names for name in NAMES])[:, None]
+    return np.array([part_of(name) in names for name in NAMES])[:, None]
 
 
 def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch]) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,7 +18,7 @@ from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
 from irtwin.robot.description import Robot
 from irtwin.simulator.choice import Choice
-from irtwin.simulator.servos import NAMES
+from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT
 from irtwin.simulator.tracking import Parts, Tracked
 
 AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
@@ -43,6 +44,7 @@ def effects() -> Mapping[str, tuple[str, str, str, str]]:
         "delay": ("command_delay", "sensing", "s", "s"),
         "torque_limit": ("servo_torque_limit", "drive", "N m", "N"),
         "dead_band": ("servo_dead_band", "drive", "rad", "m"),
+        OF_ROBOT[0]: ("payload", catalogue()["payload"].family, "kg", "kg"),
     }
 
 
@@ -71,7 +73,7 @@ def document(
     findings = _findings(robot, dict(zip(names, causes, strict=True)), parts)
     named = any(finding.matters for finding in findings)
     closed, interval = share((squares[0] - squares[1]).sum(axis=1), squares[0].sum(axis=1))
-    verdict = _verdict(named, closed, _rms(squares[0]))
+    verdict = _verdict(named, closed, *map(_rms, squares))
     return said.Document(
         verdict=verdict,
         robot=robot.name,
@@ -122,10 +124,10 @@ def _errors(
             yield RunError(run=run, joint=at, before=left, after=then, floor=None, of=of)
 
 
-def _verdict(named: bool, closed: float, before: float) -> str:
+def _verdict(named: bool, closed: float, before: float, after: float) -> str:
     if not named:
         return "no_gap" if before < AGREES else "unexplained"
-    return "attributed" if closed >= _ATTRIBUTED else "unexplained"
+    return "attributed" if closed >= _ATTRIBUTED or after < AGREES else "unexplained"
 
 
 def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
@@ -143,7 +145,10 @@ def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
 
 def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
     rows = [NAMES.index(name) for name in names]
-    joints = [[robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] for row in rows]
+    joints = [
+        [robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] if name in OF_JOINTS else []
+        for row, name in zip(rows, names, strict=True)
+    ]
     ids = cause_ids([(effects()[name][0], on) for name, on in zip(names, joints, strict=True)], robot.joint_names)
     return tuple(
         said.Cause(
@@ -175,21 +180,30 @@ def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
 
 
 def _parameters(robot: Robot, chosen: Choice, name: str) -> Iterator[said.Parameter]:
-    row, own = NAMES.index(name), chosen.fit.servos.numbers
+    if name in OF_ROBOT:
+        for each, symbol in zip(OF_ROBOT, ("m", "c_x", "c_y", "c_z"), strict=True):
+            yield replace(_parameter(chosen, each, 0, None, "kg" if each == name else "m"), name=symbol)
+        return
     _, _, turning, sliding = effects()[name]
-    for place in np.flatnonzero(chosen.differs[row]):
-        simulator, robots = float(own[row, place]), float(chosen.numbers[row, place])
-        held = name != _NOT_HELD
-        lower, upper = chosen.interval[:, row, place] - simulator
-        yield said.Parameter(
-            name=name,
-            joint=robot.joint_names[place],
-            value=robots - simulator,
-            unit=turning if robot.joints[place].unit == "rad" else sliding,
-            interval95=(float(lower), float(upper)) if upper > lower else None,
-            simulator=simulator if held else None,
-            robot=robots if held else None,
-        )
+    for place in np.flatnonzero(chosen.differs[NAMES.index(name)]):
+        unit = turning if robot.joints[place].unit == "rad" else sliding
+        yield _parameter(chosen, name, int(place), robot.joint_names[place], unit)
+
+
+def _parameter(chosen: Choice, name: str, place: int, joint: str | None, unit: str) -> said.Parameter:
+    row = NAMES.index(name)
+    simulator, robots = float(chosen.fit.servos.numbers[row, place]), float(chosen.numbers[row, place])
+    held = name != _NOT_HELD
+    lower, upper = chosen.interval[:, row, place] - simulator
+    return said.Parameter(
+        name=name,
+        joint=joint,
+        value=robots - simulator,
+        unit=unit,
+        interval95=(float(lower), float(upper)) if upper > lower else None,
+        simulator=simulator if held else None,
+        robot=robots if held else None,
+    )
 
 
 def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:

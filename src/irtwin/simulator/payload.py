@@ -1,0 +1,68 @@
+"""A point mass at a model's flange: in the compiled model, and in its file."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from irtwin.simulator.mjcf_file import Tag
+from irtwin.simulator.model import Flange, Model
+
+if TYPE_CHECKING:
+    import mujoco
+
+_OTHER_FORMS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia")  # of what `fullinertia` says
+_UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # its order
+
+
+def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> None:
+    """Put a mass, kg, `off` (3,) m from the flange, to its body; the model's constants are to be set after that."""
+    import mujoco
+
+    body = flange.body
+    whole, centre, inertia = _together(compiled, flange, mass, off)
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.linalg.det(axes)
+    compiled.body_mass[body], compiled.body_ipos[body], compiled.body_inertia[body] = whole, centre, moments
+    mujoco.mju_mat2Quat(compiled.body_iquat[body], axes.ravel())
+
+
+def loaded(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> mujoco.MjModel:
+    """Return a copy of a compiled model with a mass, kg, `off` (3,) m from its flange."""
+    import mujoco
+
+    one = copy.copy(compiled)
+    load(one, flange, mass, off)
+    mujoco.mj_setConst(one, mujoco.MjData(one))
+    return one
+
+
+def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Tag, dict[str, float | str | None]]:
+    """Return what changes of the file: the inertial of the flange's body; nothing where the file says none."""
+    tag = model.file.inertial(model.compiled.body(model.flange.body).name)
+    if tag is None:
+        return {}
+    whole, centre, inertia = _together(model.compiled, model.flange, mass, off)
+    told: dict[str, float | str | None] = dict.fromkeys(_OTHER_FORMS)
+    told |= {"mass": float(whole), "pos": " ".join(map(repr, centre.tolist()))}
+    return {tag: told | {"fullinertia": " ".join(repr(float(inertia[at])) for at in _UPPER)}}
+
+
+def _together(
+    compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return mass, centre (3,) and the inertia (3, 3) about it, in the body's frame, of body and mass."""
+    import mujoco
+
+    body, axes = flange.body, np.empty(9)
+    mujoco.mju_quat2Mat(axes, compiled.body_iquat[body])
+    own = axes.reshape(3, 3) * compiled.body_inertia[body] @ axes.reshape(3, 3).T
+    parts = ((float(compiled.body_mass[body]), compiled.body_ipos[body].copy()), (mass, flange.place + off))
+    whole = sum(each for each, _ in parts)
+    centre = sum(each * at for each, at in parts) / whole
+    for each, at in parts:
+        arm = at - centre
+        own = own + each * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return whole, np.asarray(centre), own
