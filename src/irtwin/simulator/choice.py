@@ -65,7 +65,7 @@ def choose(fit: Fit) -> Choice:
     for _ in range(1 + loaded):  # what made up for a part of the payload is given back
         fit, best, differs = _given_back(fit, best)
         best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
-    if (differs.sum(axis=0) > 1).any():
+    if differs.any():
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
         best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
     differs |= _ROBOTS & loaded
