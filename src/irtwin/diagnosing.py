@@ -6,9 +6,11 @@ Graph, database and pages are imported where a workspace or a report is asked fo
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
@@ -20,13 +22,15 @@ from irtwin.proposed_motion import save_motion
 from irtwin.resources import resources_of
 from irtwin.signals.log import DataSet
 from irtwin.signals.sampling import checked_cutoff
-from irtwin.simulator.differences import written
+from irtwin.simulator.differences import drawn, written
 from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
+
+_SEED_OF_DRAWS = 0
 
 
 def diagnose(
@@ -44,6 +48,7 @@ def diagnose(
     twin_file: Path | str | None = None,
     motion_file: Path | str | None = None,
     simulator_file: Path | str | None = None,
+    draws: int = 0,
     announce: Announce = lambda line: None,
 ) -> Diagnosis | Playing:
     """Diagnose the gap between a robot's twin, or its simulator, and its runs.
@@ -56,12 +61,12 @@ def diagnose(
     kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
     all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
     motion of the next experiment, where one is designed, `simulator_file` the simulator's model with the numbers that
-    the robot has.
+    the robot has, and beside it as many `draws` of what these could be, FILE-1 and so on.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
     location = None if workspace is None else Location.of(workspace)
-    files = _Files.checked(json_file, report, twin_file, motion_file, simulator_file)
+    files = _Files.checked(json_file, report, twin_file, motion_file, simulator_file, draws=draws)
     if location is not None or files.report is not None:
         from irtwin.report.extensions import check
 
@@ -96,14 +101,17 @@ class _Files:
     twin: Path | None
     motion: Path | None
     simulator: Path | None
+    draws: tuple[Path, ...] = field(kw_only=True)
 
     @classmethod
-    def checked(cls, *files: Path | str | None) -> _Files:
+    def checked(cls, *files: Path | str | None, draws: int) -> _Files:
         """Take files as they are asked for. Raises InputError where one cannot be written."""
         places = [None if file is None else Path(file) for file in files]
-        for file in filter(None, places):
+        last = places[-1]
+        more = () if last is None else tuple(last.with_stem(f"{last.stem}-{one + 1}") for one in range(draws))
+        for file in (*filter(None, places), *more):
             check_place(file)
-        return cls(*places)
+        return cls(*places, draws=more)
 
     def write(
         self,
@@ -115,7 +123,8 @@ class _Files:
     ) -> None:
         """Write the files that are asked for."""
         if model and self.simulator:
-            write(self.simulator, found.written() if isinstance(found, Playing) else written(model, found.document))
+            for file, content in zip((self.simulator, *self.draws), _models(found, model), strict=False):
+                write(file, content)
         if self.json is not None:
             write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
         if self.twin is not None and found.twin is not None:
@@ -130,6 +139,14 @@ class _Files:
             announce("Writing the report")
             resources = resources_of(None if location is None else location.folder)
             render_alone(data_set, found.document, found.curves, self.report, resources)
+
+
+def _models(found: Diagnosis | Playing, model: Model) -> Iterator[bytes]:
+    """Yield the model's file with the robot's numbers, then, without end, with these as they could be."""
+    rng = np.random.default_rng(_SEED_OF_DRAWS)
+    yield found.written() if isinstance(found, Playing) else written(model, found.document)
+    while True:
+        yield found.drawn(rng) if isinstance(found, Playing) else drawn(model, found.document, found.twin, rng)
 
 
 def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:

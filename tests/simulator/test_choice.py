@@ -46,6 +46,11 @@ def test_the_numbers_that_differ_are_found_with_their_values(arm):
     assert (found.differs == (true != arm[2].numbers)).all()
     assert (((found.interval[0] <= true) & (true <= found.interval[1])) | ~found.differs).all()
     np.testing.assert_allclose(found.numbers, true, rtol=0.1)
+    rng = np.random.default_rng(0)
+    draws = np.array([found.drawn(rng) for _ in range(300)])
+    inside = (found.interval[0] <= draws) & (draws <= found.interval[1])
+    assert inside[:, found.differs].mean() == pytest.approx(0.95, abs=0.03)
+    np.testing.assert_allclose(draws[:, ~found.differs], np.tile(true[~found.differs], (300, 1)), rtol=1e-9)
     left_out = np.array([False, False, True, True])
     np.testing.assert_allclose(found.without(left_out), true, rtol=0.2)
 

@@ -29,7 +29,7 @@ def told(tmp_path_factory):
     numbers["frictionloss"][2] *= 1.5
     wrong = mujoco_models.write(folder / "arm.xml", ROBOT, **numbers)
     new = folder / "better.xml"
-    return irtwin("diagnose", data, "--simulator", wrong, "--save-simulator", new), wrong, new
+    return irtwin("diagnose", data, "--simulator", wrong, "--save-simulator", new, "--draws", 3), wrong, new
 
 
 def test_both_numbers_are_told_as_the_simulators_and_the_robots(told):
@@ -48,10 +48,21 @@ def test_the_models_numbers_become_the_robots(told):
     assert model.numbers("joint_1") == before.numbers("joint_1")
 
 
+def test_draws_of_it_lie_where_its_numbers_could(told):
+    _, wrong, new = told
+    before = read_model(wrong, ROBOT)
+    drawn = [read_model(new.with_stem(f"better-{number}"), ROBOT).numbers for number in (1, 2, 3)]
+    dampings = [numbers("joint_2")["damping"] for numbers in drawn]
+    assert len(set(dampings)) == 3 and dampings == pytest.approx([TRUE["Fv"][1]] * 3, rel=0.1)
+    assert all(numbers("joint_1") == before.numbers("joint_1") for numbers in drawn)
+
+
 def test_a_file_for_the_model_needs_a_model(tmp_path):
     said = irtwin("diagnose", tmp_path, "--save-simulator", tmp_path / "new.xml")
     assert said.status == 2
     assert "--save-simulator writes the model of --simulator: give that too" in said.err
+    said = irtwin("diagnose", tmp_path, "--draws", 2)
+    assert (said.status, "--draws writes models beside that of --save-simulator" in said.err) == (2, True)
 
 
 def test_the_model_itself_is_not_written_over(tmp_path):

@@ -142,6 +142,13 @@ def case_study(workspace: Path) -> None:
     type=FILE,
     help="File to write that model to, with the numbers that the robot has; all else stays as it is.",
 )
+@click.option(
+    "--draws",
+    type=click.IntRange(0, 10_000),
+    default=0,
+    metavar="N",
+    help="Also write N models with these numbers as they could be, FILE-1 and so on: for domain randomisation.",
+)
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option(
     "--cutoff",
@@ -172,6 +179,8 @@ def diagnose(
         raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
     if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
         raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
+    if asked["draws"] and not simulator_file:
+        raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
     found = judge(
         dataset, simulator=simulator, simulator_file=simulator_file, workspace=location, announce=announce, **asked
     )

@@ -47,6 +47,18 @@ class Choice:
         """The robot's numbers (k, n)."""
         return self.fit.servos.of_chart(self.played.at)
 
+    def drawn(self, rng: np.random.Generator) -> np.ndarray:
+        """Return numbers (k, n) as they could be: as far off as the intervals say, together as the fit's errors go."""
+        ends = self.fit.servos.chart(self.interval)
+        spread, at = (ends[1] - ends[0]) / (2 * NORMAL), self.played.at.copy()
+        for joint in range(at.shape[1]):
+            rows, normal, _ = _equations(self.fit, self.played, self.slopes, self.differs, joint)
+            inverse = np.linalg.inv(normal)
+            alike = inverse / np.sqrt(np.outer(np.diag(inverse), np.diag(inverse)))
+            at[rows, joint] += spread[rows, joint] * rng.multivariate_normal(np.zeros(len(rows)), alike)
+        at[list(SHARED)] += spread[list(SHARED)] * rng.standard_normal((len(SHARED), 1))
+        return self.fit.servos.of_chart(at)
+
     def without(self, left_out: np.ndarray) -> np.ndarray:
         """Return the numbers (k, n) that fit when stretches (p,) are left out, by one step from those of all."""
         at = self.played.at.copy()

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from irtwin.document.document import Cause, Document
 from irtwin.effects.catalogue import catalogue
 from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Model
+from irtwin.twin.twin import Twin
+
+Key = tuple[str, str, str]  # effect, joint, name of a parameter
 
 
 def not_held(document: Document) -> tuple[Cause, ...]:
@@ -13,15 +20,38 @@ def not_held(document: Document) -> tuple[Cause, ...]:
     return tuple(cause for cause in _likely(document) if all(one.simulator is None for one in cause.parameters))
 
 
-def written(model: Model, document: Document) -> bytes:
-    """Return the model's file with the robot's numbers of likely causes; all else stays, byte for byte."""
+def written(model: Model, document: Document, off: Mapping[Key, float] | None = None) -> bytes:
+    """Return the model's file with the robot's numbers of likely causes; all else stays, byte for byte.
+
+    `off`: what is added to a number, by effect, joint and name.
+    """
     changed: dict[Tag, dict[str, float]] = {}
-    for cause in _likely(document):
-        for one in cause.parameters:
-            if one.robot is not None and one.joint is not None:
-                tag = model.file.tag(["joint"], "name", one.joint)
-                changed.setdefault(tag, {})[catalogue()[cause.effect].in_mjcf[one.name]] = one.robot
+    for (effect, joint, name), robot in _numbers(document).items():
+        tag = model.file.tag(["joint"], "name", joint)
+        number = robot + (off or {}).get((effect, joint, name), 0.0)
+        changed.setdefault(tag, {})[catalogue()[effect].in_mjcf[name]] = max(number, 0.0)
     return model.file.changed(changed)
+
+
+def drawn(model: Model, document: Document, twin: Twin | None, rng: np.random.Generator) -> bytes:
+    """Return the model's file with the robot's numbers as they could be, drawn from their covariance in the twin."""
+    if twin is None or twin.covariance is None:
+        return written(model, document)
+    keys = [(one.effect, one.joint or "", one.name) for one in twin.parameters]
+    told = [key for key in _numbers(document) if key in keys]
+    places = [keys.index(key) for key in told]
+    off = rng.multivariate_normal(np.zeros(len(places)), twin.covariance[np.ix_(places, places)])
+    return written(model, document, dict(zip(told, off.tolist(), strict=True)))
+
+
+def _numbers(document: Document) -> dict[Key, float]:
+    """Return the robot's numbers of joints that a model can hold, by effect, joint and name."""
+    return {
+        (cause.effect, one.joint, one.name): one.robot
+        for cause in _likely(document)
+        for one in cause.parameters
+        if one.robot is not None and one.joint is not None
+    }
 
 
 def _likely(document: Document) -> list[Cause]:

@@ -15,7 +15,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
 from irtwin.simulator.alone import alone
-from irtwin.simulator.choice import choose
+from irtwin.simulator.choice import Choice, choose
 from irtwin.simulator.fit import Fit
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import Stretch, each
@@ -30,19 +30,21 @@ _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 
 @dataclass(frozen=True)
 class Playing:
-    """A diagnosis by playing: its document, what a page draws, the robot's numbers (k, n), which of them differ."""
+    """A diagnosis by playing: its document, what a page draws, and the robot's numbers."""
 
     document: Document
     curves: Curves
-    servos: Servos
-    numbers: np.ndarray
-    differs: np.ndarray
+    chosen: Choice
     against: str = "simulated"  # the role of what the observed runs are held against
     twin: None = None  # positions alone make none
 
     def written(self) -> bytes:
         """Return the model's file with the robot's numbers."""
-        return self.servos.written(self.numbers, self.differs)
+        return self.chosen.fit.servos.written(self.chosen.numbers, self.chosen.differs)
+
+    def drawn(self, rng: np.random.Generator) -> bytes:
+        """Return the model's file with the robot's numbers as they could be."""
+        return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
 
 
 def diagnose(data_set: DataSet, model: Model) -> Playing:
@@ -73,9 +75,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     return Playing(
         writing.document(data_set.robot, model.name, names, chosen, closed, before, after, horizons),
         writing.curves(data_set.robot, names, before, after),
-        own,
-        chosen.numbers,
-        chosen.differs,
+        chosen,
     )
 
 
