@@ -73,7 +73,9 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
     right = (first["effect"] in wanted) if first and wanted else not first and not wanted
     joint = bool(first and right and first["joints"] == [one for one in [wanted[first["effect"]]["joint"]] if one])
     within = [
-        number["interval95"][0] <= wanted[cause["effect"]]["robot"] - number.get("simulator", 0.0) <= number["interval95"][1]
+        number["interval95"][0]
+        <= wanted[cause["effect"]]["robot"] - number.get("simulator", 0.0)
+        <= number["interval95"][1]
         for cause in causes
         for number in cause["parameters"]
         if cause["effect"] in wanted and number["joint"] == wanted[cause["effect"]]["joint"] and number["interval95"]
