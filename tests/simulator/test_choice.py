@@ -10,7 +10,7 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import choose
 from irtwin.simulator.fit import Fit
 from irtwin.simulator.play import each
-from irtwin.simulator.servos import NAMES, OF_ROBOT
+from irtwin.simulator.servos import NAMES, PARTS
 
 pytestmark = pytest.mark.slow
 
@@ -55,13 +55,13 @@ def test_the_numbers_that_differ_are_found_with_their_values(arm):
     np.testing.assert_allclose(found.without(left_out), true, rtol=0.2)
 
 
-def test_a_payload_is_found_with_its_mass_and_no_joint_is_blamed(arm):
-    found = chosen(arm, servo_arm.changed(arm[2], payload=(0.1, 0.1)))
-    named = {name for name, row in zip(NAMES, found.differs, strict=True) if row.any()}
-    assert named == set(OF_ROBOT)
-    row = NAMES.index("payload")
-    assert (found.interval[0, row] <= 0.1).all() and (found.interval[1, row] >= 0.1).all()
-    assert found.numbers[row] == pytest.approx(0.1, rel=0.2)
+@pytest.mark.parametrize(("part", "name", "true"), [("payload", "payload", 0.1), ("base_tilt", "tilt_y", 0.25)])
+def test_what_the_whole_robot_has_is_found_and_no_joint_is_blamed(arm, part, name, true):
+    found = chosen(arm, servo_arm.changed(arm[2], **{name: (true, true)}))
+    assert {one for one, row in zip(NAMES, found.differs, strict=True) if row.any()} == set(PARTS[part])
+    row = NAMES.index(name)
+    assert (found.interval[0, row] <= true).all() and (found.interval[1, row] >= true).all()
+    assert found.numbers[row] == pytest.approx(true, rel=0.2)
 
 
 def test_more_friction_is_no_dead_band(arm):

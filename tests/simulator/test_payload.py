@@ -8,7 +8,7 @@ import pytest
 from tests import servo_arm
 
 from irtwin.simulator.payload import loaded
-from irtwin.simulator.servos import NAMES
+from irtwin.simulator.servos import NAMES, PARTS
 
 OFF = np.array([0.02, -0.01, 0.03])
 
@@ -46,7 +46,7 @@ def test_it_is_held_where_the_last_bodys_farthest_frame_is(tmp_path):
 
 def written(own, folder):
     numbers = own.numbers.copy()
-    numbers[NAMES.index("payload") :] = np.array([0.4, *OFF])[:, None]
+    numbers[[NAMES.index(name) for name in PARTS["payload"]]] = np.array([0.4, *OFF])[:, None]
     file = folder / "new.xml"
     file.write_bytes(own.written(numbers, numbers != own.numbers))
     return file

@@ -16,7 +16,7 @@ def arm(folder, text=servo_arm.MODEL):
 def test_a_models_servos_are_told_by_their_numbers(tmp_path):
     own = arm(tmp_path)[2]
     expected = [[20, 15], [0.9, 0.7], [0.05, 0.05], [0.9, 0.9], [0.02, 0.02], [0, 0], [0, 0], [5, 30 * np.pi]]
-    np.testing.assert_allclose(own.numbers, np.vstack([expected, np.zeros((5, 2))]))
+    np.testing.assert_allclose(own.numbers, np.vstack([expected, np.zeros((7, 2))]))
     np.testing.assert_allclose(own.of_chart(own.chart(own.numbers)), own.numbers)
 
 
@@ -35,6 +35,18 @@ def test_what_differs_is_written_and_read_back(tmp_path):
     assert "<!-- servos as the maker says -->" in text
     assert '<position joint="lift" kp="12.5" kv="0.0" ctrlrange="-1.5 1.5" forcerange="-5 5" delay=' in text
     assert '<general joint="elbow" ctrlrange="-1.5 1.5" gaintype="fixed"' in text
+
+
+def test_a_tilt_is_written_as_gravity_where_the_file_has_options(tmp_path):
+    text = servo_arm.MODEL.replace("<worldbody>", '<option gravity="0 0 -9.81"/><worldbody>')
+    own = arm(tmp_path, text)[2]
+    numbers = servo_arm.changed(own, tilt_x=(0.1, 0.1))
+    file = tmp_path / "new.xml"
+    file.write_bytes(own.written(numbers, numbers != own.numbers))
+    gravity = servo_arm.read(tmp_path / "data", file)[1].compiled.opt.gravity
+    np.testing.assert_allclose(gravity, 9.81 * np.array([0.0, np.sin(0.1), -np.cos(0.1)]), atol=1e-12)
+    without = arm(tmp_path / "without")[2]
+    assert without.written(numbers, numbers != own.numbers).decode() == servo_arm.MODEL
 
 
 def test_a_file_with_no_number_changed_is_the_same_bytes(tmp_path):

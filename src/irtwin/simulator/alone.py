@@ -18,13 +18,13 @@ from scipy.signal import savgol_filter
 from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import Stretch
-from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos
+from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
 
 if TYPE_CHECKING:
     import mujoco
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
-_ASIDE = 0.01  # m from the flange, for what a payload's place changes
+_ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
 _AT_ONCE = 3_000_000  # positions that are held at a time
 
 
@@ -32,8 +32,9 @@ _AT_ONCE = 3_000_000  # positions that are held at a time
 class Alone:
     """What stretches of runs are to a joint by itself, at steps of `step` s.
 
-    `load` (5, steps, p, n): torque of bodies and of the other joints, N m, what each kg at the flange adds, and each
-    kg m from it along three axes; `inertia` of the bodies likewise, kg m^2; `begun` (2, p, n): position and speed.
+    `load` (7, steps, p, n): torque of bodies and of the other joints, N m, what each kg at the flange adds, each kg m
+    from it along three axes, and each rad of two tilts; `inertia` of the bodies likewise, kg m^2; `begun` (2, p, n):
+    position and speed.
     """
 
     servos: Servos
@@ -68,26 +69,26 @@ class Alone:
         at, dof = servos.actuators, servos.model.speeds
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
         stiffness, damping, friction, holding, armature, _, _, limit, band = own[: len(OF_JOINTS)]
-        mass, place = own[len(OF_JOINTS)], own[len(OF_JOINTS) + 1 :]
-        moments = np.array([mass, *(mass * place)])
+        mass, *off = own[len(OF_JOINTS) :]
+        changes = np.array([mass, *(mass * np.array(off[:3])), *off[3:]])
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
-        changed = holding != servos.numbers[NAMES.index("holding")]
-        firm = np.where(changed, holding, compiled.dof_solimp[dof, 1])
+        lets_go = holding != servos.numbers[NAMES.index("holding")]
+        firm = np.where(lets_go, holding, compiled.dof_solimp[dof, 1])
         back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
         free = 1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - compiled.dof_armature[dof]
         soft = (1 - holding) / holding / np.maximum(free + armature, 1e-9)
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
-        followed = q.copy()
+        followed, changed = q.copy(), changes.any()
         positions = np.empty((len(told) + 1, *told.shape[1:]))
         positions[0] = q
         for row in range(len(told)):
             load, bodies = self.load[0, row], self.inertia[0, row]
-            if mass.any():
-                load = load + (moments * self.load[1:, row, None]).sum(axis=0)
-                bodies = bodies + (moments * self.inertia[1:, row, None]).sum(axis=0)
+            if changed:
+                load = load + (changes * self.load[1:, row, None]).sum(axis=0)
+                bodies = bodies + (changes * self.inertia[1:, row, None]).sum(axis=0)
             inverse = 1 / (bodies + armature)
             followed += share * (told[row] - followed)
             off = followed - q
@@ -109,9 +110,13 @@ def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
     load, inertia = np.empty(shape), np.empty(shape)
     own, flange = servos.model.compiled, servos.model.flange
     models = [own, *(loaded(own, flange, 1.0, _ASIDE * off) for off in np.vstack([np.zeros(3), np.eye(3)]))]
+    for angles in _ASIDE * np.eye(2):
+        models.append(copy.copy(own))
+        models[-1].opt.gravity = tilted(own, angles)
     for place, one in enumerate(stretches):
         found = np.array([_bodies(servos, compiled, one) for compiled in models])
-        found[2:] = (found[2:] - found[1]) / _ASIDE
+        found[2:5] = (found[2:5] - found[1]) / _ASIDE
+        found[5:] = (found[5:] - found[0]) / _ASIDE
         found[1] -= found[0]
         between = make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
         times = np.minimum(np.arange(steps) * step, one.time[-1])

@@ -15,9 +15,9 @@ from scipy.special import expit
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
 from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Equations, Fit, Played, Slopes, of_robot
-from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
 
-_HOLDING, _PAYLOAD = NAMES.index("holding"), NAMES.index("payload")
+_HOLDING = NAMES.index("holding")
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
 _LEAST = 2e-4  # rad (m), a misfit that is none: less than encoders resolve
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
@@ -71,37 +71,38 @@ class Choice:
 def choose(fit: Fit) -> Choice:
     """Return the numbers with most evidence."""
     fit, best = _all_free(fit)
-    best, odds_of_payload = _loaded(fit, best)
-    loaded = odds_of_payload > 0
-    fit = _judged(fit, best) if loaded else fit
-    for _ in range(1 + loaded):  # what made up for a part of the payload is given back
+    robots, of_parts = np.zeros((len(NAMES), 1), dtype=bool), np.full((len(NAMES), 1), -np.inf)
+    for names in PARTS.values():
+        part = np.isin(NAMES, names)[:, None]
+        best, likely = _with_part(fit, best, part, robots)
+        of_parts[part], robots = likely, robots | (part & (likely > 0))
+    fit = _judged(fit, best) if robots.any() else fit
+    for _ in range(2 if robots.any() else 1):  # what made up for a part of it is given back
         fit, best, differs = _given_back(fit, best)
-        best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
+        best = fit.solved(best, differs | robots, _AGAIN)
     if differs.any():
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
-        best = fit.solved(best, differs | (_ROBOTS & loaded), _AGAIN)
-    differs |= _ROBOTS & loaded
+        best = fit.solved(best, differs | robots, _AGAIN)
+    differs |= robots
     slopes = fit.slopes(best)
     loss, worth = _weighed(fit, best, slopes, differs)
-    odds = np.where(differs, loss - worth, -np.inf)
-    odds = np.where(_ROBOTS, odds_of_payload, odds)
+    odds = np.where(_ROBOTS, of_parts, np.where(differs, loss - worth, -np.inf))
     return Choice(fit, best, slopes, differs, odds, _interval(fit, best, slopes, differs))
 
 
-def _loaded(fit: Fit, best: Played) -> tuple[Played, float]:
-    """Return numbers with a payload, where it has evidence, and the odds that there is one, natural logarithms.
+def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> tuple[Played, float]:
+    """Return numbers with a payload, or a tilt, where it has evidence, and the odds of that, natural logarithms.
 
     It is fitted to the model as it is, and beside what explains most without it: either may be in the other's way.
+    `part` and `robots` (k, 1): what joints share of it, and of what was found before.
     """
-    alone = np.isin(np.arange(len(NAMES)), _PAYLOAD)[:, None] & np.ones(best.at.shape, dtype=bool)
-    free = _free(fit) | _ROBOTS
-    own = fit.played(fit.servos.chart(fit.servos.numbers))
-    tried = [fit.solved(fit.solved(one, alone, _PASSES), free) for one in (best, own)]
-    found = fit.best(tried, together=True)
-    empty = fit.solved(fit.played(np.where(_ROBOTS, fit.servos.chart(fit.servos.numbers), found.at)), _free(fit))
-    best = fit.best([best, empty])  # what came with it may be as good without
-    normal, _ = _of_robot(fit, found, free)
-    worth = np.log(len(NAMES)) + np.linalg.slogdet(normal * LIKELY[SHARED, 0] * LIKELY[SHARED, 0, None])[1] / 2
+    own, without = fit.servos.chart(fit.servos.numbers), _free(fit) | robots
+    alone = np.broadcast_to(part, own.shape)
+    begun = (best, fit.played(np.where(robots, best.at, own)))
+    found = fit.best([fit.solved(fit.solved(one, alone, _PASSES), without | part) for one in begun], together=True)
+    back = fit.solved(fit.played(np.where(part, own, found.at)), without)
+    best = fit.best([best, back], together=bool(robots.any()))  # what came with it may be as good without
+    worth = np.log(len(NAMES)) + _known(fit, found, without | part) - _known(fit, best, without)
     odds = float(fit.cost(best).sum() - fit.cost(found).sum() - worth)
     return (found, odds) if odds > 0 else (best, -np.inf)
 
@@ -255,22 +256,23 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
         between = inverse @ (each.T @ each) @ inverse * count / max(count - len(rows), 1)
         doubt = _doubt(fit, best, slopes, differs, joint)
         spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)) + doubt)
-    if differs[_PAYLOAD].any():
-        spread[list(SHARED)] = _spread_of_payload(fit, best, differs)[:, None]
+    rows, normal, each = _of_robot(fit, best, differs)
+    inverse = np.linalg.inv(normal)
+    between = inverse @ (each.T @ each) @ inverse * count / max(count - 1, 1)
+    spread[rows] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)))[:, None]
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
 
 
-def _spread_of_payload(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of what joints share: by how stretches disagree, and by what is left of each."""
-    normal, each = _of_robot(fit, best, differs)
-    inverse, count = np.linalg.inv(normal), len(each)
-    between = inverse @ (each.T @ each) @ inverse * count / max(count - 1, 1)
-    return np.asarray(np.sqrt(np.maximum(np.diag(between), np.diag(inverse))))
+def _known(fit: Fit, best: Played, free: np.ndarray) -> float:
+    """Return how much better than before what joints share is known, of what is free (k, n): half a log determinant."""
+    rows, normal, _ = _of_robot(fit, best, free)
+    return float(np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2)
 
 
-def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of what joints share, beside what is free (k, n), and each stretch's right side."""
-    rows = (*SMOOTH, *SHARED)
+def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """Return rows that joints share and are free (k, n), their normal equations, and each stretch's right side."""
+    alike = [row for row in SHARED if free[row].any()]
+    rows = (*SMOOTH, *alike)
     slopes = fit.slopes(best, rows)
     joints = [
         fit.equations(best.at, slopes, rows, [row for row in rows if free[row, joint]], joint)
@@ -281,8 +283,8 @@ def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[np.ndarray, np.
         parts = [
             one._replace(right=each[joint, [rows.index(row) for row in one.rows]]) for joint, one in enumerate(joints)
         ]
-        rights.append(of_robot(parts, SHARED)[1])
-    return of_robot(joints, SHARED)[0], np.array(rights)
+        rights.append(of_robot(parts, alike)[1])
+    return alike, of_robot(joints, alike)[0], np.array(rights)
 
 
 def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:

@@ -69,7 +69,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
     after = tracked(data_set.robot, own, runs, numbers)
-    differing = sorted({part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()}, key=NAMES.index)
+    differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
     closed = parts(chosen, numbers, writing.families(differing))
     horizons = restarted(own, runs, numbers)
     return Playing(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from irtwin.errors import InputError
 from irtwin.simulator.mjcf_file import Tag
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     import mujoco
 
 OF_JOINTS = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band")
-OF_ROBOT = ("payload", "payload_x", "payload_y", "payload_z")  # the same at all joints
+PARTS = {"payload": ("payload", "payload_x", "payload_y", "payload_z"), "base_tilt": ("tilt_x", "tilt_y")}
+OF_ROBOT = tuple(name for names in PARTS.values() for name in names)  # the same at all joints
 NAMES = (*OF_JOINTS, *OF_ROBOT)
 _IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
 _UNLIMITED = np.array([[-1e12], [1e12]])  # N m
@@ -42,8 +44,8 @@ class Servos:
     stiffness N m/rad; damping N m s/rad, of servo and joint together; friction N m; holding: the impedance of that
     friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s; torque_limit N m, the most of the servo;
     dead_band rad, how far a joint is off before its servo pulls; payload kg, the same in
-    all columns, as where it is: payload_x, payload_y, payload_z m from the flange, in the frame of its body. N and m
-    where a joint slides.
+    all columns, as where it is: payload_x, payload_y, payload_z m from the flange, in the frame of its body; and
+    as tilt_x, tilt_y rad, by which gravity is turned about the world's axes. N and m where a joint slides.
     """
 
     model: Model
@@ -97,7 +99,8 @@ class Servos:
         stiffness, damping, friction, holding, armature, _, _, limit, band = numbers[: len(OF_JOINTS)]
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if mass:
-            load(one, self.model.flange, float(mass), np.array(off))
+            load(one, self.model.flange, float(mass), np.array(off[:3]))
+        one.opt.gravity = tilted(one, off[3:])
         ends = self.limits(limit)
         if paired:
             second, joints = self.paired.second, self.paired.joints
@@ -143,9 +146,12 @@ class Servos:
             if any(own[name] for name in ("stiffness", "damping", "offset", "delay", "torque_limit")):
                 tag = file.tag(["position", "general"], "joint", joint)
                 changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
+        mass, *off = numbers[len(OF_JOINTS) :, 0]
         if differs[NAMES.index("payload")].any():
-            mass, *off = numbers[len(OF_JOINTS) :, 0]
-            changes |= loaded_tag(self.model, float(mass), np.array(off))
+            changes |= loaded_tag(self.model, float(mass), np.array(off[:3]))
+        option = next((tag for tag in file.tags if tag.element == "option"), None)
+        if option and differs[NAMES.index("tilt_x")].any():
+            changes[option] = {"gravity": " ".join(map(repr, tilted(self.model.compiled, off[3:]).tolist()))}
         return file.changed(changes)
 
     def _of_servo(
@@ -184,7 +190,17 @@ class Servos:
 
 def part_of(name: str) -> str:
     """Return what a number is told as: a payload and its place are one thing."""
-    return OF_ROBOT[0] if name in OF_ROBOT else name
+    return next((part for part, names in PARTS.items() if name in names), name)
+
+
+def row_of(name: str) -> int:
+    """Return the row of a number, or the first of those that are told as one thing."""
+    return NAMES.index(PARTS.get(name, (name,))[0])
+
+
+def tilted(compiled: mujoco.MjModel, angles: Sequence[float]) -> np.ndarray:
+    """Return a model's gravity (3,), m/s^2, turned by two angles, rad, about the world's x and y axes."""
+    return np.asarray(Rotation.from_rotvec([*angles, 0.0]).apply(compiled.opt.gravity))
 
 
 def servos(model: Model) -> Servos:

@@ -18,13 +18,18 @@ from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
 from irtwin.robot.description import Robot
 from irtwin.simulator.choice import Choice
-from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT
+from irtwin.simulator.servos import OF_JOINTS, PARTS, row_of
 from irtwin.simulator.tracking import Parts, Tracked
 
 AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
 _ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
 _LEAST = 1e-14  # rad^2 (m^2), a mean square as good as none
 _NOT_HELD = "dead_band"  # no number of MuJoCo's servos
+_SYMBOLS = {
+    "payload": ("m", "kg"),
+    **{f"payload_{axis}": (f"c_{axis}", "m") for axis in "xyz"},
+    **{f"tilt_{axis}": (f"angle_{axis}", "rad") for axis in "xy"},
+}
 _SHARE_OF = "the mean square of the tracking error"
 
 Horizons = Sequence[tuple[float, float, float]]
@@ -44,7 +49,7 @@ def effects() -> Mapping[str, tuple[str, str, str, str]]:
         "delay": ("command_delay", "sensing", "s", "s"),
         "torque_limit": ("servo_torque_limit", "drive", "N m", "N"),
         "dead_band": ("servo_dead_band", "drive", "rad", "m"),
-        OF_ROBOT[0]: ("payload", catalogue()["payload"].family, "kg", "kg"),
+        **{part: (part, catalogue()[part].family, "", "") for part in PARTS},
     }
 
 
@@ -144,7 +149,7 @@ def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
 
 
 def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
-    rows = [NAMES.index(name) for name in names]
+    rows = [row_of(name) for name in names]
     joints = [
         [robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] if name in OF_JOINTS else []
         for row, name in zip(rows, names, strict=True)
@@ -166,7 +171,7 @@ def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) ->
 
 
 def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
-    at = chosen.differs[NAMES.index(name)]
+    at = chosen.differs[row_of(name)]
     everywhere, left = (max(float(some.sum()), _LEAST) for some in (parts.without(name), parts.after))
     without, after = (max(float(some[:, at].sum()), _LEAST) for some in (parts.without(name), parts.after))
     return said.Evidence(
@@ -174,24 +179,25 @@ def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
         share_of_what_is_closed=None,
         closed_where_it_acts=1 - after / without,
         gain=everywhere / left - 1,
-        log_odds=float(chosen.odds[NAMES.index(name)].max()),
+        log_odds=float(chosen.odds[row_of(name)].max()),
         probability_of_rivals={},
     )
 
 
 def _parameters(robot: Robot, chosen: Choice, name: str) -> Iterator[said.Parameter]:
-    if name in OF_ROBOT:
-        for each, symbol in zip(OF_ROBOT, ("m", "c_x", "c_y", "c_z"), strict=True):
-            yield replace(_parameter(chosen, each, 0, None, "kg" if each == name else "m"), name=symbol)
+    if name in PARTS:
+        for each in PARTS[name]:
+            symbol, unit = _SYMBOLS[each]
+            yield replace(_parameter(chosen, each, 0, None, unit), name=symbol)
         return
     _, _, turning, sliding = effects()[name]
-    for place in np.flatnonzero(chosen.differs[NAMES.index(name)]):
+    for place in np.flatnonzero(chosen.differs[row_of(name)]):
         unit = turning if robot.joints[place].unit == "rad" else sliding
         yield _parameter(chosen, name, int(place), robot.joint_names[place], unit)
 
 
 def _parameter(chosen: Choice, name: str, place: int, joint: str | None, unit: str) -> said.Parameter:
-    row = NAMES.index(name)
+    row = row_of(name)
     simulator, robots = float(chosen.fit.servos.numbers[row, place]), float(chosen.numbers[row, place])
     held = name != _NOT_HELD
     lower, upper = chosen.interval[:, row, place] - simulator
