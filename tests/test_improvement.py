@@ -15,7 +15,7 @@ import pytest
 from irtwin import asking, workflow
 from irtwin.document import form
 from irtwin.document.document import Document
-from irtwin.gap.experiment.programmes import Programme, programmes
+from irtwin.identification.programmes import Programme, programmes
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.next_experiment import next_experiment

@@ -16,7 +16,7 @@ from irtwin.document.curves import Curves
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.gap.experiment.programmes import Programme, programmes
+from irtwin.identification.programmes import Programme, programmes
 from irtwin.proposed_motion import motion_text, save_motion
 from irtwin.signals.samples import read_signals
 from tests.synthetic import arm, swing
@@ -29,8 +29,8 @@ NOTHING = Curves(follows=(), runs=(), experiment=None)
 
 @cache
 def designed() -> dict[str, Programme]:
-    taken = [effect for effect in catalogue().values() if effect.taken_off == "with the tool off"]
-    return {one.kind: one for one in programmes(ROBOT, (), [swing(ROBOT, 1)], warm=True, take_off=taken)}
+    asked = [catalogue()[name] for name in ("payload", "temperature_dependent_friction")]
+    return {one.kind: one for one in programmes(ROBOT, (), [swing(ROBOT, 1)], asked)}
 
 
 def experiment(programme: Programme | None, *by_hand: str) -> Experiment:

@@ -15,10 +15,10 @@ SOURCE = Path(irtwin.__file__).parent
 OTHER_MEANINGS = {
     "bring/data_set_text.py": {"rotor_inertia"},  # a key of the data sheet
     "bring/rtde_names.py": {"payload"},  # a column of a recording
-    "gap/experiment/programmes.py": {"payload"},  # a kind of programme
-    "report/gap/experiment.py": {"payload"},
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
+    "identification/programmes.py": {"payload"},  # a kind of programme
+    "report/gap/experiment.py": {"payload"},
     "live/joint_stream.py": {"payload"},  # a field of a message
     "live/rtde.py": {"payload"},
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet

@@ -12,10 +12,10 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
-from irtwin.gap.experiment.flexible_regression import closeable, flexible_regression
 from irtwin.gap.isolation.explained import ExplainedTorque
 from irtwin.gap.isolation.finding import find
 from irtwin.gap.localisation.channel_residuals import channel_residual
+from irtwin.gap.localisation.flexible_regression import closeable, flexible_regression
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.thresholds import DEFAULT

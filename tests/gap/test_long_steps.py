@@ -23,8 +23,6 @@ STEPS = {
     "residual": "torque that is left of",
     "followed": "what torque follows at",
     "closeable": "how much of torque could be closed",
-    "excitation": "exciting motion, step",
-    "programmes": "weighing",
 }
 
 

@@ -48,6 +48,7 @@ from irtwin.storage.revisions.versions import (
     r0018_asserted_facts,
     r0019_simulators,
     r0020_no_notes,
+    r0021_odds_after_an_experiment,
 )
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Activity, Base, Run
@@ -111,6 +112,7 @@ OF_0_1 = {  # columns that revisions have dropped, and whether they may be empty
         **dict.fromkeys(r0012_one_criterion.APART, True),
     },
     "gap_cause_competitor": {"gain": True, "correlation": True},
+    "gap_experiment_question": dict.fromkeys(r0021_odds_after_an_experiment.GONE, True),
 }
 
 
@@ -127,7 +129,8 @@ def aged(place: Workspace, *, of_0_1: bool) -> None:
     with engines.writing(place.engine, restructuring=True) as session:
         connection = session.connection()
         operations = Operations(MigrationContext.configure(connection))
-        for table, gone in AFTER_0_1.items() if of_0_1 else {"run": ("sample_rate_hz",)}.items():
+        changed = {**dict.fromkeys(OF_0_1, ()), **AFTER_0_1} if of_0_1 else {"run": ("sample_rate_hz",)}
+        for table, gone in changed.items():
             with operations.batch_alter_table(table, recreate=recreate) as of:
                 for column in gone:
                     of.drop_column(column)
@@ -181,6 +184,7 @@ def test_each_revision_follows_another() -> None:
     assert r0018_asserted_facts.down_revision == r0017_metered_loads.revision
     assert r0019_simulators.down_revision == r0018_asserted_facts.revision
     assert r0020_no_notes.down_revision == r0019_simulators.revision
+    assert r0021_odds_after_an_experiment.down_revision == r0020_no_notes.revision
 
 
 def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
@@ -362,6 +366,8 @@ def test_triggers_that_noted_changes_go(tmp_path: Path) -> None:
         connection.execute(text("CREATE TABLE row_change (number INTEGER PRIMARY KEY, table_name TEXT)"))
         note = "INSERT INTO row_change (table_name) VALUES ('run')"
         connection.execute(text(f"CREATE TRIGGER irtwin_noted_run_insert AFTER INSERT ON run BEGIN {note}; END"))
+        for column in r0021_odds_after_an_experiment.GONE:
+            connection.execute(text(f"ALTER TABLE gap_experiment_question ADD COLUMN {column} FLOAT"))
         connection.execute(text("UPDATE alembic_version SET version_num = '0019'"))
     with Workspace(tmp_path) as place, place.engine.connect() as connection:
         assert connection.execute(text("SELECT name FROM sqlite_master WHERE type = 'trigger'")).all() == []

@@ -13,19 +13,13 @@ from irtwin.document.words import Effect, Joint
 class Question:
     """What the experiment tells: one of two rival effects from the other, or whether one effect is there.
 
-    Separations are in standard deviations of the residual: of the data there are, and with the experiment.
-    `not_imitated_now`, `expected_not_imitated`: of rivals, the share (0 to 1) of one that the other cannot imitate, in
-    the data and in the experiment. `visibility_now`, `expected_visibility`: of one effect, its mean square in units of
-    the noise's, in the data and with the experiment.
+    Separations are by how much the other is less likely, in standard deviations of a normal with these odds: now, and
+    with the experiment.
     """
 
     effects: tuple[Effect, ...] = told("asks_about_Effect", "tells_from_Effect", column="effect rival")
     separation_now: float = told("Separation_Now")
     expected_separation: float = told("Separation_Expected")
-    not_imitated_now: float | None = told("Not_Imitated_Now", default=None)
-    expected_not_imitated: float | None = told("Not_Imitated_Expected", default=None)
-    visibility_now: float | None = told("Visibility_Now", default=None)
-    expected_visibility: float | None = told("Visibility_Expected", default=None)
 
 
 @part("Experiment_Instruction", table="gap_experiment_instruction", of="part_of_Experiment", ranked=True)
@@ -145,7 +139,7 @@ class Weighed:
 class Experiment:
     """What to measure next.
 
-    `effects` and `joints` that it is about; `motions` in words; separations in standard deviations, the smallest over
+    `effects` and `joints` that it is about; `motions` in words; separations as of a question, the smallest over
     its questions; `programme`: None where none helps, or the test is done by hand; `note`: what no programme tells.
     """
 

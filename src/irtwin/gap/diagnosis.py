@@ -19,10 +19,6 @@ from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
-from irtwin.gap.experiment.flexible_regression import flexible_regression
-from irtwin.gap.experiment.next_experiment import next_experiment
-from irtwin.gap.experiment.planned_equations import planned_equations
-from irtwin.gap.experiment.programmes import excitation_of
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.detectability import untestable
@@ -32,8 +28,11 @@ from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
 from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
+from irtwin.gap.localisation.flexible_regression import flexible_regression
+from irtwin.gap.next_experiment import next_experiment
 from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.rehearsal import channel_equations
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
@@ -164,7 +163,6 @@ def diagnose(
     case = case_of(data_set, withhold, thresholds, twin)
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
-    excitation = begun(lambda: excitation_of(case.robot), worth=case.long)  # the next experiment's
     stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
     plain = twin_equations(case, stack)
@@ -224,17 +222,16 @@ def diagnose(
         explained=[one.disturbance for one in taken],
     )
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
-    tell("Designing the next experiment")
-    stacks = stack, search.power_stack
-    planned = planned_equations(case, stacks, findings, search.twin.below, torque or twin_torque)
     measures = {one.finding.name: flexible_regression(one, seed) for one in left}
+    tell("Designing the next experiment")
+    stacks = {"torque": stack, "power": search.power_stack}
+    equations = channel_equations(stacks, case, search.below, torque or twin_torque)
     proposal = next_experiment(
         case.robot,
-        planned,
-        [catalogue()[one.effect] for one in lacking],
+        [(finding, equations[finding.name]) for finding in findings],
+        [one.effect for one in lacking] if open_because else [],
         case.seen,
-        thresholds.matters.apart,
-        lambda: excitation(lambda: tell_step("  waiting for the exciting motion")),
+        thresholds,
     )
     identified = twin_with_causes(lambda: tell_step("  waiting for the twin with its causes"))
     return Diagnosis(

@@ -97,7 +97,7 @@ class ScaleOfTorque:
 
 @dataclass(frozen=True)
 class Matters:
-    """What is worth a word to a person, and when a question is answered."""
+    """What is worth a word to a person."""
 
     share: float = _threshold(
         0.02, "least that a cause closes", "share of its channel's gap", "decisions/gap-verdict.md"
@@ -110,9 +110,6 @@ class Matters:
     )
     closed: float = _threshold(
         0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-verdict.md"
-    )
-    apart: float = _threshold(
-        5.0, "separation that answers a question of an experiment", "standard deviations", "decisions/gap-criterion.md"
     )
 
 

@@ -67,6 +67,22 @@ def attribute(
     return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, tuple(best), beside)
 
 
+def judged(
+    system: System,
+    found: Sequence[Hypothesis],
+    candidates: Sequence[Hypothesis],
+    limits: Criterion,
+    floor: np.ndarray | None,
+    noise: np.ndarray,
+) -> tuple[Cause, ...]:
+    """Return the causes of a structure, hypotheses of one shape each, as sure as a system makes them among candidates.
+
+    floor, noise: (g,) RMS, 0 or None where unknown, and what the structure leaves.
+    """
+    search = _Search(system, candidates, Prior.of(candidates), limits, floor)
+    return search.causes([(one, one.variants[0]) for one in found], noise)
+
+
 @dataclass(frozen=True)
 class _Search:
     """The search on one system; floor: (g,) RMS."""

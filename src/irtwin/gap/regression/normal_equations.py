@@ -85,6 +85,31 @@ class System:
         places = [self.base + kept.index(k) for k in own]
         return found, [p + len(kept) * (k >= self.changed) for p, k in zip(places, chosen, strict=True)]
 
+    def joined(self, other: System) -> System:
+        """Return the system with the blocks of another, of the same columns, as groups of their own."""
+        return replace(
+            self,
+            blocks=(*self.blocks, *other.blocks),
+            group=np.concatenate([self.group, other.group + self.groups]),
+            observed=np.concatenate([self.observed, other.observed]),
+        )
+
+    def measuring(self, values: np.ndarray) -> System:
+        """Return the system had it measured what its columns (D,) give with these coefficients."""
+
+        def measured(block: Block, observed: bool) -> Block:
+            factors = []
+            for factor, row in zip(block.factors, self.pattern, strict=True):
+                used = np.flatnonzero(row)
+                own = values[used]
+                if self.both and observed:
+                    later = used >= self.base
+                    own[later] += values[used[later] + len(self.columns)]
+                factors.append(np.column_stack([factor[:, :-1], factor[:, :-1] @ own]))
+            return replace(block, factors=tuple(factors))
+
+        return replace(self, blocks=tuple(map(measured, self.blocks, self.observed.tolist())))
+
     @property
     def halves(self) -> tuple[slice, ...]:
         """The equations of rows alike: all, or those of fast rows and those of slow ones."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from irtwin.document import experiment
 from irtwin.document.experiment import Settings
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
-from irtwin.identification.excitation import Excitation, excite
+from irtwin.identification.excitation import excite
 from irtwin.identification.motion_limits import JointLimits, Workspace
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
@@ -84,55 +83,36 @@ class Programme:
         )
 
 
-def excitation_of(robot: Robot) -> Excitation | None:
-    """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none."""
-
-    def step(iteration: int, condition: float, seconds: float) -> None:
-        tell_step(f"  exciting motion, step {iteration}")
-
-    try:
-        return excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step)
-    except InputError:
-        return None
-
-
 def programmes(
     robot: Robot,
     joints: Sequence[str],
     seen: Sequence[Motion],
-    *,
-    warm: bool = False,
-    take_off: Sequence[Effect] = (),
-    excitation: Callable[[], Excitation | None] | None = None,
+    effects: Sequence[Effect] = (),
 ) -> Iterator[Programme]:
     """Yield the programmes that are worth weighing for some joints (none: all), the plain ones first.
 
-    `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `warm`: with a warm-up;
-    `take_off`: effects to be removed for a run; `excitation`: gives the robot's exciting motion, where that was sought
-    before. Where the URDF gives no limits, those of `seen` are kept.
+    `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `effects` are in question: with
+    a warm-up where one needs temperatures, and without each that can be taken off. Where the URDF gives no limits,
+    those of `seen` are kept.
     """
     yard = _Yard(robot, joints or robot.joint_names, seen)
     for build in (_ladder, _sweep, _reversals, _steps, _poses):
         made = yard.clear(build)
         if made is not None:
             yield made
-    found = (excitation or partial(excitation_of, robot))() if yard.within(_EXCITING) else None
-    if found is None:
+    exciting = _exciting(robot, yard) if yard.within(_EXCITING) else None
+    if exciting is None:
         return
-    exciting = _exciting(robot, yard, found)
     yield exciting
     if mass := _payload(robot):
         yield _loaded(exciting, mass)
-    if warm:
+    if any("temperature" in effect.requires for effect in effects):
         yield _warmed(exciting)
-    for effect in take_off:
-        yield replace(
-            exciting,
-            kind=f"without_{effect.id}",
-            text=f"{exciting.text}, {effect.taken_off}",
-            set_up=_SET_UP,
-            without=(effect.id,),
-        )
+    for effect in effects:
+        if effect.taken_off:
+            text = f"{exciting.text}, {effect.taken_off}"
+            kind = f"without_{effect.id}"
+            yield replace(exciting, kind=kind, text=text, set_up=_SET_UP, without=(effect.id,))
 
 
 class _Yard:
@@ -343,14 +323,21 @@ def _poses(yard: _Yard) -> Programme:
     return replace(made, settings=Settings(poses=yard.by_joint(np.array(stops)), hold_seconds=_HOLD))
 
 
-def _exciting(robot: Robot, yard: _Yard, found: Excitation) -> Programme:
-    time, q, dq, ddq = found.sample(yard.rate)
-    motion = Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff)
+def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
+    """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none."""
+
+    def step(iteration: int, condition: float, seconds: float) -> None:
+        tell_step(f"  exciting motion, step {iteration}")
+
+    try:
+        time, q, dq, ddq = excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step).sample(yard.rate)
+    except InputError:
+        return None
     return Programme(
         "exciting_motion",
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
-        (motion,),
+        (Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff),),
         settings=Settings(command=f"irtwin excite URDF --seconds {_EXCITING:g} --out motion.csv"),
     )
 

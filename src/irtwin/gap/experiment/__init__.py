@@ -1,1 +1,0 @@
-"""What to measure next, so that effects which these data cannot tell apart can be told."""

@@ -1,0 +1,255 @@
+"""What to measure next: the programme, of those that the robot's limits allow, that tells rivals apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import log, sqrt
+
+import numpy as np
+
+from irtwin.document.curves import PlannedMotion
+from irtwin.document.experiment import Considered, Experiment, Question
+from irtwin.effects.catalogue import catalogue
+from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.finding import Finding, branches
+from irtwin.gap.isolation.posterior import overlap
+from irtwin.gap.regression.hypotheses import Hypothesis
+from irtwin.gap.rehearsal import Equations, Rehearsal
+from irtwin.gap.thresholds import Criterion, Thresholds
+from irtwin.identification.programmes import LONGEST, Programme, programmes
+from irtwin.identification.progress import tell_step
+from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
+
+_DRAWN = 400  # points of a curve on a page
+_LEAST = 1.0  # standard deviations: what adds less is not worth making
+_FAR = -700.0  # log of a chance that is none
+
+
+Weighed = tuple[Programme, list[Question]]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The experiment that is proposed, its programme (None where none helps), and the curve that a page draws."""
+
+    experiment: Experiment
+    programme: Programme | None
+    curve: PlannedMotion | None
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """One question: is it the effect at these joints (of the whole robot: all), and none of its rivals?
+
+    `now`: how far each rival is behind, in standard deviations; of an effect that does not show, `None` alone: nothing.
+    """
+
+    effect: str
+    scope: str
+    joints: tuple[str, ...]
+    now: Mapping[str | None, float]
+    rehearsal: Rehearsal
+
+    @property
+    def rivals(self) -> list[str]:
+        """The rivals' names."""
+        return [rival for rival in self.now if rival is not None]
+
+    def answered(self, programme: Programme) -> list[Question]:
+        """Return what a programme would tell: of each rival by itself."""
+        found = _of(self.rehearsal.causes(programme), self.effect, self.scope)
+        return [
+            Question(
+                effects=(self.effect, *filter(None, [rival])),
+                separation_now=_rounded(now),
+                expected_separation=_rounded(max(now, separation(found, rival))),
+            )
+            for rival, now in self.now.items()
+        ]
+
+
+def _of(causes: Sequence[Cause], effect: str, scope: str) -> Cause:
+    return next(one for one in causes if (one.effect, one.scope) == (effect, scope))
+
+
+def separation(cause: Cause, rival: str | None) -> float:
+    """Return by how many standard deviations a rival is behind: a normal's that is as unlikely beside its middle.
+
+    None: nothing is in the cause's place.
+    """
+    if rival is None:
+        return sqrt(2 * max(cause.log_odds, 0.0))
+    chances = cause.probability, cause.rivals.get(rival, 0.0)
+    likely, unlikely = (log(chance) if chance > 0 else _FAR for chance in chances)
+    return sqrt(2 * max(likely - unlikely, 0.0))
+
+
+def next_experiment(
+    robot: Robot,
+    channels: Sequence[tuple[Finding, Equations]],
+    lacking: Sequence[str],
+    seen: Sequence[Motion],
+    limits: Thresholds,
+) -> Proposal | None:
+    """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
+
+    `channels`: each finding with its channel's equations; `seen`: the motions that were judged. Of the programmes after
+    which no rival would be named any more the one that takes the least time is chosen, else the one that answers the
+    most. None where there is nothing to ask.
+    """
+    enough = sqrt(-2 * log(limits.criterion.unknown))
+    asked = [question for one in channels for question in _rivals(robot, *one, limits)] or [
+        question
+        for one in channels
+        for question in _unseen(robot, *one, lacking, limits.criterion)
+        if question.now[None] < enough
+    ]
+    if not asked:
+        return None
+    names = tuple(dict.fromkeys(name for one in asked for name in (one.effect, *one.rivals)))
+    joints = tuple(joint for joint in robot.joint_names if any(joint in one.joints for one in asked))
+    effects = [catalogue()[name] for name in names]
+    weighed = [(one, _weighed(one, asked)) for one in programmes(robot, joints, seen, effects)]
+    note = _note([told for _, told in weighed], enough)
+    weighed = _answerable(weighed, enough)
+    chosen, questions = _best(weighed, enough)
+    by_hand = tuple(effect.manual_test for effect in effects if effect.manual_test)
+    said = Experiment(
+        purpose="; ".join(f"tell {one.effect} from {', '.join(one.rivals)}" for one in asked if one.rivals)
+        or f"show {', '.join(names)}",
+        effects=names,
+        joints=joints,
+        motions=(chosen.text,) if chosen else by_hand,
+        expected_separation=min(one.expected_separation for one in questions) if chosen else None,
+        separation_now=_rounded(min(now for one in asked for now in one.now.values())),
+        separation_that_is_enough=_rounded(enough),
+        questions=tuple(questions),
+        programme=chosen.said if chosen else None,
+        considered=tuple(
+            Considered(
+                kind=one.kind,
+                minutes=round(one.cost / 60, 1),
+                expected_separation=min(each.expected_separation for each in told),
+            )
+            for one, told in weighed
+        ),
+        note=note,
+    )
+    return Proposal(said, chosen, None if chosen is None else curve(robot, chosen))
+
+
+def _rivals(robot: Robot, finding: Finding, equations: Equations, limits: Thresholds) -> Iterator[_Asked]:
+    """Yield a question for each cause that a person is told of and that has rivals."""
+    told = [cause for one in branches(finding) if one.closing.matters(limits.matters) for cause in one.causes]
+    true, sizes = _known(finding)
+    for cause in told:
+        near = cause.not_told_from(limits.criterion.unknown)
+        own = [one for one in true if (one.effect, one.scope) == (cause.effect, cause.scope)]
+        rivals = tuple(
+            one
+            for one in finding.attribution.hypotheses
+            if one.effect in near and any(overlap(one, each) for each in own)
+        )
+        now: dict[str | None, float] = {
+            name: separation(cause, name) for name in near if any(one.effect == name for one in rivals)
+        }
+        if now:
+            rehearsal = Rehearsal(finding, equations, true, rivals, sizes, False, limits.criterion)
+            yield _Asked(cause.effect, cause.scope, cause.joints or robot.joint_names, now, rehearsal)
+
+
+def _unseen(
+    robot: Robot, finding: Finding, equations: Equations, lacking: Sequence[str], limits: Criterion
+) -> Iterator[_Asked]:
+    """Yield the question whether an effect is there, of those that a channel's data cannot show.
+
+    As large as expected, at the place where it shows most.
+    """
+    true, sizes = _known(finding)
+    found = finding.attribution
+    for effect in lacking:
+        places = [k for k, one in enumerate(found.hypotheses) if one.effect == effect]
+        if places:
+            best = found.hypotheses[max(places, key=lambda k: found.visible[k, 0])]
+            shape = best.variants[len(best.variants) // 2]
+            expected = {k: term.spread for k, term in zip(shape.columns, shape.terms, strict=True)}
+            own = replace(best, variants=(shape,))
+            rehearsal = Rehearsal(finding, equations, (*true, own), (), sizes | expected, True, limits)
+            now = separation(_of(rehearsal.causes(None), effect, own.scope), None)
+            yield _Asked(effect, own.scope, robot.joint_names, {None: now}, rehearsal)
+
+
+def _known(finding: Finding) -> tuple[tuple[Hypothesis, ...], dict[int, float]]:
+    """Return a finding's causes joint by joint, each in the shape that was found, and their coefficients by column."""
+    true = [
+        Hypothesis(cause.effect, joint, cause.scope, (variant,))
+        for cause in finding.causes
+        for joint, variant in zip(cause.joints or (None,), cause.variants, strict=True)
+    ]
+    fitted = zip(finding.used, finding.estimate.values.tolist(), strict=True)
+    return tuple(true), {k: value for k, value in fitted if k >= finding.system.base}
+
+
+def _weighed(programme: Programme, asked: Sequence[_Asked]) -> list[Question]:
+    tell_step(f"  weighing {programme.kind.replace('_', ' ')}")
+    return [question for one in asked for question in one.answered(programme)]
+
+
+def _answerable(weighed: list[Weighed], enough: float) -> list[Weighed]:
+    """Return the questions that some programme answers, alone; all where there is none."""
+    kept = [
+        k for k, chances in enumerate(zip(*(told for _, told in weighed), strict=True)) if _reached(chances, enough)
+    ]
+    return [(one, [told[k] for k in kept]) for one, told in weighed] if kept else weighed
+
+
+def _best(weighed: Sequence[Weighed], enough: float) -> tuple[Programme | None, list[Question]]:
+    """Return the programme that answers most, of those that answer all the shortest; None of it where none helps.
+
+    Of those as short, to the minute, it is the one that tells most.
+    """
+
+    def order(pair: Weighed) -> tuple[int, int, float]:
+        expected = [one.expected_separation for one in pair[1]]
+        left = sum(one < enough for one in expected)
+        return -left, 0 if left else -round(pair[0].cost / 60), min(expected)
+
+    best, questions = max(weighed, key=order, default=(None, []))
+    helps = any(one.expected_separation >= min(enough, one.separation_now + _LEAST) for one in questions)
+    return best if helps else None, questions
+
+
+def _note(weighed: Sequence[list[Question]], enough: float) -> str | None:
+    """Say what no programme tells apart or shows."""
+    if not weighed:
+        return f"no programme of at most {LONGEST / 60:g} minutes keeps to the limits of this robot"
+    names = [chances[0].effects for chances in zip(*weighed, strict=True) if not _reached(chances, enough)]
+    said = [f"{' and '.join(some)} cannot be {'told apart' if len(some) > 1 else 'shown'}" for some in names]
+    return "; ".join(f"{one} by any motion that was weighed" for one in said) or None
+
+
+def _reached(chances: Sequence[Question], enough: float) -> bool:
+    return any(one.expected_separation >= enough for one in chances)
+
+
+def curve(robot: Robot, programme: Programme) -> PlannedMotion:
+    """Return what a page draws of a programme: time (s) and the position of each joint that moves, thinned."""
+    time, q, start = [], [], 0.0
+    moved = [robot.index(joint) for joint in programme.joints]
+    for motion in programme.motions:
+        every = -(-len(motion.time) * len(programme.motions) // _DRAWN)
+        time.append(motion.time[::every] + start)
+        q.append(motion.q[::every])
+        start = float(time[-1][-1]) + every / motion.rate
+    return PlannedMotion(
+        time=tuple(np.concatenate(time).round(3).tolist()),
+        joints=programme.joints,
+        units=tuple(robot.joints[joint].unit for joint in moved),
+        q=tuple(map(tuple, np.concatenate(q).T[moved].round(5).tolist())),
+    )
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,82 @@
+"""Programmes of an arm: within its limits, and of whole motions."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, swing
+
+from irtwin.document.form import to_json
+from irtwin.effects.catalogue import catalogue
+from irtwin.identification.motion_limits import JointLimits
+from irtwin.identification.programmes import programmes
+
+pytestmark = pytest.mark.slow
+
+ROBOT = arm(2)
+ASKED = [catalogue()[name] for name in ("payload", "temperature_dependent_friction")]
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return [replace(swing(ROBOT, seed, 10.0), run=f"run_{seed}", cutoff=20.0) for seed in range(2)]
+
+
+@pytest.fixture(scope="module")
+def of_joint_2(motions):
+    return list(programmes(ROBOT, ["joint_2"], motions, ASKED))
+
+
+def test_programmes_keep_the_limits_of_the_joints(of_joint_2):
+    limits = JointLimits.of(ROBOT)
+    assert [one.kind for one in of_joint_2][:2] == ["speed_ladder", "slow_sweep"]
+    assert {"exciting_motion", "payload", "warm_up", "without_payload"} <= {one.kind for one in of_joint_2}
+    for one in of_joint_2:
+        json.dumps(to_json(one.said), allow_nan=False)
+        for motion in one.motions:
+            assert np.all((motion.q > limits.lower) & (motion.q < limits.upper))
+            assert np.all(np.abs(motion.dq) <= limits.speed)
+            assert np.all(np.abs(motion.ddq) <= limits.acceleration)
+            assert motion.time[-1] <= 130
+
+
+def test_speeds_and_accelerations_of_a_programme_belong_to_its_positions(of_joint_2):
+    for one in of_joint_2:
+        for motion in one.motions:
+            step = 1 / motion.rate
+            slope = np.diff(motion.q, axis=0) / step
+            between = (motion.dq[1:] + motion.dq[:-1]) / 2
+            largest = np.abs(motion.ddq).max()
+            assert np.abs(slope - between).max() <= largest * step + 1e-9
+
+
+def test_joints_that_are_not_asked_for_stand_still(of_joint_2):
+    ladder = of_joint_2[0]
+    assert np.ptp(ladder.motions[0].q[:, 0]) == 0
+    assert set(ladder.settings.speeds) == {"joint_2"}
+
+
+def test_speeds_of_sliding_joints_are_in_metres(motions):
+    assert "m/s" in next(iter(programmes(arm(2, slides=(1,)), ["joint_2"], motions))).text
+
+
+@pytest.mark.parametrize(("speed", "rate"), [(1e-5, 100.0), (3.0, 50_000.0)])
+def test_a_programme_lasts_minutes_and_has_no_million_samples(motions, speed, rate):
+    robot = replace(ROBOT, joints=tuple(replace(joint, velocity=speed) for joint in ROBOT.joints))
+    fast = [replace(motion, time=motion.time * motion.rate / rate, cutoff=rate / 5) for motion in motions]
+    for one in programmes(robot, [], fast):
+        for motion in one.motions:
+            assert motion.time[-1] <= 600
+            assert len(motion.time) <= 100_000
+
+
+def test_without_limits_those_that_were_seen_are_kept(motions):
+    joints = tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in ROBOT.joints)
+    free = replace(ROBOT, joints=joints)
+    reached = np.concatenate([motion.q for motion in motions])
+    for one in programmes(free, [], motions):
+        for motion in one.motions:
+            assert np.all(motion.q <= reached.max(axis=0)) and np.all(motion.q >= reached.min(axis=0))
