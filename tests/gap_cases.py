@@ -186,8 +186,7 @@ def with_findings(said: dict[str, Any]) -> dict[str, Any]:
 
 def _closeable(*given: float | None) -> dict[str, Any]:
     shares = dict(zip(("closed", "closeable", "by_regression", "nameless"), given, strict=True))
-    of_joints = {f"{name}_by_equation": [share] for name, share in shares.items()}
-    return shares | of_joints | {"of": "the gap above the floor"}
+    return shares | {"of": "the gap above the floor"}
 
 
 def _by_cause(effect: str, scope: str, share: float, alone: list[float], without: list[float]) -> dict[str, Any]:

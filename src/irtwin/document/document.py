@@ -365,17 +365,13 @@ class Closeable:
     """How much of a channel's gap could be closed at all, as shares 0 to 1 `of` something; None where there is no gap.
 
     `closed`: by the causes, refitted to all runs; `by_regression`: by a flexible regression on the motion alone;
-    `nameless`: by one of what the causes leave; `closeable`: by the better of the two. Then each equation's.
+    `nameless`: by one of what the causes leave; `closeable`: by the better of the two.
     """
 
     closed: float | None = told("Closed_By_Causes")
     closeable: float | None = told("Closeable_At_All")
     by_regression: float | None = told("Closed_By_Regression")
     nameless: float | None = told("Closeable_Without_Name")
-    closed_by_equation: tuple[float | None, ...]
-    closeable_by_equation: tuple[float | None, ...]
-    by_regression_by_equation: tuple[float | None, ...]
-    nameless_by_equation: tuple[float | None, ...]
     of: str = told("Closeable_Of", column="of_what")
 
 

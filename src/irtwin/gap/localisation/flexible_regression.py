@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
@@ -27,32 +25,28 @@ _MEMORY = (0.1, 0.5)  # s
 
 
 def closeable(squares: np.ndarray, floor: np.ndarray | None, least_gap: float) -> Closeable:
-    """Return which part of the gap above the floor could be closed, in all equations and in each.
+    """Return which part of the gap above the floor could be closed, in all equations together.
 
     squares: (4, g) mean squares on groups left out: of what the twin leaves, refitted to all runs, of what a regression
     of that on the motion does, and of both with the causes. `floor` (g,): RMS of the noise, None where unknown; then
     fractions are of the mean square. They are None where the gap is smaller than `least_gap`, of the floor's.
-    `closed`: by the causes; `by_regression`: by a regression of what the plain twin leaves; `nameless`: by one of what
-    the causes leave, that is, without a name; `closeable`: by the better of the two.
     """
-    plain, plain_regressed, closed, closed_regressed = squares
+    plain = squares[0]
     least = np.zeros_like(plain) if floor is None else floor**2
     level = plain if floor is None else least
-    gap = (plain - least) / level
-    left = {
-        "closed": plain - closed.clip(least),
-        "closeable": plain - np.minimum(plain_regressed, closed_regressed).clip(least),
-        "by_regression": plain - plain_regressed.clip(least),
-        "nameless": closed - closed_regressed.clip(least),
-    }
-    parts = {name: np.maximum(squares / level, 0.0) for name, squares in left.items()}
-    total = float(np.maximum(gap, 0.0).sum())
-    total = total if total > least_gap * len(gap) else 0.0
-    gaps = np.where(gap > least_gap, gap, 0.0)
-    shares: dict[str, Any] = {name: _share(float(part.sum()), total) for name, part in parts.items()}
-    shares |= {f"{name}_by_equation": tuple(map(_share, part, gaps)) for name, part in parts.items()}
+    gap = float(np.maximum((plain - least) / level, 0.0).sum())
+
+    def share(before: np.ndarray, after: np.ndarray) -> float | None:
+        won = float(np.maximum((before - after.clip(least)) / level, 0.0).sum())
+        return min(won / gap, 1.0) if gap > least_gap * len(plain) else None
+
+    regressed, closed, rest = squares[1:]
     return Closeable(
-        **shares, of="the mean square, as no floor is known" if floor is None else "the gap above the floor"
+        closed=share(plain, closed),
+        closeable=share(plain, np.minimum(regressed, rest)),
+        by_regression=share(plain, regressed),
+        nameless=share(closed, rest),
+        of="the mean square, as no floor is known" if floor is None else "the gap above the floor",
     )
 
 
@@ -168,7 +162,3 @@ def _regressed(features: np.ndarray, residuals: np.ndarray, group: np.ndarray) -
             left[place] += ((residuals[inside] - fitted) ** 2).sum(axis=0)
     start, best = left[0] / len(group), left.min(axis=0) / len(group)
     return np.array([start[0], best[0], start[1], best[1]])
-
-
-def _share(part: float, whole: float) -> float | None:
-    return float(np.clip(part / whole, 0.0, 1.0)) if whole > 0 else None

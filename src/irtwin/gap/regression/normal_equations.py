@@ -216,15 +216,6 @@ class System:
             used = np.append(used, used[later] + len(self.columns))
         return np.column_stack([columns * self.scale[used], target]), used
 
-    def scored(self, block: int, equation: int, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `weights` (D + 1,) leave of an equation in a block, (r,), and its products with all, (D + 1,).
-
-        These are `factor @ weights` and `factor.T` of that, without the factor's copies of columns.
-        """
-        factor, observed = self.blocks[block].factors[equation], bool(self.observed[block])
-        left = factor @ self._held(equation, observed, weights)
-        return left, self._among_all(equation, observed, factor.T @ left)
-
     def _held(self, equation: int, observed: bool, weights: np.ndarray) -> np.ndarray:
         """Return what (D + 1,) weights of all columns are of those that an equation holds, (k + 1,), unscaled."""
         used = np.flatnonzero(self.pattern[equation])

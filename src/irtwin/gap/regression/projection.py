@@ -1,4 +1,4 @@
-"""What a fit leaves of columns: their products, and each block's score of each column."""
+"""What a fit leaves of columns: their products."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.moments import Moments, Summed
+from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
 
 _PANEL = 256  # rows of a product of matrices, at least
-_QUIET = 0.3  # of the noise: what is left of a block is never taken for less
 
 
 @dataclass(frozen=True)
@@ -57,31 +56,6 @@ def projected_in(part: Moments, whole: Projected, inside: np.ndarray) -> Project
     seen = part.among(inside, np.append(inside, asked))
     across = np.ascontiguousarray(seen[:, len(inside) :].T)
     return Projected(part, asked, ((own, across - own @ seen[:, : len(inside)]), (across, own)))
-
-
-def scores(
-    system: System, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]
-) -> tuple[np.ndarray, Projected]:
-    """Return each block's score of each column (B, D), and the products of what the fit leaves of columns.
-
-    A block's equations count by the inverse of what is left of them, so that no few blocks decide alone.
-    """
-    total = Summed(moments)
-    inside = fitted_columns(system, chosen)
-    products = total.of(inside)
-    weights = _weights(system, inside, products[:, inside], products)
-    rest = np.zeros(total.size)
-    rest[-1] = 1.0
-    rest[inside] = -weights[:, -1]
-    found = np.empty((len(system.blocks), total.size - 1))
-    for block in range(len(system.blocks)):
-        vector = np.zeros(total.size)
-        for equation, level in enumerate(noise):
-            left, own = system.scored(block, equation, rest)
-            loud = np.sqrt(left @ left / max(system.blocks[block].rows[equation], 1)) / level
-            vector += own / level**2 / max(float(loud), _QUIET)
-        found[block] = (vector - weights.T @ vector[inside])[:-1]
-    return found, Projected.by(total, np.arange(total.size), products, weights)
 
 
 def fitted_columns(system: System, chosen: Sequence[int]) -> np.ndarray:

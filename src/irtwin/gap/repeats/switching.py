@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from irtwin.gap.repeats.series import SPREAD, Series, correlation_samples
 from irtwin.gap.repeats.slow import creep
 
-_TRUST = (1.0, 0.1)  # in all of the power beside its changes: motion may hardly change, or the load may be large
-_ROUNDS = 10  # of fitting what the motion takes and what is on, in turn
+_ROUNDS = 7  # of fitting what the motion takes and what is on, in turn
 _BIN = 0.02  # s, over which power is averaged before it is said when a load is on,
 _MOST_BINS = 20_000  # or longer, in long runs
 _LEAST = 0.05  # of the load: bins are known no better
@@ -20,10 +18,6 @@ _BOTH = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])  # whether it
 
 Edges = list[tuple[float, float]]
 """Times, s, and steps, W."""
-_MOMENT = 0.1  # s, over which power is averaged, and changes
-_ROUNDS = 7  # of weights by absolute deviations; as many of weights that leave out what is far
-_NEAR = 0.5  # spreads: nearer changes count alike
-_FAR = 4.0  # spreads: what lies beyond is a step (Tukey's biweight)
 
 
 @dataclass(frozen=True)
@@ -79,10 +73,8 @@ def switching(pairs: Sequence[Watched], runs: Mapping[str, Series]) -> Switching
     """
     names = dict.fromkeys(name for pair in pairs for name in pair.names)
     watched = {name: runs[name] for name in names}
-    followed = (_followed(pairs, watched, two_levels(watched, trust)) for trust in _TRUST)
-    found = [one for one in followed if one is not None and one.explained > 0.5]
-    worth = [_worth(one, pairs, watched) for one in found]
-    return found[int(np.argmax(worth))] if max(worth, default=0.0) > 0 else None
+    load = _followed(pairs, watched, _two_levels(watched))
+    return load if load is not None and load.explained > 0.5 and _worth(load, pairs, watched) > 0 else None
 
 
 def _worth(load: Switching, pairs: Sequence[Watched], runs: Mapping[str, Series]) -> float:
@@ -254,52 +246,14 @@ def _saved(before: np.ndarray, after: np.ndarray) -> float:
     return len(after) / (2 * correlation_samples(after)) * float(np.log(ratio))
 
 
-def two_levels(runs: Mapping[str, Series], trust: float) -> dict[str, np.ndarray]:
-    """Return where each run's power is on the upper of two levels, beside what the motion takes, (N,) of 0 and 1.
-
-    `trust`: how much all of the power counts beside its changes.
-    """
-    even = {name: _smooth(np.column_stack([one.beside, one.values]), one) for name, one in runs.items()}
-    changes = [
-        each[_samples(one) :] - each[: -_samples(one)] for one, each in zip(runs.values(), even.values(), strict=True)
-    ]
-    taken = _of_motion(np.vstack(list(even.values())), np.vstack(changes), trust)
-    left = {name: each @ np.append(-taken, 1.0) for name, each in even.items()}
-    middle = _middle(np.concatenate(list(left.values())))
-    return {name: (values > middle).astype(float) for name, values in left.items()}
-
-
-def _smooth(columns: np.ndarray, one: Series) -> np.ndarray:
-    """Return the moving means of columns (N, m) over a moment."""
-    return np.asarray(uniform_filter1d(columns, _samples(one), axis=0, mode="nearest"))
-
-
-def _samples(one: Series) -> int:
-    return min(max(1, round(_MOMENT * one.rate)), len(one.time) // 3)
-
-
-def _of_motion(whole: np.ndarray, change: np.ndarray, trust: float) -> np.ndarray:
-    """Return the coefficients (m,) of columns, power the last, (M, m + 1): by a robust fit to changes, held by all."""
-    scale = np.maximum(np.linalg.norm(whole[:, :-1], axis=0), 1e-300)
-    whole, values = whole[:, :-1] / scale, whole[:, -1]
-    change, changes = change[:, :-1] / scale, change[:, -1]
-    square, right = whole.T @ whole, whole.T @ values
-    found = np.linalg.lstsq(square, right, rcond=1e-12)[0]
-    rough = float(np.mean((values - whole @ found) ** 2))
-    for turn in range(2 * _ROUNDS):
-        off = np.abs(changes - change @ found)
-        spread = max(SPREAD * float(np.median(off)), 1e-12)
-        weights = _weights(off / spread, last=turn >= _ROUNDS)
-        held = trust**2 * spread**2 / max(rough, 1e-300)
-        weighted = change * weights[:, None]
-        both = change.T @ weighted + held * square, weighted.T @ changes + held * right
-        found = np.linalg.lstsq(*both, rcond=1e-12)[0]
-    return np.asarray(found / scale)
-
-
-def _weights(off: np.ndarray, *, last: bool) -> np.ndarray:
-    """Return the weights (N,) of deviations in spreads: of the least absolute ones first, then of Tukey's biweight."""
-    return np.clip(1 - (off / _FAR) ** 2, 0.0, None) ** 2 if last else 1 / np.maximum(off, _NEAR)
+def _two_levels(runs: Mapping[str, Series]) -> dict[str, np.ndarray]:
+    """Return where each run's power is on the upper of two levels, (N,) of 0 and 1, beside what the motion takes."""
+    states = {name: np.zeros(len(one.time)) for name, one in runs.items()}
+    for _ in range(_ROUNDS):
+        left = _left(runs, states)
+        middle = _middle(np.concatenate(list(left.values())))
+        states = {name: (values > middle).astype(float) for name, values in left.items()}
+    return states
 
 
 def _middle(values: np.ndarray) -> float:
