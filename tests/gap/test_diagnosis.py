@@ -107,8 +107,8 @@ def test_a_missing_friction_is_named_with_its_joint():
 
 def test_a_change_is_named_beside_the_reference_runs():
     grease = on_joint(0, lambda m: 3 * m.dq[:, 0])
-    observed = runs(change=grease, first=20)
-    diagnosis = diagnose(data_set([*runs(role="reference"), *observed], effects=WITH_LOSS))
+    both = [*runs(4, role="reference"), *runs(4, change=grease, first=20)]
+    diagnosis = diagnose(data_set(both, effects=WITH_LOSS))
     (_, cause), *_ = diagnosis.causes
     assert (cause.effect, cause.scope, cause.joints) == ("viscous_friction", "changed", ("joint_1",))
     (parameter,) = diagnosis.to_json()["causes"][0]["parameters"]
@@ -155,7 +155,7 @@ def test_what_has_no_cause_is_told_beyond_what_reference_runs_leave_over_one_ano
 
 
 def test_withheld_friction_comes_back():
-    diagnosis = diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["coulomb_friction"])
+    diagnosis = diagnose(data_set(runs(4), effects=WITH_LOSS), withhold=["coulomb_friction"])
     (_, cause), *_ = diagnosis.causes
     assert cause.effect == "coulomb_friction"
     assert set(cause.joints) == {"joint_1", "joint_2"}
@@ -166,14 +166,14 @@ def test_withheld_friction_comes_back():
 
 
 def test_power_lacks_the_loss_in_the_windings():
-    diagnosis = diagnose(data_set(runs(), effects=WITH_LOSS), withhold=["copper_loss"])
+    diagnosis = diagnose(data_set(runs(4), effects=WITH_LOSS), withhold=["copper_loss"])
     channel, cause = diagnosis.causes[0]
     assert (channel.name, cause.effect) == ("power", "copper_loss")
 
 
 def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():
     stribeck = on_joint(1, lambda m: 4 * np.sign(m.dq[:, 1]) * np.exp(-np.abs(m.dq[:, 1]) / 0.1))
-    diagnosis = diagnose(data_set(runs(change=stribeck), effects=WITH_LOSS), unknown=["stribeck_friction"])
+    diagnosis = diagnose(data_set(runs(4, change=stribeck), effects=WITH_LOSS), unknown=["stribeck_friction"])
     named = {name for _, cause in diagnosis.causes for name in (cause.effect, *cause.rivals)}
     assert "stribeck_friction" not in named
     assert diagnosis.verdict != "no_gap"
