@@ -25,7 +25,7 @@ def main() -> None:
         (row,) = ask("planned_against_measured", workspace).rows
         size = (workspace / "reports" / "case_study.html").stat().st_size
         print(f"{wall:.1f} s, {used.ru_utime + used.ru_stime:.1f} s of processor, {used.ru_maxrss / 1e3:.0f} MB")
-        print(f"page {size / 1e6:.2f} MB; planned {row['planned_J']:.1f} J, measured {row['measured_J']:.1f} J")
+        print(f"page {size / 1e6:.2f} MB; planned {row['planned_Wh']:.3f} Wh, measured {row['measured_Wh']:.3f} Wh")
 
 
 if __name__ == "__main__":

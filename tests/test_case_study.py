@@ -52,7 +52,7 @@ def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not
     assert abs(row["difference_percent"]) < 6.54
     part = "PREFIX irt: <https://w3id.org/irtwin#> SELECT ?part { ?run irt:performs ?plan ; irt:Part_In_Twin ?part }"
     assert [found["part"] for found in ask(part, done[1]).rows] == ["held_out"]
-    assert f"planned to take {row['planned_J']:.1f} J and took {row['measured_J']:.1f} J" in text
+    assert f"planned to take {row['planned_Wh'] * 3600:.1f} J and took {row['measured_Wh'] * 3600:.1f} J" in text
     assert f"off by {' '.join(percent(abs(row['difference_percent'])).split())}" in text and "off by 6.54 %" in text
 
 
@@ -117,7 +117,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     assert page.locator(".is-run option").all_inner_texts() == [case_study.PLANNED, case_study.MEASURED]
     page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 1e9}}))")
     (row,) = ask("planned_against_measured", done[1]).rows
-    assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_J"], abs=0.6)
+    assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_Wh"] * 3600, abs=0.6)
     assert page.evaluate("document.documentElement.scrollWidth") == 1440
     assert faults(page) == []
     assert narrow_and_dark(page) == []

@@ -77,7 +77,7 @@ def test_its_provider_fills_its_table_and_its_question_is_answered(done) -> None
     assert run[0] == 0, run[2]
     assert "co2: 3 individuals" in run[2]
     grams = {row["run"]: row["co2_g"] for row in json.loads(emissions[1])}
-    joules = {row["run"]: row["energy_J"] for row in json.loads(energies[1])}
+    joules = {row["run"]: row["energy_Wh"] * 3600 for row in json.loads(energies[1])}
     assert grams == pytest.approx({name: 1000 * 0.4 * energy / 3.6e6 for name, energy in joules.items()})
 
 

@@ -15,13 +15,13 @@ from irtwin.input_file import read_text
 from irtwin.knowledge.questions.queries import read_question
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.report import extensions
-from irtwin.report.plant.tariff import read_tariff
 from irtwin.resources import resources_of
 from irtwin.robot.urdf import read_urdf
 from irtwin.ros.ros_package import write_package
 from irtwin.serve.server import read_token
 from irtwin.signals.log import read_data_set
 from irtwin.storage import base_iri
+from irtwin.storage.tariff import read_tariff
 from irtwin.twin.files import load
 from tests.data_sets import irtwin
 from tests.synthetic import arm

@@ -98,11 +98,11 @@ def test_the_graph_says_of_a_plan_what_the_command_printed(performed: Path, kept
     assert set(rows) == {"reach", "later"}
     reach = rows["reach"]
     assert reach["from"] == "modelled"
-    assert reach["lower_J"] < reach["energy_J"] < reach["upper_J"]
-    assert reach["energy_J"] == pytest.approx(reach["mean_power_W"] * reach["time_s"])
-    assert rows["later"]["energy_J"] == pytest.approx(reach["energy_J"], rel=1e-3)
+    assert reach["lower_Wh"] < reach["energy_Wh"] < reach["upper_Wh"]
+    assert reach["energy_Wh"] * 3600 == pytest.approx(reach["mean_power_W"] * reach["time_s"])
+    assert rows["later"]["energy_Wh"] == pytest.approx(reach["energy_Wh"], rel=1e-3)
     printed = float(kept[1].out.partition("energy ")[2].partition(" ")[0])
-    assert reach["energy_J"] == pytest.approx(printed, rel=1e-3)  # as it was planned, whatever the twin is since
+    assert reach["energy_Wh"] * 3600 == pytest.approx(printed, rel=1e-3)  # whatever the twin is since
 
 
 def test_a_plan_leads_back_to_twin_and_motion(performed: Path) -> None:
@@ -121,8 +121,8 @@ def test_a_plan_leads_back_to_twin_and_motion(performed: Path) -> None:
 def test_planned_is_held_against_measured(performed: Path) -> None:
     (pair,) = asking.ask("planned_against_measured", performed)
     assert (pair["plan"], pair["run"]) == ("reach", "done")
-    assert pair["difference_percent"] == pytest.approx(100 * (pair["planned_J"] / pair["measured_J"] - 1))
-    assert pair["within_interval"] is (pair["lower_J"] <= pair["measured_J"] <= pair["upper_J"])
+    assert pair["difference_percent"] == pytest.approx(100 * (pair["planned_Wh"] / pair["measured_Wh"] - 1))
+    assert pair["within_interval"] is (pair["lower_Wh"] <= pair["measured_Wh"] <= pair["upper_Wh"])
     assert pair["measured_s"] - pair["planned_s"] == pytest.approx(2.0, abs=0.1)
     assert abs(pair["planned_peak_W"] - pair["measured_peak_W"]) < 0.25 * pair["measured_peak_W"]
 
@@ -136,7 +136,7 @@ def test_what_is_planned_is_in_no_sum(performed: Path) -> None:
     assert not others
     measured = list(asking.ask("energy_per_run", performed))
     assert total["runs"] == len(measured) == 4
-    assert total["energy"] == pytest.approx(sum(row["energy_J"] for row in measured))
+    assert total["energy"] == pytest.approx(sum(row["energy_Wh"] for row in measured) * 3600)
     assert total["time"] == pytest.approx(sum(row["time_s"] for row in measured))
     assert not list(
         asking.ask(
@@ -225,14 +225,14 @@ def test_a_motion_from_a_file_is_kept_as_well(also_priced: tuple[Path, Said]) ->
     assert priced.out.startswith('planned run "laden" of arm_2: energy ')
     rows = {row["run"]: row for row in asking.ask("planned_runs", workspace)}
     assert rows["laden"]["payload_kg"] == 2.0
-    assert f"{rows['laden']['energy_J']:.4g}" in priced.out
+    assert f"{rows['laden']['energy_Wh'] * 3600:.4g}" in priced.out
 
 
 def test_a_live_run_is_held_against_the_plan_that_it_carried_out(watched: Path) -> None:
     pairs = list(asking.ask("planned_against_measured", watched))
     live, done = sorted(pairs, key=lambda row: row["run"] == "done")
     assert (live["plan"], live["run"][:5], done["run"]) == ("reach", "live_", "done")
-    assert live["measured_J"] == pytest.approx(done["measured_J"], rel=0.01)
+    assert live["measured_Wh"] == pytest.approx(done["measured_Wh"], rel=0.01)
     page = (watched / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert page.count("<small>planned as reach</small>") == 2
 
@@ -354,11 +354,11 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
     *others, last = said.out.splitlines()
     (row,) = asking.ask("retimed_motions", performed)
     assert (row["run"], row["plan"]) == ("done", "slower")
-    assert row["lower_J"] < row["saving_J"] < row["upper_J"]
+    assert row["lower_Wh"] < row["saving_Wh"] < row["upper_Wh"]
     assert f'{out} and planned run "slower" of arm_2: 6.00 s: ' in last
     printed = float(last.partition(" J, ")[2].partition(" ")[0])
-    assert printed == pytest.approx(abs(row["saving_J"]), rel=0.01)
-    assert f" J {'less' if row['saving_J'] >= 0 else 'more'} than done " in last
+    assert printed == pytest.approx(abs(row["saving_Wh"] * 3600), rel=0.01)
+    assert f" J {'less' if row['saving_Wh'] >= 0 else 'more'} than done " in last
     assert any(line.startswith("move from ") and line.endswith(" times as long") for line in others)
     times = np.loadtxt(out, delimiter=",", skiprows=1)[:, 0]
     assert times[-1] - times[0] == pytest.approx(6.0, abs=0.01)
@@ -377,9 +377,9 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
     q = np.repeat([[1.0, -1.0]], 50, axis=0)  # where the motion ends
     held = Motion(np.linspace(0, 1, 50), q, 0 * q, 0 * q, run="held")
     waiting = float(np.mean(twin.power(held))) * (slower["s"] - quick["s"])
-    assert row["saving_J"] == pytest.approx(quick["j"] + waiting - slower["j"], abs=0.02 * quick["j"])
+    assert row["saving_Wh"] * 3600 == pytest.approx(quick["j"] + waiting - slower["j"], abs=0.02 * quick["j"])
     page = (performed / "reports" / "arm_2.html").read_text(encoding="utf-8")
-    assert ("Timed as slower, in " in page) is (row["lower_J"] > 0)
+    assert ("Timed as slower, in " in page) is (row["lower_Wh"] > 0)
 
 
 @pytest.mark.parametrize(

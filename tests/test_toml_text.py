@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.report.plant.tariff import read_tariff
 from irtwin.storage.base_iri import said
+from irtwin.storage.tariff import read_tariff
 from irtwin.toml_text import read_toml
 
 

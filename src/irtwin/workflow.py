@@ -56,6 +56,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
 from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
+from irtwin.storage.tariff import read_tariff
 from irtwin.storage.turns import rewriting_alone
 from irtwin.twin.files import to_json
 
@@ -234,7 +235,8 @@ def renew(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
 
 
 def check_before(place: Workspace) -> None:
-    """Raise InputError for a fault in what extends a workspace, or where its series cannot be kept."""
+    """Raise InputError for a fault in what extends a workspace or its tariff, or where its series cannot be kept."""
+    read_tariff(place.folder)
     check_extensions(place.resources)
     check_mappings(place.resources, place.engine)
     series_place.check(place.folder)

@@ -74,7 +74,7 @@ def test_a_data_set_becomes_a_report(workspace):
 def test_questions_are_answered_in_three_forms(workspace):
     runs = json.loads(irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "json").out)
     assert {row["run"] for row in runs} >= {"swing_2", "waiting"}
-    assert all(row["energy_J"] > 100 for row in runs)
+    assert all(row["energy_Wh"] * 3600 > 100 for row in runs)
     text = irtwin("query", "energy_per_run", "--workspace", workspace, "--format", "csv").out.splitlines()
     assert text[0].startswith("robot,run,")
     assert len(text) == len(runs) + 1

@@ -27,13 +27,16 @@ from irtwin.storage.database import Workspace
 
 ANSWERS = Path(__file__).parent / "questions"
 QUESTIONS = named_questions()
+TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
+    place = tmp_path_factory.mktemp("fleet")
+    (place / "plant.toml").write_text(TARIFF, encoding="utf-8")
+    graph = KnowledgeGraph(workspace=place)
     graph.load_ontology()
-    with Workspace(tmp_path_factory.mktemp("fleet")) as workspace:
+    with Workspace(place) as workspace:
         small_fleet.fill(workspace)
         documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
         graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
@@ -194,6 +197,14 @@ def per_robot(rows: Iterable[Row], column: str) -> dict[str, float]:
     return found
 
 
+def joules(rows: Iterable[Row]) -> dict[str, float]:
+    """Return the energies that a question answers, added up for each robot, J."""
+    units = {"energy_kWh": 3.6e6, "energy_Wh": 3600.0}
+    return per_robot(
+        [{**row, "value": row[name] * unit} for row in rows for name, unit in units.items() if name in row], "value"
+    )
+
+
 def of_runs(graph: KnowledgeGraph, property: str) -> dict[str, float]:
     """Return what a property comes to over each robot's runs."""
     name = "?run irt:run_of / irt:has_Information / irt:IR_Name ?robot"
@@ -203,16 +214,16 @@ def of_runs(graph: KnowledgeGraph, property: str) -> dict[str, float]:
 @pytest.mark.parametrize("question", ["energy_per_day", "energy_per_month", "energy_per_robot", "energy_per_run"])
 def test_parts_add_up_to_the_energy_of_all_runs(graph: KnowledgeGraph, question: str) -> None:
     whole = of_runs(graph, "Energy_Consumption")
-    assert per_robot(ask(graph, question), "energy_J") == pytest.approx(whole)
+    assert joules(ask(graph, question)) == pytest.approx(whole)
     (fleet,) = ask(graph, "fleet_totals")
     assert 3.6e6 * fleet["energy_kWh"] == pytest.approx(sum(whole.values()))
 
 
 def test_effects_and_joints_add_up_to_the_modelled_energy(graph: KnowledgeGraph) -> None:
     whole = of_runs(graph, "Modelled_Energy")
-    assert per_robot(ask(graph, "energy_per_effect"), "energy_J") == pytest.approx(whole)
+    assert joules(ask(graph, "energy_per_effect")) == pytest.approx(whole)
     of_joints = [row for row in ask(graph, "energy_per_joint_and_effect") if row["joint"] is not None]
-    assert per_robot(ask(graph, "energy_per_joint"), "energy_J") == pytest.approx(per_robot(of_joints, "energy_J"))
+    assert joules(ask(graph, "energy_per_joint")) == pytest.approx(joules(of_joints))
 
 
 def test_a_ledger_that_is_not_whole_is_told(graph: KnowledgeGraph) -> None:

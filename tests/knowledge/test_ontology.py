@@ -24,6 +24,7 @@ MODULES = [
     "gap",
     "providers",
     "totals",
+    "tariff",
     "live",
     "alignment",
 ]

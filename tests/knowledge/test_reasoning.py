@@ -82,7 +82,7 @@ def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
 def test_rules_conclude_what_is_known_of_two_robots(reasoned: KnowledgeGraph) -> None:
     links = short({one for one in reasoned.triples(GRAPH_SHACL) if not isinstance(one.object, Literal)})
     assert links == CONCLUSIONS | DOMINANT | ALARMS
-    said = {one for one in short(reasoned.triples(GRAPH_SHACL)) - links if "Arm_A" in one[0]}
+    said = {one for one in short(reasoned.triples(GRAPH_SHACL)) - links if "twin_alarm/Arm_A" in one[0]}
     assert said == {
         ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_Since", "2026-03-02T09:00:00Z"),
         ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_State", "active"),

@@ -15,7 +15,6 @@ from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.providers.records import load_robot
 from irtwin.report.plant import curves, page, robot
-from irtwin.report.plant.tariff import Tariff
 from irtwin.report.questions import ask
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
@@ -41,6 +40,8 @@ def test_a_meters_log(tmp_path: Path) -> None:
     (tmp_path / "dataset.toml").write_text(DATA_SET)
     np.savetxt(tmp_path / "day.csv", np.column_stack([time, power]), delimiter=",", header="time,power", comments="")
     said: list[str] = []
+    (tmp_path / "ws").mkdir()
+    (tmp_path / "ws/plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\n')
     with Workspace(tmp_path / "ws") as place, rewriting(place) as graph:
         take_in(place, read_data_set(tmp_path), said.append)
         assert "  no twin, for a meter alone was logged: which joint, effect or motion takes it stays unknown" in said
@@ -64,8 +65,8 @@ def test_a_meters_log(tmp_path: Path) -> None:
             load_robot(place, "Cell_3")
         iri, run = graph.iri("robot/Cell_3"), graph.iri("run/Cell_3.day")
         answers = ask(graph, robot.questions(), {"robot": iri})
-        beside = {"tariff": Tariff(0.2, "EUR", 0.4), "trouble": "", "excel": False, "report": None, "gap_report": None}
-        said_of = robot.of_robot(answers, ZoneInfo("Europe/Berlin"))
+        beside = {"zone": ZoneInfo("Europe/Berlin"), "trouble": "", "excel": False, "report": None, "gap_report": None}
+        said_of = robot.of_robot(answers, beside["zone"])
         html = text(page.render("robot/page.html.jinja", answers, {"robot": iri}, **said_of, **beside))
         assert "early, 6 to 14 h 3 " in html
         assert "150 W at standby; 58 cycles, one in 2 min 0 s, 15.0 Wh each" in html

@@ -6,20 +6,15 @@ from types import SimpleNamespace
 import pytest
 
 from irtwin.errors import InputError
+from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.explain.explanation import to_text
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers import planner, provider
-from irtwin.providers.planner import Declaration, declarations, in_order, lacking
+from irtwin.providers.planner import ready
 
 IRT = "https://w3id.org/irtwin#"
-
-
-def declare(name: str, requires: str, populates: str, applies_to: str = "IR_RunProcess") -> Declaration:
-    return Declaration(
-        name,
-        IRT + applies_to,
-        frozenset(IRT + r for r in requires.split()),
-        frozenset(IRT + p for p in populates.split()),
-    )
+DECLARED = "SELECT ?name { ?one irt:applies_to ?class ; irt:Entry_Point ?name }"
 
 
 @pytest.fixture
@@ -46,27 +41,37 @@ def ends(iris: list[str]) -> list[str]:
     return [iri.rpartition("/")[2] for iri in iris]
 
 
+def waiting(graph: KnowledgeGraph) -> set[tuple[str, str, str]]:
+    asked = "SELECT ?one ?by ?lacks { ?one irt:waits_for ?by ; irt:lacks ?lacks . ?by irt:requires ?lacks }"
+    return {
+        tuple(value.rpartition("/")[2].removeprefix("irtwin#") for value in row.values()) for row in graph.query(asked)
+    }
+
+
 def test_the_ontology_declares_what_the_package_registers(graph):
-    declared = {declaration.name for declaration in declarations(graph)}
+    declared = {row["name"] for row in graph.query(DECLARED)}
     assert declared == {point.name for point in provider.entry_points(group=provider.GROUP)}
 
 
-def test_providers_follow_those_whose_work_they_require(graph):
-    names = [declaration.name for declaration in in_order(declarations(graph))]
-    assert names.index("identification") < names.index("energy")
+def test_only_what_lacks_the_result_and_has_the_premises_is_ready(graph):
+    found = {name: ends(subjects) for name, subjects in ready(graph).items()}
+    assert found == {"energy": ["A.2"], "identification": ["B"]}  # A.1 has its energy, B no twin yet
 
 
-def test_a_circle_is_named():
-    circle = [declare("hen", "egg", "hen"), declare("egg", "hen", "egg")]
-    with pytest.raises(InputError, match=r"require each other in a circle: (hen -> egg -> hen|egg -> hen -> egg)"):
-        in_order(circle)
+def test_what_is_said_by_an_inverse_counts(graph):
+    graph.update("DELETE WHERE { GRAPH ?g { ?one irt:has_Twin ?twin } }")
+    assert "energy" not in ready(graph)
+    graph.update(f"INSERT DATA {{ GRAPH <{IRT}x> {{ id:t irt:twin_of id:A }} }}")
+    assert ends(ready(graph)["energy"]) == ["A.2"]
+    assert ends(ready(graph)["identification"]) == ["B"]
 
 
-def test_only_what_lacks_the_result_and_has_the_premises_is_run(graph):
-    energy = declare("energy", "has_Series has_Twin", "Modelled_Energy Energy_Consumption")
-    assert ends(lacking(graph, energy)) == ["A.2"]  # A.1 has it, B has no twin
-    twin = declare("identification", "has_Series", "has_Twin", "Industrial_Robot")
-    assert ends(lacking(graph, twin)) == ["B"]
+def test_what_waits_says_what_it_lacks_and_why(graph):
+    reason(graph)
+    assert waiting(graph) == {("B.1", "energy", "has_Twin")}
+    (why,) = explain(graph, "id:B.1 irt:lacks irt:has_Twin")
+    assert "provider:energy irt:requires irt:has_Twin" in to_text(why)
+    assert {name: ends(some) for name, some in ready(graph).items()} == {"energy": ["A.2"], "identification": ["B"]}
 
 
 def test_a_provider_that_nobody_offers_is_named():
@@ -87,9 +92,7 @@ def test_each_runs_once_and_the_graph_is_refreshed_after_it(graph, monkeypatch):
     monkeypatch.setattr(planner, "load_provider", made_by)
     workspace = SimpleNamespace(replace_activity=lambda activity, *_, **__: kept.append(activity))
     planner.populate(workspace, graph, lambda: refreshed.append(len(ran)), lambda line: None)
-    assert ran[:1] == [("identification", "B")]
-    assert ("energy", "A.2") in ran
-    assert ("energy", "A.1") not in ran
+    assert ran == [("energy", "A.2"), ("identification", "B")]
     assert len(ran) == len(set(ran)) == len(kept)
     assert all(activity.started <= activity.ended for activity in kept)
     assert refreshed[-1] == len(ran)

@@ -11,6 +11,8 @@ from tests.report.robots import Factory, PageOf
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import render
 
+TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
+
 
 @pytest.fixture
 def graph() -> KnowledgeGraph:
@@ -34,6 +36,8 @@ def page_of(graph: KnowledgeGraph, tmp_path: Path) -> PageOf:
 @pytest.fixture(scope="session")
 def plant(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
     """A graph of four robots, for the pages of a plant."""
-    graph = KnowledgeGraph()
-    plants.fill(graph, tmp_path_factory.mktemp("plant"))
+    place = tmp_path_factory.mktemp("plant")
+    (place / "plant.toml").write_text(TARIFF, encoding="utf-8")
+    graph = KnowledgeGraph(workspace=place)
+    plants.fill(graph, place)
     return graph

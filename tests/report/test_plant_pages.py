@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import pytest
 from tests import plants
@@ -14,10 +15,9 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, IRT
 from irtwin.report.plant import individual, overview, page, robot
 from irtwin.report.plant.energies import KINDS, days, kind
-from irtwin.report.plant.tariff import Tariff
 from irtwin.report.questions import Answer, Answers, ask
 
-TARIFF = Tariff(price=0.2, currency="EUR", co2=0.4)
+UTC = ZoneInfo("UTC")
 
 
 @pytest.fixture(scope="module")
@@ -30,11 +30,9 @@ def answers(graph: KnowledgeGraph) -> Answers:
     return ask(graph, page.questions(), {})
 
 
-def drawn(answers: Answers, tariff: Tariff) -> str:
-    found = overview.overview(answers, tariff)
-    return page.render(
-        "page.html.jinja", answers, {}, found=found, tariff=tariff, trouble="", file="", excel=True, reports=[]
-    )
+def drawn(answers: Answers) -> str:
+    found = overview.overview(answers)
+    return page.render("page.html.jinja", answers, {}, found=found, trouble="", file="", excel=True, reports=[])
 
 
 def text(html: str) -> str:
@@ -42,7 +40,7 @@ def text(html: str) -> str:
 
 
 def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> None:
-    found = overview.overview(answers, TARIFF)
+    found = overview.overview(answers)
     groups = {group.kind.name if group.kind else None: [line.name for line in group.lines] for group in found.groups}
     assert groups == {"measured": ["Arm_A", "Arm_B"], "mechanical": ["Arm_C"], None: [plants.HOSTILE]}
     (mechanical,) = (group.lines[0] for group in found.groups if group.kind is KINDS["mechanical"])
@@ -56,7 +54,7 @@ def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> No
 
 
 def test_shares_of_time_and_of_energy(answers: Answers) -> None:
-    line = overview.overview(answers, TARIFF).groups[0].lines[0]
+    line = overview.overview(answers).groups[0].lines[0]
     assert line.standing == pytest.approx((0.1 * 10 + 0.2 * 20 + 0.8 * 30) / 60)
     assert line.standby == pytest.approx((500 + 1000 + 1500) / (980 + 1760 + 1568))
     assert (line.state.words, line.state.live, line.alarms, line.reidentify) == ("standing still", None, 0, True)
@@ -64,29 +62,34 @@ def test_shares_of_time_and_of_energy(answers: Answers) -> None:
 
 
 def test_a_robot_that_is_watched(answers: Answers) -> None:
-    line = overview.overview(answers, TARIFF).groups[0].lines[1]
+    line = overview.overview(answers).groups[0].lines[1]
     assert (line.name, line.state.words, line.state.live, line.alarms) == (
         "Arm_B", "no news: no state came for 2.0 s", "stale", 1
     )  # fmt: skip
-    assert "/live/Arm_B" in drawn(answers, TARIFF)
+    assert "/live/Arm_B" in drawn(answers)
 
 
 def test_energies_of_two_kinds_of_one_robot_are_two_lines(answers: Answers) -> None:
     rows = answers["energy"].rows
     other = {**next(row for row in rows if row["robot"].endswith("Arm_A")), "energy_from": "modelled", "energy_j": 9e9}
-    found = overview.overview({**answers, "energy": replace(answers["energy"], rows=(*rows, other))}, TARIFF)
+    found = overview.overview({**answers, "energy": replace(answers["energy"], rows=(*rows, other))})
     lines = [(group.kind.name, line.energy_j) for group in found.groups if group.kind for line in group.lines
              if line.name == "Arm_A"]  # fmt: skip
     assert lines == [("measured", 4600.0), ("modelled", 9e9)]
 
 
 def test_what_nobody_said_is_not_shown(answers: Answers) -> None:
-    priced, without = drawn(answers, TARIFF), drawn(answers, Tariff())
-    assert "cost, EUR" in priced and "CO₂, kg" in priced
+    nothing = dict.fromkeys(answers["tariff"].rows[0])
+    unsaid = answers | {
+        "tariff": replace(answers["tariff"], rows=(nothing,)),
+        "waiting": replace(answers["waiting"], rows=()),
+    }
+    priced, without = drawn(answers), drawn(unsaid)
+    assert "cost, EUR" in priced and "CO₂, kg" in priced and "could save a year, EUR" in priced
     assert "cost, " not in without and "CO₂, kg" not in without and "Cost and CO₂ are not shown" in without
-    assert overview.sheet(overview.overview(answers, Tariff()), Tariff()).columns == tuple(
-        name for name in overview.sheet(overview.overview(answers, TARIFF), TARIFF).columns
-        if name not in ("cost_EUR", "CO2_kg")
+    assert overview.sheet(overview.overview(unsaid)).columns == tuple(
+        name for name in overview.sheet(overview.overview(answers)).columns
+        if name not in ("cost_EUR", "CO2_kg") and not name.startswith("saving")
     )  # fmt: skip
 
 
@@ -94,19 +97,19 @@ def test_a_plant_without_robots() -> None:
     graph = KnowledgeGraph()
     graph.load_ontology()
     answers = ask(graph, page.questions(), {})
-    assert "No robots The graph knows no robot yet." in text(drawn(answers, TARIFF))
-    assert not overview.sheet(overview.overview(answers, TARIFF), TARIFF).rows
+    assert "No robots The graph knows no robot yet." in text(drawn(answers))
+    assert not overview.sheet(overview.overview(answers)).rows
 
 
 def test_alarms_are_not_counted_as_none_beside_a_contradiction(answers: Answers) -> None:
     rows = ({"contradiction": "two payloads of one run"},)
-    said = text(drawn(answers | {"contradictions": replace(answers["contradictions"], rows=rows)}, TARIFF))
+    said = text(drawn(answers | {"contradictions": replace(answers["contradictions"], rows=rows)}))
     assert "of what is not contradicted, see above" in said
-    assert "of what is not contradicted" not in text(drawn(answers, TARIFF))
+    assert "of what is not contradicted" not in text(drawn(answers))
 
 
 def test_a_piece_and_a_cycle(answers: Answers) -> None:
-    said = text(drawn(answers, TARIFF))
+    said = text(drawn(answers))
     assert "bracket Arm_A electrical, measured 40 75.0 J 15 133 J" in said.replace("\N{NO-BREAK SPACE}", " ")
     assert "not named Arm_C mechanical, by the twin – – 4 100 J" in said.replace("\N{NO-BREAK SPACE}", " ")
     rows = {row[0]: row[2:] for row in overview.made_sheet(answers).rows}
@@ -119,13 +122,13 @@ def test_more_than_a_hundred_robots(answers: Answers) -> None:
         name: replace(answer, rows=tuple(renamed(row, number) for number in range(30) for row in answer.rows))
         for name, answer in answers.items()
     }
-    found = overview.overview(answers, TARIFF)
+    found = overview.overview(answers)
     assert found.robots == sum(len(group.lines) for group in found.groups) == 120
     assert found.electrical_j == 30 * 5900.0
-    html = drawn(answers, TARIFF)
+    html = drawn(answers)
     assert html.count('class="state"') == 50 + 30 + 30  # the 60 that are measured take two pages
     assert "Page 1 of 2; 60 robots." in html and '<a href="?page=2#measured">Next</a>' in html
-    assert len(overview.sheet(found, TARIFF).rows) == 120
+    assert len(overview.sheet(found).rows) == 120
 
 
 def renamed(row: Mapping[str, Any], number: int) -> dict[str, Any]:
@@ -149,8 +152,8 @@ def test_a_robots_page(graph: KnowledgeGraph, name: str) -> None:
 
 def of_robot(graph: KnowledgeGraph, bindings: Mapping[str, str]) -> str:
     answers = ask(graph, robot.questions(), bindings)
-    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": None, "gap_report": None}
-    return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers, TARIFF.zone), **said)
+    said = {"zone": UTC, "trouble": "", "excel": False, "report": None, "gap_report": None}
+    return page.render("robot/page.html.jinja", answers, bindings, **robot.of_robot(answers, UTC), **said)
 
 
 def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
@@ -173,7 +176,7 @@ def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
 def test_a_runs_page(graph: KnowledgeGraph, name: str, words: str) -> None:
     bindings = {"run": f"{ID}run/{name}"}
     answers = ask(graph, page.questions("run"), bindings)
-    said = {"tariff": TARIFF, "trouble": "", "excel": False, "report": "Arm.html"}
+    said = {"trouble": "", "excel": False, "report": "Arm.html"}
     html = page.render("run/page.html.jinja", answers, bindings, **robot.of_run(answers), **said)
     assert words in text(html) and "<script" not in html
 

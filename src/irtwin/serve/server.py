@@ -27,7 +27,6 @@ from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.location import Location
-from irtwin.report.plant.tariff import read_tariff
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
 from irtwin.serve.catching_up import catch_up
@@ -43,6 +42,7 @@ from irtwin.serve.source import reading
 from irtwin.serve.standing import Standing
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
+from irtwin.storage.tariff import read_tariff
 
 _GRACE = 3  # s that answers under way may still take when the server stops
 _LONGEST_TOKEN = 100_000  # bytes

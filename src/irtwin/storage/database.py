@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.location import Location
 from irtwin.resources import Resources, resources_of
-from irtwin.storage import asserted, base_iri, engine, files, series_place
+from irtwin.storage import asserted, base_iri, engine, files, series_place, tariff
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.asserted_schema import AssertedFact
@@ -64,11 +64,10 @@ _FROM_A_BACKUP = (
     "again into a new one (where a server keeps the database, give --database)"
 )
 TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
-TARIFF = "plant.toml"  # what a kilowatt hour costs and emits, and the base of IRIs; a person writes it
 _MOST_OF_ROWS = 10_000_000  # bytes of a database whose rows are looked at when it is opened: 0.2 s, of a fleet seconds
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES)  # of files that rows name
 # What is written without being asked for: a link among it would lead into somebody's other files.
-_OWN = (*_FOLDERS, _DATABASE, LIVE, "graph", "reports", "alarms", "next_experiment", "mapped_rows.db", TARIFF)
+_OWN = (*_FOLDERS, _DATABASE, LIVE, "graph", "reports", "alarms", "next_experiment", "mapped_rows.db", tariff.FILE)
 
 
 class Workspace:
@@ -381,7 +380,7 @@ class Workspace:
 
     def _base(self, given: str | None) -> str:
         """Return what the IRIs of individuals begin with; keep what is said of it anew."""
-        file = self.folder / TARIFF
+        file = self.folder / tariff.FILE
         in_file = base_iri.said(file)
         base = in_file if given is None else base_iri.checked(given, "--base")
         if None not in (in_file, base) and in_file != base:

@@ -21,6 +21,7 @@ from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
+from irtwin.knowledge.tariff import ELECTRICITY
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_INFERRED,
@@ -30,6 +31,7 @@ from irtwin.knowledge.vocabulary import (
     shorten,
 )
 from irtwin.resources import Files
+from irtwin.storage.tariff import FILE
 
 MOST_TRIPLES = 100
 HOPS = 2  # from a statement's terms, before all of the graph is searched for its premises
@@ -142,7 +144,10 @@ class Explainer:
             made_of = tuple(map(self.individual, behind))
             return Explanation(what, maker, made_of, None, near.file, near.checksum, near.folder)
         if name == GRAPH_ONTOLOGY:
-            return Explanation(what, "the ontology", file=_module(triple, self._graph.resources.of("ontology")))
+            module = _module(triple, self._graph.resources.of("ontology"))
+            if module is None and triple.subject == ELECTRICITY:
+                return Explanation(what, "the plant's tariff", file=FILE)
+            return Explanation(what, "the ontology", file=module)
         return Explanation(what, f"what was written into {shorten(name)}")
 
     def _inferred(self, statement: Statement) -> Explanation:

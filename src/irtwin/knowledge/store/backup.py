@@ -32,7 +32,7 @@ from irtwin.location import Location
 from irtwin.resources import KINDS
 from irtwin.storage import engine, files
 from irtwin.storage.archive import pack, unpack
-from irtwin.storage.database import DIAGNOSES, MESHES, TARIFF, TWINS, Workspace
+from irtwin.storage.database import DIAGNOSES, MESHES, TWINS, Workspace
 from irtwin.storage.files import inside
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_row
@@ -40,12 +40,13 @@ from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
 from irtwin.storage.series import FOLDER, fetch_series, moved_out
 from irtwin.storage.series_place import asked, elsewhere, look
+from irtwin.storage.tariff import FILE as PLANT_FILE
 from irtwin.trust import trust, withdraw
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
 _NAMES = re.compile(
-    rf"{re.escape(_GRAPH)}|{re.escape(TARIFF)}"
+    rf"{re.escape(_GRAPH)}|{re.escape(PLANT_FILE)}"
     rf"|(?:rows|{'|'.join((*_FOLDERS, *KINDS))}|reports/[a-z_]+)/[A-Za-z0-9_~-][A-Za-z0-9_.~-]*"
 )
 _AT_ONCE = 5000  # rows
@@ -171,8 +172,8 @@ def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
             except FileNotFoundError:  # the journal of a run that is in the database now
                 continue
             yield f"{name}/{file.name}", target
-    if (folder / TARIFF).is_file():
-        yield TARIFF, shutil.copyfile(folder / TARIFF, held / TARIFF)
+    if (folder / PLANT_FILE).is_file():
+        yield PLANT_FILE, shutil.copyfile(folder / PLANT_FILE, held / PLANT_FILE)
 
 
 def _link(file: Path, target: Path) -> None:

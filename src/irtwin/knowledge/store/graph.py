@@ -36,6 +36,7 @@ from irtwin.knowledge.store.table import Table, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, by_doing, check
+from irtwin.knowledge.tariff import tariff_of
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
@@ -158,11 +159,10 @@ class KnowledgeGraph:
         return self.iri(value) if isinstance(value, str) else value
 
     def load_ontology(self) -> None:
-        """Put the modules of `ontology/` into the ontology's graph."""
-        modules = self.resources.paths("ontology")
-        self.replace(
-            in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY
-        )
+        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says."""
+        said = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
+        tariff = () if self._workspace is None else tariff_of(self._workspace)
+        self.replace(in_graph(chain(said, tariff), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
 
     @property
     @telling

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from irtwin.report import wording
 from irtwin.report.energy import verdict
 from irtwin.report.limits import limits
 from irtwin.report.questions import Answers, Row
 
 _HOUR = 3600.0  # s
-
-
-@dataclass(frozen=True)
-class Saving:
-    """What switching off while waiting would save at most, J, with its 95 % interval, and as a share of the energy."""
-
-    energy_j: float
-    lower_j: float
-    upper_j: float
-    share: float
-    waiting_share: float  # of the time
-    standby_w: float
 
 
 def taken(answers: Answers) -> str:
@@ -59,32 +45,16 @@ def taken(answers: Answers) -> str:
     return f"{said}."
 
 
-def saving(answers: Answers) -> Saving | None:
-    """Return what switching off while waiting would save; None where it is not known with an interval."""
-    rows = answers["waiting"].rows
-    if len(rows) != 1 or rows[0]["lower_w"] is None or not 0 < rows[0]["lower_w"] <= rows[0]["upper_w"]:
-        return None
-    row = rows[0]
-    waiting = row["waiting_s"]
-    if not waiting or row["energy_j"] <= 0:
-        return None
-    saved = row["standby_w"] * waiting
-    return Saving(
-        saved, row["lower_w"] * waiting, row["upper_w"] * waiting, saved / row["energy_j"], waiting / row["time_s"],
-        row["standby_w"],
-    )  # fmt: skip
-
-
 def could_save(answers: Answers) -> str | None:
-    """Return in words what switching off while waiting would save, None where that is not known."""
-    found = saving(answers)
-    if found is None:
+    """Return in words what switching off while waiting would save, None where that is not known with an interval."""
+    row = answers["waiting"].first
+    if row is None:
         return None
-    saved, lower, upper = map(wording.kilowatt_hours, (found.energy_j, found.lower_j, found.upper_j))
+    saved, lower, upper = map(wording.kilowatt_hours, (row["energy_j"], row["lower_j"], row["upper_j"]))
     return (
-        f"It stood still for {wording.share(found.waiting_share)} of the time. Switched off while it waits, it would "
-        f"save up to {saved} (95 % interval {lower} to {upper}), {wording.share(found.share)} of the energy: its "
-        f"standby power is {wording.quantity(found.standby_w, 'W')}. What starting up again takes is not counted."
+        f"It stood still for {wording.share(row['waiting_share'])} of the time. Switched off while it waits, it would "
+        f"save up to {saved} (95 % interval {lower} to {upper}), {wording.share(row['share'])} of the energy: its "
+        f"standby power is {wording.quantity(row['standby_w'], 'W')}. What starting up again takes is not counted."
     )
 
 

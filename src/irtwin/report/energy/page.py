@@ -79,7 +79,7 @@ def _page(
         rows={name: answer.rows for name, answer in answers.items()},
         taken=lead.taken(answers),
         could_save=lead.could_save(answers),
-        saving=lead.saving(answers),
+        saving=answers["waiting"].first,
         retimed=lead.retimed(answers),
         made=lead.made(answers),
         trust=lead.trust(answers),

@@ -33,6 +33,11 @@ MECHANICAL = Kind(
 KINDS = {kind.name: kind for kind in (MEASURED, MODELLED, MECHANICAL)}
 
 
+def kwh(joules: float | None) -> float | None:
+    """Return an energy (J) in kWh."""
+    return None if joules is None else joules / 3.6e6
+
+
 @dataclass(frozen=True)
 class Bar:
     """A day's energy; `height` is its part of the greatest, 0 to 1."""

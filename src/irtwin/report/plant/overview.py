@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
 from irtwin.report.plant.choice import ALL, GROUPS, Choice
-from irtwin.report.plant.energies import KINDS, Days, Kind, added_up, by_day, days, kind, share
+from irtwin.report.plant.energies import KINDS, Days, Kind, added_up, by_day, days, kind, kwh, share
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.plant.tariff import JOULES, Tariff
 from irtwin.report.questions import Answers, Row
 
 TREND = 30  # days in a robot's trend
@@ -26,15 +25,6 @@ class State:
     words: str
     live: str | None = None
     at: datetime | None = None
-
-
-@dataclass(frozen=True)
-class Saving:
-    """What a robot would save in a year, J, were it off while it waits; its 95 % interval, where that is known."""
-
-    energy_j: float
-    lower_j: float | None
-    upper_j: float | None
 
 
 @dataclass(frozen=True)
@@ -57,7 +47,7 @@ class Line:
     alarms: int
     reidentify: bool
     gap: Row | None
-    saving: Saving | None
+    saving: Row | None  # J in a year, were it off while it waits; its 95 % interval, where that is known
     of: str  # what it is grouped by
 
 
@@ -82,7 +72,7 @@ class Group:
     @property
     def saving_j(self) -> float | None:
         """What its robots would save in a year, as far as that is known."""
-        return _sum(line.saving.energy_j for line in self.lines if line.saving is not None)
+        return _sum(line.saving["energy_j"] for line in self.lines if line.saving is not None)
 
 
 @dataclass(frozen=True)
@@ -99,12 +89,13 @@ class Overview:
     co2_kg: float | None
     standby: float | None
     saving_j: float | None  # a year
+    tariff: Row
 
 
-def overview(answers: Answers, tariff: Tariff, asked: Choice = ALL) -> Overview:
+def overview(answers: Answers, asked: Choice = ALL) -> Overview:
     """Make the overview of the answers to `reports/plant/*.rq`, of what is asked for."""
     energies = answers["energy"].rows
-    groups = tuple(_groups(answers, tariff, asked))
+    groups = tuple(_groups(answers, asked))
     daily = by_day(answers["days"].rows)
     plants = ((one, days(added_up(of for (_, name), of in daily.items() if name == one.name), PLANT_TREND))
               for one in KINDS.values())  # fmt: skip
@@ -122,6 +113,7 @@ def overview(answers: Answers, tariff: Tariff, asked: Choice = ALL) -> Overview:
         co2_kg=_sum(group.total("co2_kg") for group in electrical),
         standby=share(_sum(row["standby_j"] for row in rows), _sum(row["modelled_j"] for row in rows)),
         saving_j=_sum(group.saving_j for group in electrical),
+        tariff=answers["tariff"].rows[0],
     )
 
 
@@ -130,25 +122,26 @@ def states(answers: Answers) -> dict[str, State]:
     return {row["robot"]: _watched(row) for row in answers["live"].rows}
 
 
-def sheet(found: Overview, tariff: Tariff) -> Sheet:
+def sheet(found: Overview) -> Sheet:
     """Return the table of robots, a row for each kind of energy of each."""
+    tariff = found.tariff
     columns = [
         "robot", "iri", "state", "energy_from", "measured_at", "runs", "run_time_s", "energy_kWh",
-        *([f"cost_{tariff.currency}"] if tariff.price is not None else []),
-        *(["CO2_kg"] if tariff.co2 is not None else []),
+        *([f"cost_{tariff['currency']}"] if tariff["price"] is not None else []),
+        *(["CO2_kg"] if tariff["co2"] is not None else []),
         "standstill_share_of_time", "standby_share_of_energy", "active_alarms", "last_gap", "gap_closed_share",
-        *(["saving_a_year_kWh", "saving_lower_kWh", "saving_upper_kWh"] if tariff.hours is not None else []),
+        *(["saving_a_year_kWh", "saving_lower_kWh", "saving_upper_kWh"] if tariff["hours"] is not None else []),
     ]  # fmt: skip
     rows = [
         (
             line.name, line.robot, line.state.words, group.kind.name if group.kind else None,
             line.measured_at if group.kind is KINDS["measured"] else None, line.runs, line.time_s,
-            None if line.energy_j is None else line.energy_j / JOULES,
-            *([line.cost] if tariff.price is not None else []),
-            *([line.co2_kg] if tariff.co2 is not None else []),
+            kwh(line.energy_j),
+            *([line.cost] if tariff["price"] is not None else []),
+            *([line.co2_kg] if tariff["co2"] is not None else []),
             line.standing, line.standby, line.alarms, line.gap["verdict"] if line.gap else None,
             line.gap["closed"] if line.gap else None,
-            *(_kwh(line.saving) if tariff.hours is not None else []),
+            *(_saving(line) if tariff["hours"] is not None else []),
         )
         for group in found.groups for line in group.lines
     ]  # fmt: skip
@@ -170,12 +163,12 @@ def made_sheet(answers: Answers) -> Sheet:
     )  # fmt: skip
 
 
-def _groups(answers: Answers, tariff: Tariff, asked: Choice) -> list[Group]:
+def _groups(answers: Answers, asked: Choice) -> list[Group]:
     known: dict[str, list[Row]] = {}
     for row in answers["energy"].rows:
         known.setdefault(row["robot"], []).append(row)
     daily = by_day(answers["days"].rows)
-    beside = _Beside(answers, tariff)
+    beside = _Beside(answers)
     lines: dict[Kind | None, list[Line]] = {}
     for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
         if not asked.finds(robot["name"], *(robot[name] for name in GROUPS)):
@@ -184,7 +177,7 @@ def _groups(answers: Answers, tariff: Tariff, asked: Choice) -> list[Group]:
         for energy in known.get(robot["robot"], [None]):
             of = kind(energy["energy_from"]) if energy is not None else None
             trend = days(daily.get((robot["robot"], energy["energy_from"]), {}), TREND) if energy is not None else None
-            lines.setdefault(of, []).append(_line(robot, energy, of, trend, tariff, beside, of_group))
+            lines.setdefault(of, []).append(_line(robot, energy, of, trend, beside, of_group))
     order = [*KINDS.values(), *(of for of in lines if of is not None and of.name not in KINDS), None]
     return [
         Group(of, tuple(sorted(lines[of], key=lambda line: _place(line, asked.sort)))) for of in order if of in lines
@@ -193,7 +186,7 @@ def _groups(answers: Answers, tariff: Tariff, asked: Choice) -> list[Group]:
 
 def _place(line: Line, by: str) -> tuple[Any, ...]:
     """Return what a line is sorted by: its group; then what is asked for, else what it could save; then its energy."""
-    saving = line.saving.energy_j if line.saving is not None else None
+    saving = line.saving["energy_j"] if line.saving is not None else None
     first = {"standby": line.standby, "standing": line.standing, "alarms": line.alarms, "runs": line.runs,
              "energy": line.energy_j}.get(by, saving)  # fmt: skip
     return line.of, -(first if first is not None else -1.0), -(line.energy_j or 0.0), line.name
@@ -202,8 +195,8 @@ def _place(line: Line, by: str) -> tuple[Any, ...]:
 class _Beside:
     """What is known of robots beside their energies, by their IRIs."""
 
-    def __init__(self, answers: Answers, tariff: Tariff) -> None:
-        self.savings = _savings(answers["waiting"].rows, tariff)
+    def __init__(self, answers: Answers) -> None:
+        self.savings = {row["robot"]: row for row in answers["waiting"].rows}
         self.standing = {row["robot"]: share(row["idle_s"], row["known_s"]) for row in answers["standstill"].rows}
         self.alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
         self.reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
@@ -211,35 +204,10 @@ class _Beside:
         self.states = states(answers)
 
 
-def _savings(rows: Iterable[Row], tariff: Tariff) -> dict[str, Saving]:
-    """Return what each robot would save in a year, by its share of time that it waits; none where nobody said hours."""
-    of_each: dict[str, list[Row]] = {}
-    for row in rows:
-        of_each.setdefault(row["robot"], []).append(row)
-    found = {}
-    for robot, its in of_each.items():
-        time = sum(row["time_s"] for row in its)
-        if tariff.hours is None or time <= 0:
-            continue
-
-        def a_year(name: str, its: list[Row] = its, time: float = time) -> float | None:
-            if any(row[name] is None for row in its):
-                return None
-            return sum(row[name] * row["waiting_s"] for row in its) / time * tariff.hours * 3600.0  # type: ignore[no-any-return]
-
-        saved = a_year("standby_w")
-        if saved is not None and saved > 0:
-            found[robot] = Saving(saved, a_year("lower_w"), a_year("upper_w"))
-    return found
-
-
-def _line(
-    robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, tariff: Tariff, beside: _Beside, of_group: str
-) -> Line:
+def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, beside: _Beside, of_group: str) -> Line:
     iri = robot["robot"]
     joules = energy["energy_j"] if energy is not None else None
     electrical = energy if of is not None and of.electrical else None
-    priced = electrical["energy_j"] if electrical is not None else None
     return Line(
         robot=iri,
         name=robot["name"],
@@ -249,8 +217,8 @@ def _line(
         runs=(energy["runs"] if energy is not None else robot["runs"]) or 0,
         time_s=energy["time_s"] if energy is not None else robot["time_s"],
         energy_j=joules,
-        cost=tariff.cost(priced),
-        co2_kg=tariff.emitted(priced),
+        cost=electrical["cost"] if electrical is not None else None,
+        co2_kg=electrical["co2_kg"] if electrical is not None else None,
         standing=beside.standing.get(iri),
         standby=share(electrical["standby_j"], electrical["modelled_j"]) if electrical is not None else None,
         trend=trend,
@@ -278,10 +246,9 @@ def _left(robot: Row) -> State:
     return State(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
 
 
-def _kwh(saving: Saving | None) -> list[float | None]:
-    if saving is None:
-        return [None, None, None]
-    return [None if one is None else one / JOULES for one in (saving.energy_j, saving.lower_j, saving.upper_j)]
+def _saving(line: Line) -> list[float | None]:
+    ends = ("energy_j", "lower_j", "upper_j")
+    return [None if line.saving is None else kwh(line.saving[end]) for end in ends]
 
 
 def _sum(values: Any) -> float | None:

@@ -11,7 +11,7 @@ import jinja2
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import choice, links, paging
-from irtwin.report.plant.tariff import JOULES
+from irtwin.report.plant.energies import kwh
 from irtwin.report.questions import Answers, Question, read_questions
 from irtwin.report.templates import environment
 
@@ -42,6 +42,7 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
         bindings=bindings,
         **{
             "number": 1,
+            "tariff": next(iter(rows.get("tariff", ())), None),
             "graph_stands": None,
             "curves": None,
             "asked": choice.ALL,
@@ -58,14 +59,10 @@ def _templates(base: str) -> jinja2.Environment:
     templates = environment(resources.shipped())
     templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
-        "page_of": of.page_of, "individual": of.individual, "tail": of.tail, "kwh": _kwh, "spaced": _spaced,
+        "page_of": of.page_of, "individual": of.individual, "tail": of.tail, "kwh": kwh, "spaced": _spaced,
          "pages": paging.pages, "on_page": paging.on_page,
     }  # fmt: skip
     return templates
-
-
-def _kwh(joules: float | None) -> float | None:
-    return None if joules is None else joules / JOULES
 
 
 def _spaced(text: str | None) -> str:

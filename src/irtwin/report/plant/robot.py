@@ -33,7 +33,8 @@ _LEDGER = {
 def questions() -> Mapping[str, Question]:
     """Return the questions of a robot's page."""
     of_the_plant = page.questions()
-    return {**page.questions("robot"), **{name: replace(of_the_plant[name], bind=("robot",)) for name in _OF_THE_PLANT}}
+    beside = {name: replace(of_the_plant[name], bind=("robot",)) for name in _OF_THE_PLANT}
+    return {**page.questions("robot"), **beside, "tariff": of_the_plant["tariff"]}
 
 
 def all_runs() -> Question:

@@ -1,4 +1,7 @@
-"""What a kilowatt hour costs and emits at this plant: said once, in `plant.toml` of the workspace, never guessed."""
+"""What a kilowatt hour costs and emits at this plant: said once, in `plant.toml` of the workspace, never guessed.
+
+The graph is told it as the individual `tariff:electricity`; what follows from it is concluded there.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,9 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from irtwin.errors import InputError
 from irtwin.storage.base_iri import KEY
-from irtwin.storage.database import TARIFF
 from irtwin.toml_text import read_toml
 
-JOULES = 3.6e6  # of a kWh
+FILE = "plant.toml"  # in a workspace; a person writes it
 _YEAR = 8784  # hours of the longest
 _KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
@@ -32,18 +34,10 @@ class Tariff:
     hours: float | None = None  # a year
     zone: ZoneInfo = field(default_factory=lambda: ZoneInfo("UTC"))
 
-    def cost(self, joules: float | None) -> float | None:
-        """Return what an electrical energy (J) costs, in the currency."""
-        return None if joules is None or self.price is None else joules / JOULES * self.price
-
-    def emitted(self, joules: float | None) -> float | None:
-        """Return the CO2 (kg) of an electrical energy (J)."""
-        return None if joules is None or self.co2 is None else joules / JOULES * self.co2
-
 
 def read_tariff(workspace: Path) -> Tariff:
     """Read `plant.toml` of a workspace; an empty tariff where there is none. InputError where it cannot be used."""
-    file = workspace / TARIFF
+    file = workspace / FILE
     if not file.exists():
         return Tariff()
     said = read_toml(file)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.report.plant.tariff import Tariff, read_tariff
+from irtwin.storage.tariff import Tariff, read_tariff
 
 
 def read(folder: Path, text: str) -> Tariff:
@@ -16,14 +16,12 @@ def read(folder: Path, text: str) -> Tariff:
 
 
 def test_nobody_said(tmp_path: Path) -> None:
-    tariff = read_tariff(tmp_path)
-    assert tariff == Tariff() and tariff.cost(3.6e6) is None and tariff.emitted(3.6e6) is None
+    assert read_tariff(tmp_path) == Tariff()
 
 
 def test_all_of_it(tmp_path: Path) -> None:
     tariff = read(tmp_path, 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.38\n')
-    assert (tariff.cost(7.2e6), tariff.currency, tariff.emitted(7.2e6)) == (0.4, "EUR", 0.76)
-    assert tariff.cost(None) is None
+    assert tariff == Tariff(price=0.2, currency="EUR", co2=0.38)
     assert read(tmp_path, "co2_kg_per_kwh = 0\n") == Tariff(co2=0.0)
 
 

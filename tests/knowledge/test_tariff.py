@@ -1,0 +1,85 @@
+"""What energy costs and emits, and what waiting takes: concluded by rules, explained down to `plant.toml`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests import plants
+
+from irtwin.errors import InputError
+from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.explain.explanation import to_text
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import term
+
+KWH = 3.6e6
+SAID = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
+
+
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
+    place = tmp_path_factory.mktemp("plant")
+    (place / "plant.toml").write_text(SAID, encoding="utf-8")
+    graph = KnowledgeGraph(workspace=place)
+    plants.fill(graph, place)
+    return graph
+
+
+def of(graph: KnowledgeGraph, subject: str, name: str) -> object:
+    """Return the value of a property, None where it has none."""
+    found = graph.query(f"SELECT ?value {{ <{graph.iri(subject)}> <{term(name)}> ?value }}")
+    return next((row["value"] for row in found), None)
+
+
+def test_a_run_and_a_robot_cost_and_emit(graph: KnowledgeGraph) -> None:
+    assert of(graph, "run/Arm_A.fit_1", "Energy_Cost") == pytest.approx(1000 / KWH * 0.2)
+    assert of(graph, "run/Arm_A.fit_1", "Currency") == "EUR"
+    assert of(graph, "run/Arm_A.fit_1", "Carbon_Emission") == pytest.approx(1000 / KWH * 0.4)
+    assert of(graph, "robot_total/Arm_A", "Energy_Cost") == pytest.approx(4600 / KWH * 0.2)
+    assert of(graph, "run/Arm_C.press_1", "Energy_Cost") is None  # mechanical
+    assert of(graph, "run/Arm_A.pick", "Energy_Cost") is None  # planned
+
+
+def test_what_a_robot_takes_while_it_waits(graph: KnowledgeGraph) -> None:
+    waiting = 10 * 0.1 + 20 * 0.2 + 30 * 0.8  # s of 60, at 50 W, 1 W up or down
+    expected = {
+        "Waiting_Time": waiting,
+        "Waiting_Share": waiting / 60,
+        "Waiting_Energy": 50 * waiting,
+        "Waiting_Energy_Lower": 49 * waiting,
+        "Waiting_Energy_Upper": 51 * waiting,
+        "Waiting_Energy_Share": 50 * waiting / 4600,
+        "Yearly_Saving": 50 * waiting / 60 * 1000 * 3600,
+        "Yearly_Saving_Lower": 49 * waiting / 60 * 1000 * 3600,
+    }
+    assert {name: of(graph, "robot/Arm_A", name) for name in expected} == pytest.approx(expected)
+    assert of(graph, "robot/Arm_D", "Waiting_Energy") is None  # no twin
+
+
+def test_without_an_interval_of_standby_there_is_none_of_the_saving(graph: KnowledgeGraph) -> None:
+    with_one = [name for name in ("Arm_A", "Arm_B") if of(graph, f"robot/{name}", "Yearly_Saving_Lower") is not None]
+    assert with_one == ["Arm_A", "Arm_B"]
+    parameter = graph.iri("parameter/Arm_B.t1.standby_power.robot.P0")
+    bare = KnowledgeGraph()
+    bare.replace(graph.quads(), "")
+    bare.update(f"DELETE WHERE {{ GRAPH ?g {{ <{parameter}> <{term('Interval_Lower')}> ?low }} }}")
+    plants.reason(bare)
+    assert of(bare, "robot/Arm_B", "Yearly_Saving") is not None
+    assert of(bare, "robot/Arm_B", "Yearly_Saving_Lower") is None
+
+
+def test_a_cost_is_explained_down_to_the_tariff(graph: KnowledgeGraph) -> None:
+    (found,) = explain(graph, "id:run/Arm_A.fit_1 irt:Energy_Cost ?")
+    said = to_text(found)
+    assert 'by the rule "cost of energy", in SHACL' in said
+    assert 'tariff:electricity irt:Energy_Price "0.2"^^xsd:double' in said and "file plant.toml" in said
+    assert 'irt:Energy_Consumption "1000"^^xsd:double' in said
+    (found,) = explain(graph, "id:robot/Arm_A irt:Yearly_Saving ?")
+    assert "tariff:electricity irt:Operating_Hours" in to_text(found)
+
+
+def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:
+    (tmp_path / "plant.toml").write_text("price_per_kwh = -1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="price_per_kwh is a number of 0 or more, not -1"):
+        KnowledgeGraph(workspace=tmp_path).load_ontology()
