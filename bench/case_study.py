@@ -1,4 +1,4 @@
-"""How long `irtwin case-study` takes, in a process of its own, and how near its plan came.
+"""How long `irtwin demo --case-study` takes, in a process of its own, and how near its plan came.
 
 In bench/: `python case_study.py`
 """
@@ -20,7 +20,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         workspace = Path(folder) / "study"
         began = time.monotonic()
-        subprocess.run([sys.executable, "-m", "irtwin", "case-study", "--workspace", str(workspace)], check=True)
+        command = [sys.executable, "-m", "irtwin", "demo", "--case-study", "--workspace", str(workspace)]
+        subprocess.run(command, check=True)
         wall, used = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
         (row,) = ask("planned_against_measured", workspace).rows
         size = (workspace / "reports" / "case_study.html").stat().st_size

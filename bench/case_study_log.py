@@ -1,4 +1,4 @@
-"""Let the simulated KR6 carry out the motion of `irtwin case-study`; writes the log that the command measures it by.
+"""Let the simulated KR6 carry out the motion of `irtwin demo --case-study`; writes the log that it is measured by.
 
 In bench/: `python case_study_log.py ../src/irtwin/demo/kuka_kr6_r700_case_study/process_measured.parquet`
 """
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from irtwin import case_study
+from irtwin.location import Location
 from irtwin.planning.plan import Plan
 from plant.arm import Payload
 from plant.campaign import check, read_campaign
@@ -29,8 +30,8 @@ _WARM_UP = 1800.0  # s at work before it
 def main() -> None:
     """Plan as the command does, and simulate."""
     with tempfile.TemporaryDirectory() as folder:
-        workspace = Path(folder)
-        case_study.identify(case_study.unpack(workspace), workspace)
+        workspace = Location(Path(folder))
+        case_study.identify(case_study.unpack(workspace.folder), workspace)
         plan, kept = case_study.plan_process(workspace)
     campaign = read_campaign("kuka_kr6_r700")
     machine = build(read_drawings(campaign.robot), campaign.seed)

@@ -72,11 +72,11 @@ def all_commands(folder: Path, data_set: Path) -> dict[str, Arguments]:
         "samples": lambda place: ["query", SAMPLES, "--workspace", place, "--format", "csv"],
         "explain": lambda place: ["explain", "? irt:Energy_Consumption ?", "--workspace", place],
         "export": lambda place: ["export", "--owl", folder / "x.owl", "--workspace", place],
-        "backup": lambda place: ["backup", folder / "kept.zip", "--workspace", place],
+        "backup": lambda place: ["workspace", "backup", folder / "kept.zip", "--workspace", place],
         "live": lambda place: ["live", "--workspace", place],
         "run": lambda place: ["run", data_set, "--workspace", place],
-        "drop": lambda place: ["drop", "First", "--workspace", place],
-        "repair": lambda place: ["repair", "--workspace", place],
+        "drop": lambda place: ["workspace", "drop", "First", "--workspace", place],
+        "repair": lambda place: ["workspace", "repair", "--workspace", place],
     }
 
 

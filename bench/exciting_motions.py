@@ -1,4 +1,4 @@
-"""Design the exciting motions that the plant's campaign runs, by `irtwin excite`'s search, one a seed.
+"""Design the exciting motions that the plant's campaign runs, by `irtwin robot excite`'s search, one a seed.
 
 The search knows the floor but not the robot's own body: `--within` gives narrower limits (deg) that keep the arm off
 it. plant/README.md gives the command.
@@ -32,7 +32,7 @@ def as_toml(motion: Excitation, seed: int) -> str:
     """Return the Fourier coefficients of a motion (rad) as the plant reads them."""
     series = motion.series
     lines = [
-        f"# irtwin excite, seed {seed}: condition number {motion.condition_number:.1f}",
+        f"# irtwin robot excite, seed {seed}: condition number {motion.condition_number:.1f}",
         f"period = {series.period}  # s",
         f"centre = {_row(series.centre)}  # rad, one a joint",
         *_matrix("sine", series.sine),

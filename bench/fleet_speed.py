@@ -1,4 +1,4 @@
-"""Robots a minute through `irtwin fleet run`, by 1, 2 and 4 processes and by Dask: `python fleet_speed.py [ROBOTS]`.
+"""Robots a minute through `irtwin run`, by 1, 2 and 4 processes and by Dask: `python fleet_speed.py [ROBOTS]`.
 
 A robot is an arm of two joints with three runs of 8 s; its time is that of reading, fitting, mapping, reasoning and its
 page, not of its samples. Every way begins with an empty folder.

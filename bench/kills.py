@@ -74,7 +74,7 @@ def prepared(folder: Path) -> dict[str, Command]:
     runs = [synthetic.as_run(synthetic.measure(robot, motion, noise=0.01)) for motion in motions]
     third = data_sets.write(folder / "third", robot, runs)
     assert data_sets.irtwin("run", first, "--workspace", base).status == 0
-    assert data_sets.irtwin("backup", folder / "kept.zip", "--workspace", base).status == 0
+    assert data_sets.irtwin("workspace", "backup", folder / "kept.zip", "--workspace", base).status == 0
     (folder / "none").mkdir()
     watched(first, folder / "watched")
     (folder / "fleet").mkdir()
@@ -97,10 +97,12 @@ def prepared(folder: Path) -> dict[str, Command]:
         "live": Command(lambda place: ["live", "--workspace", place], base, fed, grows),
         "live of 20": Command(lambda place: ["live", "--workspace", place], folder / "watched", fed_of_many, grows),
         "diagnose": Command(lambda place: ["diagnose", third, "--json", folder / "d.json", "--workspace", place], base),
-        "restore": Command(lambda place: ["restore", folder / "kept.zip", "--workspace", place], folder / "none"),
-        "repair": Command(lambda place: ["repair", "--workspace", place], base),
+        "restore": Command(
+            lambda place: ["workspace", "restore", folder / "kept.zip", "--workspace", place], folder / "none"
+        ),
+        "repair": Command(lambda place: ["workspace", "repair", "--workspace", place], base),
         "fleet": Command(
-            lambda place: ["fleet", "run", folder / "fleet", "--out", place, "--batch", 1, "--workers", 1],
+            lambda place: ["run", folder / "fleet", "--out", place, "--batch", 1, "--workers", 1],
             folder / "none",
             workspaces=lambda place: sorted(batch / "workspace" for batch in place.glob("[!.]*") if batch.is_dir()),
         ),

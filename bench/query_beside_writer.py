@@ -81,7 +81,7 @@ def running(data_sets: list[Path], place: Path) -> Iterator[None]:
                     called("run", data_set, "--workspace", place)
             for data_set in data_sets:
                 if not over.is_set():
-                    called("drop", data_set.name, "--workspace", place)
+                    called("workspace", "drop", data_set.name, "--workspace", place)
 
     with in_background(work):
         yield

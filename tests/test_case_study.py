@@ -12,6 +12,7 @@ import pytest
 from irtwin import case_study
 from irtwin.asking import ask
 from irtwin.errors import InputError
+from irtwin.location import Location
 from irtwin.planning.plan import Plan
 from irtwin.report.case_study.page import individuals
 from irtwin.report.wording import percent
@@ -29,7 +30,7 @@ Done = tuple[Said, Path]
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
     workspace = tmp_path_factory.mktemp("case") / "study"
-    return irtwin("case-study", "--workspace", workspace), workspace
+    return irtwin("demo", "--case-study", "--workspace", workspace), workspace
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_individuals_are_named_below_the_workspaces_base() -> None:
 
 
 def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
-    again = irtwin("case-study", "--workspace", done[1])
+    again = irtwin("demo", "--case-study", "--workspace", done[1])
     assert again.status == 2
     assert "is not empty; remove it, or name a new folder by --workspace" in again.err
 
@@ -85,7 +86,7 @@ def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
 def test_without_the_planners_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case_study, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r'pip install "irtwin\[plan\]"'):
-        case_study.case_study(tmp_path / "new")
+        case_study.case_study(Location(tmp_path / "new"))
     assert not (tmp_path / "new").exists()
 
 

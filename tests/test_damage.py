@@ -98,7 +98,7 @@ def test_a_damaged_table_of_the_graph_is_told_before_it_is_read(workspace: Path,
     for file in tables(workspace):
         content = file.read_bytes()
         DAMAGES[damage](file)
-        assert f"`irtwin repair --workspace {workspace}`" in one_line(workspace, "query", COUNT)
+        assert f"`irtwin workspace repair --workspace {workspace}`" in one_line(workspace, "query", COUNT)
         file.write_bytes(content)
     assert asked(workspace, NAMES)
 
@@ -108,8 +108,12 @@ def test_a_damaged_table_of_the_graph_is_told_before_it_is_read(workspace: Path,
 def test_the_files_that_a_graph_begins_with(workspace: Path, pattern: str, damage: str) -> None:
     (file,) = (workspace / "graph").glob(pattern)
     DAMAGES[damage](file)
-    for command in (("query", COUNT), ("backup", workspace / "kept.zip"), ("export", "--owl", workspace / "x.owl")):
-        assert "`irtwin repair --workspace" in one_line(workspace, *command)
+    for command in (
+        ("query", COUNT),
+        ("workspace", "backup", workspace / "kept.zip"),
+        ("export", "--owl", workspace / "x.owl"),
+    ):
+        assert "`irtwin workspace repair --workspace" in one_line(workspace, *command)
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -122,7 +126,7 @@ def test_a_log_of_the_graph_holds_nothing_once_it_is_closed(made: Path, workspac
 
 def test_a_lost_graph_is_not_begun_anew_in_silence(workspace: Path) -> None:
     shutil.rmtree(workspace / "graph")
-    for command in (("query", COUNT), ("backup", workspace / "kept.zip"), ("drop", "First")):
+    for command in (("query", COUNT), ("workspace", "backup", workspace / "kept.zip"), ("workspace", "drop", "First")):
         assert "graph is missing" in one_line(workspace, *command)
     assert not (workspace / "graph").exists()
 
@@ -130,15 +134,19 @@ def test_a_lost_graph_is_not_begun_anew_in_silence(workspace: Path) -> None:
 @pytest.mark.parametrize("damage", [each for each in DAMAGES if each != "flipped"])  # SQLite sums no contents
 def test_a_damaged_database_is_told(workspace: Path, damage: str) -> None:
     DAMAGES[damage](workspace / "irtwin.db")
-    for command in (("repair",), ("backup", workspace / "kept.zip"), ("drop", "First")):
-        assert "`irtwin restore ARCHIVE --workspace NEW`" in one_line(workspace, *command)
+    for command in (
+        ("workspace", "repair"),
+        ("workspace", "backup", workspace / "kept.zip"),
+        ("workspace", "drop", "First"),
+    ):
+        assert "`irtwin workspace restore ARCHIVE --workspace NEW`" in one_line(workspace, *command)
     assert asked(workspace, NAMES)  # the graph is whole
 
 
 def test_a_database_that_lacks_a_table_is_told(workspace: Path) -> None:
     with Workspace(workspace) as place, place.engine.begin() as connection:
         connection.exec_driver_sql("DROP TABLE joint_energy")
-    assert "table joint_energy is missing" in one_line(workspace, "drop", "First")
+    assert "table joint_energy is missing" in one_line(workspace, "workspace", "drop", "First")
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -165,7 +173,7 @@ def test_repair_makes_the_graph_of_the_database(made: Path, workspace: Path, unr
         flip(tables(workspace)[-1])
     elif damage == "folder":
         shutil.rmtree(workspace / "graph")
-    said = irtwin("repair", "--workspace", workspace)
+    said = irtwin("workspace", "repair", "--workspace", workspace)
     assert said.status == 0, said.err
     assert asked(workspace, COUNT) == asked(made, COUNT)
     assert asked(workspace, NAMES) == asked(made, NAMES)
@@ -181,13 +189,13 @@ def test_repair_looks_through_what_extends_a_workspace(workspace: Path) -> None:
         'sh:sparql [ sh:select "SELECT $this { SERVICE <http://h/> { $this ?a ?b } }" ] .'
     )
     trust_all(workspace)
-    assert f"{shape}, line 1: its SPARQL is none: column 16: SERVICE" in one_line(workspace, "repair")
+    assert f"{shape}, line 1: its SPARQL is none: column 16: SERVICE" in one_line(workspace, "workspace", "repair")
 
 
 def test_repair_says_which_files_are_lost(workspace: Path, unreasoned: None) -> None:
     file = next((workspace / "series").iterdir())
     file.unlink()
-    said = irtwin("repair", "--workspace", workspace)
+    said = irtwin("workspace", "repair", "--workspace", workspace)
     assert said.status == 2
     assert f"  series/{file.name} of " in said.err
     assert "the graph is rebuilt, but files are missing or altered (1)" in said.err
@@ -199,7 +207,7 @@ def test_a_graph_in_use_is_not_repaired(workspace: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        assert "another process has the graph open; stop it first" in one_line(workspace, "repair")
+        assert "another process has the graph open; stop it first" in one_line(workspace, "workspace", "repair")
         process.kill()
 
 
@@ -207,7 +215,7 @@ def test_a_live_run_that_a_crash_left_is_dropped_by_its_name(workspace: Path, un
     header = Header("First.live_1", "First", 0.0, ("time", "q_joint_1"))
     journal = Journal(workspace / LIVE, header)
     journal.append(np.array([[1e9, 0.0], [1e9 + 1, 0.1]]))
-    drop = ("drop", "First", "--run", "live_1")
+    drop = ("workspace", "drop", "First", "--run", "live_1")
     assert '"live_1" is being watched; stop `irtwin live` first' in one_line(workspace, *drop)
     journal.close()
     assert irtwin(*drop, "--workspace", workspace).status == 0
@@ -220,8 +228,8 @@ def test_a_dropped_robot_is_forgotten(workspace: Path, unreasoned: None) -> None
     report = workspace / "reports" / "First.html"
     report.parent.mkdir()
     report.write_text("<html>")
-    assert 'no robot "Frist" here; the nearest is "First"' in one_line(workspace, "drop", "Frist")
-    assert irtwin("drop", "First", "--workspace", workspace).status == 0
+    assert 'no robot "Frist" here; the nearest is "First"' in one_line(workspace, "workspace", "drop", "Frist")
+    assert irtwin("workspace", "drop", "First", "--workspace", workspace).status == 0
     assert not report.exists()
     with Workspace(workspace) as place, place.reading() as session:
         for table in Base.metadata.sorted_tables:
@@ -230,7 +238,7 @@ def test_a_dropped_robot_is_forgotten(workspace: Path, unreasoned: None) -> None
     assert asked(
         workspace, 'SELECT ?s { ?s ?p ?o FILTER(CONTAINS(STR(?s), "/First") || STR(?o) = "First") }'
     ).split() == ["s"]
-    assert irtwin("drop", "Second arm", "--workspace", workspace).status == 0
+    assert irtwin("workspace", "drop", "Second arm", "--workspace", workspace).status == 0
     assert asked(workspace, NAMES).split() == ["name"]
 
 
@@ -242,7 +250,7 @@ def test_a_row_that_leads_outside_removes_nothing_there(workspace: Path, tmp_pat
             if "robot_id" in table.columns:
                 database.execute(f"UPDATE {table.name} SET robot_id = '../../mine' WHERE robot_id = 'First'")
         database.commit()
-    said = irtwin("drop", "First", "--workspace", workspace)
+    said = irtwin("workspace", "drop", "First", "--workspace", workspace)
     assert said.status == 2
     assert "a row of table robot was changed by another program: robot_id '../../mine'" in said.err
     assert (tmp_path / "mine.html").read_text() == (tmp_path / "mine.run.journal").read_text() == "mine"

@@ -34,7 +34,7 @@ done.append(irtwin("query", ask, "--workspace", place, "--format", "json"))
 done.append(irtwin("explain", "?", "a", heavy, "--workspace", place))
 done.append(irtwin("explain", "?", "<https://example.org/irtwin-co2#Emission>", "?", "--workspace", place))
 done.append(irtwin("export", "--owl", place + "/whole.owl", "--workspace", place))
-done.append(irtwin("status", "--workspace", place))
+done.append(irtwin("workspace", "status", "--workspace", place))
 done.append(irtwin("diagnose", bumped, "--workspace", place, "--json", place + "/gap.json"))
 cause = "SELECT ?label { ?cause irt:caused_by_Effect ?effect . ?effect rdfs:label ?label }"
 done.append(irtwin("query", cause, "--workspace", place, "--format", "json"))

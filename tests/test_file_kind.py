@@ -24,19 +24,20 @@ DATA_SET = '[robot]\nname = "Arm"\n[[run]]\nfile = "a.csv"\nrole = "reference"\n
         ("arm.xml", "<robot/>", "a robot's description", "irtwin import LOG --robot "),
         ("model.xml", "<!-- x --><mujoco/>", "a model of MuJoCo", "irtwin diagnose DATASET --simulator "),
         ("twin.json", "{}", "a twin, if `--save-twin` wrote it", "irtwin predict "),
-        ("kept.zip", "", "an archive, if `irtwin backup` wrote it", "irtwin restore "),
-        ("robot.ttl", "", "a graph", "irtwin reason "),
+        ("kept.zip", "", "an archive, if `irtwin workspace backup` wrote it", "irtwin workspace restore "),
+        ("robot.ttl", "", "a graph", "irtwin graph reason "),
         ("set/dataset.toml", DATA_SET, "a data set of Arm, 2 runs (1 reference, 1 observed)", "irtwin check "),
         ("set/dataset.toml", "run = 1", "a data set of a robot, 0 runs", "irtwin check "),
-        ("set/irtwin.db", "", "a workspace", "irtwin status --workspace "),
+        ("set/irtwin.db", "", "a workspace", "irtwin workspace status --workspace "),
         ("set/monday.bag", "", "a folder with 1 log", "irtwin import "),
+        ("set/kr6/dataset.toml", "", "a folder with 1 data set", "irtwin run "),
     ],
 )
 def test_each_kind_is_told_with_what_takes_it(tmp_path: Path, name: str, content: str, what: str, command: str) -> None:
     file = tmp_path / name
-    file.parent.mkdir(exist_ok=True)
+    file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(content)
-    kind = file_kind(file if file.parent == tmp_path else file.parent)
+    kind = file_kind(tmp_path / Path(name).parts[0])
     assert kind.what == what
     first, _ = kind.commands[0]
     assert first.startswith(command)

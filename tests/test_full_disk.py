@@ -14,14 +14,14 @@ from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
 pytestmark = pytest.mark.slow
-BY_DAY = (("run", 1), ("run", 40), ("backup", 40))
+BY_DAY = (("run", 1), ("run", 40), ("workspace backup", 40))
 
 
 @pytest.mark.parametrize(
     ("command", "size"),
     [
         pytest.param(command, size, marks=() if (command, size) in BY_DAY else pytest.mark.nightly)
-        for command in ("run", "backup")
+        for command in ("run", "workspace backup")
         for size in (1, 8, 40, 200, 1000)
     ],
 )
@@ -32,7 +32,7 @@ def test_a_full_disk_is_one_line(small_run: Path, tmp_path: Path, command: str, 
     asked = ("query", "energy_per_run", "--workspace", workspace, "--format", "csv")
     before = irtwin(*asked).out
     done = subprocess.run(
-        [sys.executable, "-m", "irtwin", command, str(what), "--workspace", str(workspace)],
+        [sys.executable, "-m", "irtwin", *command.split(), str(what), "--workspace", str(workspace)],
         capture_output=True,
         text=True,
         check=False,

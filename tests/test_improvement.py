@@ -174,7 +174,7 @@ def test_the_log_stays_beside_the_data_set_and_is_judged(improved: tuple[Path, S
     page = (workspace / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert ">Rounds of improvement</h3>" in page
     assert "logged since and cut in time: again" in page
-    dropped = irtwin("drop", "arm_2", "--run", "again", "--workspace", workspace)
+    dropped = irtwin("workspace", "drop", "arm_2", "--run", "again", "--workspace", workspace)
     assert dropped.status == 2
     assert 'the twin was bettered or judged by "again"; it goes with its robot' in dropped.err
 

@@ -252,7 +252,7 @@ def test_a_live_run_outlasts_the_plan_of_an_earlier_data_set(watched: Path, tmp_
 
 
 def test_one_run_is_dropped_and_the_others_stay(watched: Path) -> None:
-    here = ("drop", "arm_2", "--workspace", watched, "--run")
+    here = ("workspace", "drop", "arm_2", "--workspace", watched, "--run")
     (live,) = (row["run"] for row in asking.ask("planned_against_measured", watched) if row["run"] != "done")
     for name, said in (
         ("done", "stands in the robot's data set; take it out there and run that again"),

@@ -99,7 +99,7 @@ def test_a_robot_that_cannot_be_worked_out_is_set_aside(folder: Path) -> None:
     aside = [line for line in said.err.splitlines() if "set aside" in line]
     assert len(aside) == 1
     assert "Bad is set aside: " in aside[0]
-    assert "remove it with `irtwin drop Bad`" in aside[0]
+    assert "remove it with `irtwin workspace drop Bad`" in aside[0]
 
 
 @pytest.mark.nightly

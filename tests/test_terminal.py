@@ -72,11 +72,11 @@ def test_names_neither_break_the_line_nor_steer_the_terminal(tmp_path):
     [
         ["predict", "twin.json", "run.csv", "--out", "out.parquet", "--payload-mass"],
         ["predict", "twin.json", "run.csv", "--out", "out.parquet", "--payload-com", "0", "0"],
-        ["excite", "robot.urdf", "--out", "out.csv", "--seconds"],
-        ["excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--rate"],
-        ["excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--box", "0", "0", "0", "1", "1"],
+        ["robot", "excite", "robot.urdf", "--out", "out.csv", "--seconds"],
+        ["robot", "excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--rate"],
+        ["robot", "excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--box", "0", "0", "0", "1", "1"],
         ["serve", "--timeout"],
-        ["map", "m.ttl", "--database", "sqlite://", "--out", "out.nq", "--timeout"],
+        ["graph", "map", "m.ttl", "--database", "sqlite://", "--out", "out.nq", "--timeout"],
     ],
     ids=lambda words: " ".join(words[:1] + words[-3:]),
 )

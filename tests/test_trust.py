@@ -56,10 +56,10 @@ def test_a_damaged_list_is_told(workspace: Path, config: Path, text: str) -> Non
 
 def test_a_command_lists_what_is_left_aside_until_it_is_allowed(workspace: Path) -> None:
     said = irtwin("query", "ASK {}", "--workspace", workspace)
-    assert f"left aside, as nobody trusts it: questions/mine.rq; `irtwin trust {workspace}` lists" in said.err
+    assert f"left aside, as nobody trusts it: questions/mine.rq; `irtwin workspace trust {workspace}` lists" in said.err
     assert [file.asked for file in resources_of(workspace).left_aside] == ["questions/mine.rq"]
     (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "https://a.example/secret/path"\n')
-    allowed = irtwin("trust", workspace)
+    allowed = irtwin("workspace", "trust", workspace)
     assert allowed.out.splitlines() == [
         "questions/mine.rq",
         "alarms.toml: webhook at a.example",
@@ -68,25 +68,25 @@ def test_a_command_lists_what_is_left_aside_until_it_is_allowed(workspace: Path)
     assert "left aside" not in irtwin("query", "ASK {}", "--workspace", workspace).err
     (workspace / "questions" / "later.rq").write_text("")
     assert "nobody trusts it: questions/later.rq" in irtwin("query", "ASK {}", "--workspace", workspace).err
-    assert irtwin("trust", workspace, "--withdraw").out == f"{workspace}: nothing is allowed\n"
+    assert irtwin("workspace", "trust", workspace, "--withdraw").out == f"{workspace}: nothing is allowed\n"
     assert len(resources_of(workspace).left_aside) == 2
 
 
 def test_a_workspace_that_asks_for_nothing(tmp_path: Path, config: Path) -> None:
-    assert irtwin("trust", tmp_path).out == f"{tmp_path}: asks for nothing\n"
+    assert irtwin("workspace", "trust", tmp_path).out == f"{tmp_path}: asks for nothing\n"
     assert not config.exists()
-    assert irtwin("trust", tmp_path / "none").status == 2
+    assert irtwin("workspace", "trust", tmp_path / "none").status == 2
 
 
 def test_a_copy_of_a_workspace_is_asked_for_anew(workspace: Path, tmp_path: Path) -> None:
-    irtwin("trust", workspace)
+    irtwin("workspace", "trust", workspace)
     shutil.copytree(workspace, tmp_path / "copy")
     assert len(resources_of(tmp_path / "copy").left_aside) == 1
 
 
 def test_the_list_names_places_and_holds_no_secret(workspace: Path, config: Path) -> None:
     (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "https://a.example/secret/path"\n')
-    irtwin("trust", workspace)
+    irtwin("workspace", "trust", workspace)
     given = json.loads(config.read_text())
     assert list(given) == [str(workspace.resolve())]
     assert "secret" not in config.read_text()

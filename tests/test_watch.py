@@ -63,15 +63,15 @@ def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(
     assert said.count("line refused: a line is not JSON") == 1
     assert "50 samples stored, 2 lines refused" in said
     archive = tmp_path / "kept.zip"
-    kept = in_this_process("backup", archive, "--workspace", workspace, *database)
+    kept = in_this_process("workspace", "backup", archive, "--workspace", workspace, *database)
     assert (kept.out.strip(), kept.err) == (str(archive), "")
     after = tmp_path / "after"
-    in_this_process("restore", archive, "--workspace", after, *other)
+    in_this_process("workspace", "restore", archive, "--workspace", after, *other)
     question = "SELECT (series:integral(?run, 'power', 0, 9) AS ?joules) { ?run irt:State_Time ?at }"
     for folder in (workspace, after):
         asked = in_this_process("query", question, "--format", "json", "--workspace", folder)
         assert json.loads(asked.out) == [{"joules": pytest.approx(490.0)}], asked.err
-    again = in_this_process("restore", archive, "--workspace", after, *other)
+    again = in_this_process("workspace", "restore", archive, "--workspace", after, *other)
     assert "already exists" in again.err
     assert again.status == 2
 
@@ -113,7 +113,7 @@ def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None
 
 
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
-    for command in (["live"], ["backup", tmp_path / "a.zip"]):
+    for command in (["live"], ["workspace", "backup", tmp_path / "a.zip"]):
         refused = in_this_process(*command, "--workspace", tmp_path / "none")
         assert "no workspace here" in refused.err
         assert refused.status == 2

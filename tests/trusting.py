@@ -9,6 +9,6 @@ from irtwin.upkeep import asked
 
 
 def trust_all(workspace: Path) -> Path:
-    """Do as `irtwin trust WORKSPACE`; return the workspace."""
+    """Do as `irtwin workspace trust WORKSPACE`; return the workspace."""
     trust(workspace, asked(workspace))
     return workspace

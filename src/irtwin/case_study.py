@@ -43,26 +43,34 @@ started = 2026-05-13T07:30:00Z
 _OFF = 0.02  # rad: how far the measured motion may be from the planned one
 
 
-def case_study(workspace: Path, announce: Announce = lambda line: None) -> Path:
+def case_study(
+    location: Location,
+    *,
+    base: str | None = None,
+    series_url: str | None = None,
+    announce: Announce = lambda line: None,
+) -> Path:
     """Carry the case study out in a new workspace; return the page's path. `announce` is told each step.
 
-    Raises InputError where the folder is not empty, or the extra `plan` is not installed.
+    `base`, `series_url`: as of `workflow.run`. Raises InputError where the folder is not empty, or the extra `plan` is
+    not installed.
     """
-    if workspace.exists() and (not workspace.is_dir() or any(workspace.iterdir())):
-        raise InputError(f"{workspace}: is not empty; remove it, or name a new folder by --workspace")
+    folder = location.folder
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: is not empty; remove it, or name a new folder by --workspace")
     if find_spec("ompl") is None or find_spec("toppra") is None:
         raise InputError('the case study plans a motion; install what that takes with pip install "irtwin[plan]"')
     announce(f"1. The twin: identified from {len(_RUNS)} runs, two of them held out")
-    data_set = unpack(workspace)
-    identify(data_set, workspace)
+    data_set = unpack(folder)
+    identify(data_set, location, base, series_url)
     announce("2. The process: planned from the initial to the final configuration, priced and kept")
-    plan, kept = plan_process(workspace)
+    plan, kept = plan_process(location)
     announce(f"   {plan.seconds:.2f} s; {kept.price}")
     off = add_measurement(data_set, plan)
     announce(f"3. The measurement: the simulated robot carried the plan out, {1000 * off:.1f} mrad off at most")
-    workflow.run(data_set, workspace)
+    workflow.run(data_set, location)
     announce("4. The page: read back from the graph")
-    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
+    with Workspace.existing(location) as place, KnowledgeGraph.of_workspace(place) as graph:
         robot = graph.iri(robot_iri(identifier(ROBOT)))
         described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document)
         out = place.file("reports/case_study.html")
@@ -83,16 +91,16 @@ def unpack(workspace: Path) -> Path:
     return data_set
 
 
-def identify(data_set: Path, workspace: Path) -> None:
+def identify(data_set: Path, location: Location, base: str | None = None, series_url: str | None = None) -> None:
     """Take a data set in, with the twin that is identified from it; nothing is concluded before the plan is there."""
-    with Workspace(workspace) as place, workflow.rewriting(place) as graph:
+    with Workspace.at(location, base, series_url) as place, workflow.rewriting(place) as graph:
         workflow.take_in(place, read_data_set(data_set))
         graph.load_ontology()
 
 
-def plan_process(workspace: Path) -> tuple[Plan, plans.Kept]:
+def plan_process(location: Location) -> tuple[Plan, plans.Kept]:
     """Plan the process by the twin in the workspace, and keep it there."""
-    return plans.plan(ROBOT, TASK, Location(workspace), name=PLANNED)
+    return plans.plan(ROBOT, TASK, location, name=PLANNED)
 
 
 def add_measurement(data_set: Path, plan: Plan) -> float:

@@ -55,10 +55,10 @@ def file_kind(path: Path) -> FileKind:
             (f"irtwin diagnose DATASET --twin {shown}", "where new logs differ from it, and why"),
         )
     if suffix == ".zip":
-        command = f"irtwin restore {shown} --workspace NEW"
-        return _kind("an archive, if `irtwin backup` wrote it", (command, "makes a workspace of it"))
+        command = f"irtwin workspace restore {shown} --workspace NEW"
+        return _kind("an archive, if `irtwin workspace backup` wrote it", (command, "makes a workspace of it"))
     if suffix in _GRAPHS:
-        command = f"irtwin reason {shown} --out FILE"
+        command = f"irtwin graph reason {shown} --out FILE"
         return _kind("a graph", (command, "draws all conclusions from it, by OWL 2 RL"))
     raise InputError(
         f"{path}: neither a data set, a workspace, a log ({', '.join(_LOGS)}), a robot (.urdf), a model of MuJoCo "
@@ -85,15 +85,21 @@ def _folder(path: Path, shown: str) -> FileKind:
     if Workspace.is_there(path):
         return _kind(
             "a workspace",
-            (f"irtwin status --workspace {shown}", "what is in it"),
+            (f"irtwin workspace status --workspace {shown}", "what is in it"),
             (f"irtwin serve --workspace {shown}", "its pages, in the browser, and its SPARQL endpoint"),
             (f"irtwin query --workspace {shown}", "the questions that it answers"),
+        )
+    if sets := len(list(path.glob("*/dataset.toml"))):
+        return _kind(
+            f"a folder with {sets} data set{'s' if sets > 1 else ''}",
+            (f"irtwin run {shown} --out RESULTS", "builds twin, graph and energy report of each"),
+            (f"irtwin diagnose {shown} --out RESULTS", "says of each where twin and robot differ, and why"),
         )
     logs = sorted(file for file in path.iterdir() if file.suffix.lower() in _LOGS)
     if not logs:
         raise InputError(
             f"{path}: a folder without dataset.toml, workspace or logs ({', '.join(_LOGS)}); name a file in it, or "
-            "make a data set: `irtwin init FOLDER --robot ROBOT.urdf`"
+            "make a data set: `irtwin import --robot ROBOT.urdf --out FOLDER`"
         )
     command = f"irtwin import {shown}/*{logs[0].suffix} --robot ROBOT.urdf --out FOLDER"
     said = f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}"
@@ -120,6 +126,6 @@ def _model(path: Path, shown: str) -> FileKind:
     return _kind(
         "a robot's description",
         (f"irtwin import LOG --robot {shown} --out FOLDER", "makes a data set of a log of this robot"),
-        (f"irtwin excite {shown} --seconds 20 --out motion.csv", "a motion that shows all that a twin needs"),
+        (f"irtwin robot excite {shown} --seconds 20 --out motion.csv", "a motion that shows all that a twin needs"),
         (f"irtwin robot dh {shown}", "its Denavit-Hartenberg table"),
     )

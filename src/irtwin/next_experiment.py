@@ -25,7 +25,7 @@ from irtwin.storage.gap_schema import GapDiagnosis
 
 _FOLDER = "next_experiment"
 _SECONDS = 20.0
-_ITERATIONS = 5  # a motion that moves everything; `irtwin excite` refines one
+_ITERATIONS = 5  # a motion that moves everything; `irtwin robot excite` refines one
 
 
 @dataclass(frozen=True)

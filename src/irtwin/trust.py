@@ -1,4 +1,4 @@
-"""What the files of a workspace may do, by the user's word: `irtwin trust WORKSPACE`.
+"""What the files of a workspace may do, by the user's word: `irtwin workspace trust WORKSPACE`.
 
 A workspace may come from elsewhere, and its files may ask for something: rules and templates to run, hosts to send to,
 variables of the environment, object storage to write to. Each is asked for by a name that says what. The user's word is
@@ -43,7 +43,7 @@ def withdraw(workspace: Path) -> None:
 
 def how(workspace: Path) -> str:
     """Say what lets a workspace's files do what they ask for."""
-    return f"`irtwin trust {workspace}` lists what it asks for, and allows it"
+    return f"`irtwin workspace trust {workspace}` lists what it asks for, and allows it"
 
 
 def _file() -> Path:

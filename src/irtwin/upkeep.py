@@ -130,7 +130,7 @@ def repair(location: Location, announce: Announce = lambda line: None) -> None:
     if lost:
         raise InputError(
             f"{place.folder}: the graph is rebuilt, but files are missing or altered ({len(lost)}); "
-            "run the data sets of these robots again, restore a backup, or remove the robots with `irtwin drop`"
+            "run the data sets of these robots again, restore a backup, or remove them with `irtwin workspace drop`"
         )
 
 

@@ -290,7 +290,7 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
     """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
 
     def set_aside(robot_id: str, reason: InputError) -> None:
-        announce(f"  {robot_id} is set aside: {reason}; remove it with `irtwin drop {robot_id}`")
+        announce(f"  {robot_id} is set aside: {reason}; remove it with `irtwin workspace drop {robot_id}`")
 
     return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
 

@@ -490,7 +490,7 @@ def test_a_last_line_that_is_cut_off_is_left_out_and_told(tmp_path: Path) -> Non
 
 
 def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:
-    assert irtwin("init", tmp_path / "set", "--robot", NAME).status == 0
+    assert irtwin("import", "--robot", NAME, "--out", tmp_path / "set").status == 0
     text = (tmp_path / "set" / "dataset.toml").read_text()
     for key in (*ROBOT_KEYS, *RUN_KEYS, *SHEET_KEYS, *TWIN_KEYS, *DATA_SET_KEYS):
         assert key in text or key == "dh"
@@ -501,7 +501,7 @@ def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:
     (tmp_path / "set" / "dataset.toml").write_text(filled)
     data_set = read_data_set(tmp_path / "set")
     assert [joint.gear_ratio for joint in data_set.robot.joints] == [100.0] * 6
-    assert irtwin("init", tmp_path / "set").status == 2
+    assert irtwin("import", "--out", tmp_path / "set").status == 2
     init(tmp_path / "bare", None, None)
     assert "# [robot.joint.NAME]" in (tmp_path / "bare" / "dataset.toml").read_text()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -12,10 +13,12 @@ import pytest
 from tests.data_sets import irtwin, write
 from tests.synthetic import arm, as_run, measure, swing
 
+from irtwin.bring.robot_library import robot_of
 from irtwin.check import arrangement
 from irtwin.check.check import check, checked
 from irtwin.check.rigid_body import Rows
 from irtwin.errors import InputError
+from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, read_data_set
 
@@ -115,6 +118,12 @@ def test_torques_in_a_circle_are_in_another_order():
     order = np.array([1, 2, 0, 3])
     faulty = spoilt(healthy(), lambda signals: replace(signals, torque=signals.torque[:, order]))
     assert found(faulty) == {("order", "tau_joint_1 <-> tau_joint_2 <-> tau_joint_3")}
+
+
+@pytest.mark.parametrize(("joint", "axis"), [(2, "1 0 0"), (3, "1 0 0"), (3, "0 0 1")])
+def test_the_description_of_another_robot_is_told_by_its_axes(joint: int, axis: str):
+    urdf = re.sub(rf'(name="joint_{joint}".*?<axis xyz=")[^"]*', rf"\g<1>{axis}", ROBOT.urdf, count=1)
+    assert found(replace(healthy(), robot=parse_urdf(urdf))) == {("other_robot", "robot.urdf")}
 
 
 def test_times_in_milliseconds_are_told_by_the_speeds_or_by_the_limits():
@@ -217,6 +226,15 @@ def test_measured_logs_show_what_is_known_of_them(name: str):
     known = {("held_samples", f"q_joint{k}") for k in range(1, 7)}
     known |= {("not_joint_torque", f"tau_joint{k}") for k in range(4, 7)}
     assert found(measured(name)) == (known if name == "shanghai_6r" else set())
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("log", "robot"), [("ur10", "kuka_kr6_r700"), ("ur10", "staubli_tx40"), ("airbot_coarse", "ur10")]
+)
+def test_a_measured_log_is_not_of_another_robot(log: str, robot: str):
+    described = robot_of(robot)[0] if robot == "kuka_kr6_r700" else measured(robot).robot
+    assert found(replace(measured(log), robot=described)) >= {("other_robot", "robot.urdf")}
 
 
 def joints_of(name: str) -> Iterable[int]:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -49,19 +50,7 @@ def test_help_imports_nothing_heavy():
     code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
     text = process("--help").stdout
-    for command in (
-        "run",
-        "demo",
-        "diagnose",
-        "predict",
-        "adopt",
-        "drop",
-        "repair",
-        "query",
-        "export",
-        "excite",
-        "map",
-    ):
+    for command in cli.commands:
         assert f"  {command} " in text
 
 
@@ -104,7 +93,7 @@ def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
 
 def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
     out = tmp_path / "motion.csv"
-    done = irtwin("excite", small_data_set / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
+    done = irtwin("robot", "excite", small_data_set / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
     assert done.status == 0, done.err
     assert "condition number" in done.out
     motion = np.genfromtxt(out, delimiter=",", names=True)
@@ -136,7 +125,7 @@ def test_a_withheld_effect_is_diagnosed_kept_and_adopted(small_data_set, tmp_pat
     assert "viscous" in (workspace / "reports/Arm.gap.html").read_text()
     assert "9.5,stated" in irtwin("query", "cutoffs", "--workspace", workspace, "--format", "csv").out
     assert irtwin("query", "why_more_energy", "--workspace", workspace, "--format", "csv").out.count("\n") > 1
-    adopted = irtwin("adopt", "Arm", "--workspace", workspace)
+    adopted = irtwin("improve", "Arm", "--workspace", workspace)
     assert adopted.status == 0, adopted.err
     assert "viscous friction" in irtwin("query", "twin", "--workspace", workspace, "--format", "csv").out
 
@@ -204,9 +193,15 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
         (["run", "nowhere"], "dataset.toml: not found"),
         (["query", "robots", "--workspace", "nowhere"], "no workspace here"),
         (["export", "--owl", "x.owl", "--workspace", "nowhere"], "no workspace here"),
-        (["excite", "nowhere.urdf", "--seconds", "5", "--out", "x.csv"], "nowhere.urdf: cannot be read"),
-        (["map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
+        (["robot", "excite", "nowhere.urdf", "--seconds", "5", "--out", "x.csv"], "nowhere.urdf: cannot be read"),
+        (["graph", "map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
         (["frobnicate"], "No such command"),
+        (["adopt", "Arm"], "irtwin: `irtwin adopt` is now `irtwin improve ROBOT`\n"),
+        (["restore", "kept.zip"], "irtwin: `irtwin restore` is now `irtwin workspace restore`\n"),
+        (["run", "robots", "--workers", "2"], "--workers goes with --out"),
+        (["diagnose", "robots", "--out", "o", "--json", "x"], "--json is for one data set, and does not go with --out"),
+        (["improve", "Arm", "--repair"], "--repair says how LOG was made, and goes with it"),
+        (["import", "--repair", "--out", "set"], "--repair says how to read a FILE: give one"),
     ],
 )
 def test_a_users_mistake_exits_with_2(tmp_path, monkeypatch, arguments, message):
@@ -227,7 +222,7 @@ def test_queries_cannot_reach_other_servers(workspace):
 def test_the_map_command_writes_quads(workspace, tmp_path):
     mapping = Path(__file__).parents[2] / "mappings/robot.r2rml.ttl"
     out = tmp_path / "robot.nq"
-    done = irtwin("map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
+    done = irtwin("graph", "map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
     assert done.status == 0, done.err
     assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
 
@@ -240,7 +235,7 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
         "WITH RECURSIVE t(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM t) SELECT n FROM t WHERE n < 0" ] ."""
     )
     known = ["--database", "sqlite:///x.db", "--out", "x.nq", "--timeout", "0.5"]
-    done = process("map", "x.ttl", *known, folder=tmp_path)
+    done = process("graph", "map", "x.ttl", *known, folder=tmp_path)
     assert (done.returncode, "its SQL has not ended after 0.5 s" in done.stderr) == (2, True), done.stderr
     assert not (tmp_path / "x.nq").exists()
 
@@ -259,7 +254,7 @@ def test_any_database_and_any_sparql_server_serve(small_data_set, tmp_path, new_
         assert json.loads(asked)[0]["robot"] == "Arm"
         server.update("DROP ALL")
         assert irtwin(*worst).out == "[]\n"
-        assert irtwin("repair", *there).status == 0
+        assert irtwin("workspace", "repair", *there).status == 0
         assert irtwin(*worst).out == asked
 
 
@@ -281,9 +276,9 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
 
 
 def test_reason_says_what_goes_together(tmp_path):
-    done = irtwin("reason", tmp_path / "in.ttl")
+    done = irtwin("graph", "reason", tmp_path / "in.ttl")
     assert (done.status, "Missing option '--out'" in done.err) == (2, True), done.err
-    done = irtwin("reason", "--out", tmp_path / "out.ttl")
+    done = irtwin("graph", "reason", "--out", tmp_path / "out.ttl")
     assert (done.status, "SOURCE and --out go together" in done.err) == (2, True), done.err
 
 
@@ -293,12 +288,12 @@ HAS = {
     "explain": {"--graph"},
     "alarms": {"--graph"},
     "docs": set(),  # it reads files
-    "case-study": set(),  # it makes its own workspace
 }
 
 
 def test_each_command_on_a_workspace_says_where_rows_and_graph_are():
-    for name, command in cli.commands.items():
+    groups = [command.commands for command in cli.commands.values() if isinstance(command, click.Group)]
+    for name, command in (one for commands in (cli.commands, *groups) for one in commands.items()):
         options = {option for parameter in command.params for option in parameter.opts}
         if "--workspace" in options:
             assert options & {"--database", "--graph"} == HAS.get(name, {"--database", "--graph"}), name

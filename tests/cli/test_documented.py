@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -29,7 +30,22 @@ def lines(page: str) -> list[str]:
     return sorted({one for one in commands if one.startswith("irtwin ")})
 
 
+def leaves(command: click.Command, name: str) -> Iterator[tuple[str, click.Command]]:
+    """The commands below a group, by their whole name."""
+    if isinstance(command, click.Group):
+        for each in command.commands.values():
+            yield from leaves(each, f"{name} {each.name}")
+    else:
+        yield name, command
+
+
+def examples(command: click.Command) -> list[str]:
+    return re.findall(r"Example: (.+)", command.help or "")
+
+
+LEAVES = dict(leaves(cli, "irtwin"))
 COMMANDS = [(page, line) for page in PAGES for line in lines(page)]
+COMMANDS += [(f"{name} --help", line) for name, command in LEAVES.items() for line in examples(command)]
 
 
 @pytest.mark.parametrize(("page", "line"), COMMANDS)
@@ -44,5 +60,12 @@ def test_a_command_that_is_told_is_there(page: str, line: str) -> None:
     assert [option for option in told if option not in known | {"-h"}] == [], f"{page}: {line}"
 
 
-def test_there_are_commands_to_look_at() -> None:
-    assert len({line.split()[1] for _, line in COMMANDS}) > 25
+def test_each_command_gives_an_example_of_itself() -> None:
+    assert [
+        name for name, one in LEAVES.items() if f"{name} " not in "".join(f"{line} " for line in examples(one))
+    ] == []
+
+
+def test_there_are_few_commands_at_the_top_and_all_are_told() -> None:
+    assert len(cli.commands) <= 18
+    assert {line.split()[1] for _, line in COMMANDS} >= set(cli.commands)

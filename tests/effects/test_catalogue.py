@@ -22,6 +22,9 @@ OTHER_MEANINGS = {
     "live/joint_stream.py": {"payload"},  # a field of a message
     "live/rtde.py": {"payload"},
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet
+    "simulator/fit.py": {"payload"},  # a number of a model, told as the effect of that name
+    "simulator/servos.py": {"payload", "base_tilt"},
+    "simulator/writing.py": {"payload"},
     "twin/files.py": {"rotor_inertia"},
 }
 FAMILIES = {"bodies", "friction", "transmission", "load", "environment", "sensing", "drive", "supply"}

@@ -1,4 +1,4 @@
-"""`irtwin fleet`: data sets in, results by batch, and what was set aside."""
+"""Many data sets by one command: data sets in, results by batch, and what was set aside."""
 
 import itertools
 import threading
@@ -40,7 +40,7 @@ def out(first: tuple[Path, data_sets.Said]) -> Path:
 
 
 def run(robots: Path, out: Path) -> data_sets.Said:
-    return data_sets.irtwin("fleet", "run", robots, "--out", out, "--workers", 2, "--base", BASE)
+    return data_sets.irtwin("run", robots, "--out", out, "--workers", 2, "--base", BASE)
 
 
 def test_a_fleet_is_run_into_workspaces_and_only_once(robots: Path, first: tuple[Path, data_sets.Said]) -> None:
@@ -73,26 +73,29 @@ def test_a_fleet_has_one_base_of_iris(robots: Path, out: Path) -> None:
     places = [batch.folder / "workspace" for batch in batches_of(out)]
     said = [data_sets.irtwin("query", asked, "--workspace", place).out for place in places if place.is_dir()]
     assert said and all(lines.count(f"{BASE}robot/") == 2 for lines in said)
-    other = data_sets.irtwin("fleet", "run", robots, "--out", out)
+    other = data_sets.irtwin("run", robots, "--out", out)
     assert other.status == 2
     assert f"the IRIs of this fleet begin with {BASE}; give --base {BASE}, or another --out" in other.err
-    none = data_sets.irtwin("fleet", "run", robots, "--out", out, "--base", "plant")
+    none = data_sets.irtwin("run", robots, "--out", out, "--base", "plant")
     assert none.status == 2
     assert none.err.startswith("irtwin: --base: ")
 
 
 def test_status_says_what_became_of_each(out: Path) -> None:
-    said = data_sets.irtwin("fleet", "status", out)
+    said = data_sets.irtwin("workspace", "status", "--workspace", out)
     assert said.status == 0 and said.out == "done     2\nrefused  1\n"
     assert said.err.startswith("refused: ") and said.err.count("\n") == 1
 
 
 def test_a_folder_is_of_one_kind(robots: Path, out: Path) -> None:
-    said = data_sets.irtwin("fleet", "diagnose", robots, "--out", out)
+    said = data_sets.irtwin("diagnose", robots, "--out", out)
     assert said.status == 2
     assert "holds a fleet of `run`; give `diagnose` a folder of its own" in said.err
 
 
-def test_a_folder_without_a_fleet_has_no_status(tmp_path: Path) -> None:
-    said = data_sets.irtwin("fleet", "status", tmp_path)
-    assert said.status == 2 and "holds no fleet" in said.err
+def test_a_folder_of_data_sets_alone_is_told_how_all_are_taken(robots: Path) -> None:
+    said = data_sets.irtwin("run", robots)
+    assert (
+        said.status == 2
+        and f"{robots}: holds data sets, and is none itself; name one, or take all by --out" in said.err
+    )

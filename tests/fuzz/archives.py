@@ -1,4 +1,4 @@
-"""Ways in which a backup is not what `irtwin backup` wrote: its ZIP, its list, its rows, its graph, its files."""
+"""Ways in which an archive is not what `irtwin workspace backup` wrote: its ZIP, list, rows, graph, files."""
 
 from __future__ import annotations
 

@@ -51,10 +51,10 @@ class Sound:
         self._do("live", *into, stdin=stream)
 
     def _backup(self, place: Path) -> None:
-        self._do("backup", place, "--workspace", self._part("workspace"))
+        self._do("workspace", "backup", place, "--workspace", self._part("workspace"))
 
     def _fleet(self, place: Path) -> None:
-        self._do("fleet", "diagnose", self._part("data"), "--workers", "1", "--out", place)
+        self._do("diagnose", self._part("data"), "--workers", "1", "--out", place)
 
     def _do(self, *words: str | Path, stdin: Path | None = None) -> None:
         done = in_child(partial(run_irtwin, list(map(str, words))), self._folder, stdin)

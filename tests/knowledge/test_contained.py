@@ -135,7 +135,7 @@ def concluded(workspace: Path) -> set[Quad]:
 def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(workspace: Path) -> None:
     before = concluded(workspace)
     run = second_payload(workspace)
-    done = irtwin("reason", "--workspace", workspace)
+    done = irtwin("graph", "reason", "--workspace", workspace)
     assert done.status == 3
     assert done.err.splitlines()[-1].startswith(f"irtwin: {workspace}: statements contradict each other (OWL 2 RL rule")
     lost = before - concluded(workspace)
@@ -143,7 +143,7 @@ def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(
     told = irtwin("alarms", "--workspace", workspace)
     assert told.status == 0
     assert "contradiction" in told.out and "Arm" in told.out
-    status = irtwin("status", "--workspace", workspace)
+    status = irtwin("workspace", "status", "--workspace", workspace)
     assert status.status == 2
     assert "statements contradict each other" in status.out
 
@@ -153,10 +153,10 @@ def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(
 def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> None:
     before = concluded(workspace)
     second_payload(workspace)
-    assert irtwin("reason", "--workspace", workspace).status == 3
+    assert irtwin("graph", "reason", "--workspace", workspace).status == 3
     with Workspace.existing(workspace) as place, rewriting(place) as graph:
         graph.change(set(graph.quads_in(MINE)), ())
         assert reason(graph).set_aside == ()
     assert concluded(workspace) == before
-    assert irtwin("status", "--workspace", workspace).status == 0
+    assert irtwin("workspace", "status", "--workspace", workspace).status == 0
     assert "contradiction" not in irtwin("alarms", "--workspace", workspace).out

@@ -177,7 +177,7 @@ def test_status_lists_what_extends_and_what_is_wrong(tmp_path: Path) -> None:
     Workspace(tmp_path).close()
     file = put(tmp_path, "rules/my_rules.ttl", RULE.replace("BODY", "$this a"))
     put(tmp_path, "shapes/shapes.ttl", SHAPE.replace("WHAT", "sh:minCount 1"))
-    done = irtwin("status", "--workspace", tmp_path)
+    done = irtwin("workspace", "status", "--workspace", tmp_path)
     assert done.status == 2
     lines = done.out.splitlines()
     assert any(line.split() == ["robots", "none"] for line in lines)

@@ -30,7 +30,7 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
     live = irtwin("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
     assert live.status == 0, live.err
     assert totals(workspace) == before
-    assert irtwin("reason", "--workspace", workspace).status == 0
+    assert irtwin("graph", "reason", "--workspace", workspace).status == 0
     assert totals(workspace) == before
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
         (run,) = graph.query(
@@ -38,9 +38,9 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
             "OPTIONAL { ?run irt:Modelled_Energy ?modelled } OPTIONAL { ?run irt:Energy_Consumption ?took } }"
         )
         assert run["took"] is None and run["modelled"] is not None
-    assert "1 replayed" in irtwin("status", "--workspace", workspace).out
+    assert "1 replayed" in irtwin("workspace", "status", "--workspace", workspace).out
     assert irtwin("run", small_run / "data", "--workspace", workspace).status == 0  # which keeps it
-    assert "1 replayed" in irtwin("status", "--workspace", workspace).out
+    assert "1 replayed" in irtwin("workspace", "status", "--workspace", workspace).out
 
 
 @pytest.mark.nightly

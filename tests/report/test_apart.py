@@ -99,4 +99,4 @@ def test_a_template_that_never_ends_leaves_the_workspace_whole(
     assert said.status == 2
     assert said.err.splitlines()[-1].startswith(f"irtwin: {file}: takes more than 1 s")
     assert (workspace / "reports" / "Arm.html").read_bytes() == before
-    assert irtwin("status", "--workspace", workspace).status == 0
+    assert irtwin("workspace", "status", "--workspace", workspace).status == 0

@@ -107,7 +107,7 @@ def test_the_tree_draws_what_is_below_and_escapes_what_it_is_given() -> None:
 @pytest.mark.slow
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     out = tmp_path / "ontology.html"
-    assert CliRunner().invoke(cli, ["docs", "--out", str(out)]).exit_code == 0
+    assert CliRunner().invoke(cli, ["graph", "docs", "--out", str(out)]).exit_code == 0
     assert "industrial robots and the energy they use" in out.read_text(encoding="utf-8")
 
 
@@ -130,6 +130,8 @@ def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
     assert "shifts.ttl of workspace" in text
     assert "Made &lt;by&gt; night." in text
-    done = CliRunner().invoke(cli, ["docs", "--workspace", str(tmp_path), "--out", str(tmp_path / "page.html")])
+    done = CliRunner().invoke(
+        cli, ["graph", "docs", "--workspace", str(tmp_path), "--out", str(tmp_path / "page.html")]
+    )
     assert done.exit_code == 0, done.output
     assert (tmp_path / "page.html").read_text() == text

@@ -139,6 +139,7 @@ def test_curves_zoom_and_mark_a_moment(page: tuple[Any, list[str]], plant: Serve
     page.fill("#moment", "2.5")
     until(page, "location.hash === '#t=2.5'")
     assert page.evaluate("document.getElementById('curves').layout.shapes.at(-1).x0") == 2.5
+    until(page, "document.querySelector('#stands figcaption').textContent === 'at 2.50 s'")
     page.goto(f"{plant.url}/compare?robot=Arm_A&by=run&a_run=Arm_A.fit_1&b_run=Arm_A.check_1")
     page.wait_for_selector("#curves .scatterlayer .trace", state="attached")
     assert [line[0] for line in page.evaluate(lines)] == ["fit_1", "check_1", "j1", "j1"]

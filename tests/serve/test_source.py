@@ -123,4 +123,4 @@ def test_a_graph_that_was_lost_is_told_where_the_database_is_known(tmp_path: Pat
         database = f"sqlite:///{tmp_path / 'irtwin.db'}"
         said = irtwin("serve", "--workspace", tmp_path, "--graph", empty.url, "--database", database)
         assert said.status == 2
-        assert "the graph is empty, though the database knows of robots; `irtwin repair" in said.err
+        assert "the graph is empty, though the database knows of robots; `irtwin workspace repair" in said.err

@@ -79,7 +79,7 @@ def test_the_page_of_a_workspace_says_it_too(told):
     page = (told[1].parent / "w" / "reports" / "arm.gap.html").read_text()
     for said in ("Tracking error of each run", "differs from the simulator’s", "servo stiffness", "Simulator</th>"):
         assert said in page
-    said = irtwin("adopt", "arm", "--workspace", told[1].parent / "w")
+    said = irtwin("improve", "arm", "--workspace", told[1].parent / "w")
     assert said.status == 2
     assert "its diagnosis (attributed) added nothing to the twin" in said.err
 

@@ -69,9 +69,15 @@ def test_commands_on_a_workspace_of_another_user(tmp_path: Path) -> None:
     out.mkdir()
     take_in(folder, "A")
     before = contents(given_away(folder))
-    reading = ["status", f"backup {out}/kept.zip", "query energy_per_run", "explain 'id:robot/A a'", "alarms"]
+    reading = [
+        "workspace status",
+        f"workspace backup {out}/kept.zip",
+        "query energy_per_run",
+        "explain 'id:robot/A a'",
+        "alarms",
+    ]
     reading.append(f"export --owl {out}/graph.owl")
-    writing = ["reason", "drop A", "repair", "adopt A", "demo"]
+    writing = ["graph reason", "workspace drop A", "workspace repair", "improve A", "demo"]
     said = without_rights(COMMANDS, *(f"{command} --workspace {folder}" for command in reading + writing))
     for line in said[: len(reading)]:
         assert line.startswith("0 ") and line.endswith(" False"), line

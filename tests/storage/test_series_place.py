@@ -79,7 +79,7 @@ def test_the_place_is_remembered(workspace: Workspace, objects: MemoryS3) -> Non
 def test_series_of_a_folder_stay_there(objects: MemoryS3, tmp_path: Path) -> None:
     with Workspace(tmp_path) as place:
         populate(place)
-    with pytest.raises(InputError, match="its series are in its folder already; `irtwin backup FILE`, then"):
+    with pytest.raises(InputError, match="its series are in its folder already; `irtwin workspace backup FILE`, then"):
         Workspace(tmp_path, series_url=URL)
     assert not objects.store
 
@@ -181,9 +181,11 @@ def test_storage_that_a_workspace_from_elsewhere_names_is_not_opened(workspace: 
     populate(workspace)
     there = set(objects.find("plant"))
     withdraw(workspace.folder)
-    with pytest.raises(InputError, match=r"series\.toml: names s3://plant/.*nothing is read from .* `irtwin trust "):
+    with pytest.raises(
+        InputError, match=r"series\.toml: names s3://plant/.*nothing is read from .* `irtwin workspace trust"
+    ):
         workspace.remove_orphans()
-    with pytest.raises(InputError, match="`irtwin trust "):
+    with pytest.raises(InputError, match="`irtwin workspace trust "):
         Workspace.existing(workspace.folder).read_series(f"{rows.ROBOT}.work")
     assert set(objects.find("plant")) == there
     trust_all(workspace.folder)

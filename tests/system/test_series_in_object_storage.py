@@ -121,7 +121,7 @@ def test_a_run_from_end_to_end(bucket: str, tmp_path: Path) -> None:
     data_set = small_robots.data_set(tmp_path / "dätä set", "Röbot 1")
     irtwin("run", data_set, "--series", bucket)
     assert not (tmp_path / "wörk shop" / "series").exists()
-    assert f"series      {bucket}" in irtwin("status")
+    assert f"series      {bucket}" in irtwin("workspace", "status")
     asked = 'SELECT ?run (series:mean(?run, "power", 0, 8) AS ?mean) { ?run a irt:Measured_Run }'
     found = json.loads(irtwin("query", asked, "--format", "json"))
     assert len(found) == 3
@@ -203,7 +203,7 @@ def test_a_server_that_dies_in_the_middle_changes_nothing(bucket: str, tmp_path:
 @pytest.mark.nightly
 def test_a_fleet_keeps_its_series_there(bucket: str, tmp_path: Path) -> None:
     robots, out = tmp_path / "robots", tmp_path / "out"
-    asked = ("fleet", "run", robots, "--out", out, "--workers", "1")
+    asked = ("run", robots, "--out", out, "--workers", "1")
     for seed, (name, said_once) in enumerate({"A": ("--series", bucket), "B": ()}.items()):
         small_robots.data_set(robots / name, f"Arm {name}", seed=10 * seed)
         done = in_this_process(*asked, *said_once)

@@ -18,7 +18,7 @@ _SHEET = (
     ("rotor_inertia", 0.5, "kg m^2, reflected to the joint"),
     ("torque_constant", 12.0, "N m/A, reflected to the joint: makes torque of the motor's current"),
     ("winding_resistance", 2.0, "ohm"),
-    ("acceleration", 10.0, "rad/s^2 (m/s^2): the joint's limit; irtwin excite and plan keep to it"),
+    ("acceleration", 10.0, "rad/s^2 (m/s^2): the joint's limit; irtwin robot excite and plan keep to it"),
 )
 _POWER_AT = "where power (voltage and current) is measured: mains or dc_bus"
 

@@ -1,22 +1,25 @@
-"""Do positions and torques stand in the columns of their joints, with the right sign and scale?
+"""Do positions and torques stand in the columns of their joints, with the right sign and scale, and of this robot?
 
-A reversed, exchanged or wrongly geared position, or a reversed or exchanged torque, spoils what one set of bodies
-explains of all torques, whatever the bodies' parameters are. Each such fault is undone in turn; the one without which
-torques that were held out are far better predicted is there.
+A reversed, exchanged or wrongly geared position, a reversed or exchanged torque, or the description of another robot,
+spoils what one set of bodies explains of all torques, whatever the bodies' parameters are. Each such fault is undone in
+turn; the one without which torques that were held out are far better predicted is there. Of another robot an axis that
+is turned tells: the own robot's bodies are explained no better by any.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, starmap
 
 import numpy as np
+import pinocchio as pin
 from scipy.optimize import linear_sum_assignment
 
+from irtwin.check.built_otherwise import turned_axes
 from irtwin.check.moving import Moving
 from irtwin.check.rigid_body import Rows, rows_of
-from irtwin.check.whole_body import Fitted, Held, WholeBody
+from irtwin.check.whole_body import Held, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import Finding
@@ -37,7 +40,7 @@ _SAID = {
     "order": "stand in each other's columns",
 }
 _CURE = {
-    ("sign", "q"): "change it, and that of the speed",
+    ("sign", "q"): "change it, and that of the speed, or give the URDF of the robot that was logged",
     ("sign", "tau"): "its sign is changed here, change it in the log",
     ("scale", "q"): "correct the gear ratio that was assumed",
 }
@@ -53,7 +56,13 @@ class _Fault:
     factors: np.ndarray
     order: np.ndarray
 
-    def undone(self, values: np.ndarray) -> np.ndarray:
+    def cured(self, rows: Rows) -> Rows:
+        if self.field == "torque":
+            return replace(rows, torque=self._undone(rows.torque))
+        q, dq, ddq = map(self._undone, (rows.q, rows.dq, rows.ddq))
+        return replace(rows, q=q, dq=dq, ddq=ddq)
+
+    def _undone(self, values: np.ndarray) -> np.ndarray:
         return np.asarray((values * self.factors)[:, self.order])
 
     def columns(self, robot: Robot) -> str:
@@ -63,6 +72,17 @@ class _Fault:
     def mirrors(self, other: _Fault) -> bool:
         """Whether the other is the same fault of the same joints, of the other field."""
         return (self.fault, self.joints) == (other.fault, other.joints) and self.field != other.field
+
+
+@dataclass(frozen=True, eq=False)
+class _Axis:
+    """The description of another robot: an axis of it, turned."""
+
+    joint: int
+    model: pin.Model
+
+    def cured(self, rows: Rows) -> Rows:
+        return replace(rows, model=self.model)
 
 
 def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collection[str] = ()) -> list[Finding]:
@@ -75,16 +95,20 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
         return []
     body = WholeBody.of(rows)
     own = body.held_out(rows.torque)
-    left = {fault: _undone(rows, body, fault).left for fault in _faults(rows, moving.joints)}
-    fault = min(left, key=lambda each: left[each], default=None)
-    if fault is None or body.fit(rows.torque).left < left[fault]:
+    faults: list[_Fault | _Axis] = [*_faults(rows, moving.joints), *starmap(_Axis, turned_axes(rows.model))]
+    left = {fault: _left(rows, body, fault) for fault in faults}
+    fault = min(left, key=lambda each: left[each])
+    if body.fit(rows.torque).left < left[fault]:
         return []
     held = _held(rows, body, fault)
     if own.gain(held) < np.log(_GAIN) or own.t(held) < _SURE:
         return []
+    if isinstance(fault, _Axis):
+        return [_of_another_robot(fault, own.gain(held), own.t(held), robot, moving)]
     if fault.field == "torque" and fault.fault == "scale":
         return []  # is found where its size is estimated
-    rivals = [each for each in left if each.mirrors(fault) and _held(rows, body, each).t(held) < _ALIKE]
+    mirrors = [each for each in left if isinstance(each, _Fault) and each.mirrors(fault)]
+    rivals = [each for each in mirrors if _held(rows, body, each).t(held) < _ALIKE]
     return [_finding(fault, rivals, own.gain(held), own.t(held), robot, moving)]
 
 
@@ -110,14 +134,32 @@ def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> Ro
     return replace(rows, torque=rows.torque * np.where([name in reversed_torques for name in names], -1.0, 1.0))
 
 
-def _undone(rows: Rows, body: WholeBody, fault: _Fault) -> Fitted:
-    return body.fit(fault.undone(rows.torque)) if fault.field == "torque" else _moved(rows, fault).fit(rows.torque)
+def _left(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> float:
+    body, torque = _cured(rows, body, fault)
+    return body.fit(torque).left
 
 
-def _held(rows: Rows, body: WholeBody, fault: _Fault) -> Held:
-    if fault.field == "torque":
-        return body.held_out(fault.undone(rows.torque))
-    return _moved(rows, fault).held_out(rows.torque)
+def _held(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> Held:
+    body, torque = _cured(rows, body, fault)
+    return body.held_out(torque)
+
+
+def _cured(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> tuple[WholeBody, np.ndarray]:
+    """Return what explains the cured torques, of rows whose motion `body` is of, and these torques (N, n)."""
+    cured = fault.cured(rows)
+    unmoved = cured.q is rows.q and cured.model is rows.model
+    return body if unmoved else WholeBody.of(cured), cured.torque
+
+
+def _of_another_robot(axis: _Axis, gain: float, t: float, robot: Robot, moving: Moving) -> Finding:
+    ratio, name = float(np.exp(gain)), robot.joints[axis.joint].name
+    return Finding(
+        "other_robot", "robot.urdf", moving.names, certain=True, mended=False,
+        evidence={"residual_ratio": ratio, "t": round(t, 1)},
+        say=f"robot.urdf is not of the robot that was logged: were the axis of {name} turned by 90 degrees, one set of "
+        f"bodies would explain all torques {ratio:.3g} times better; give the description of that robot, or correct "
+        "the axis",
+    )  # fmt: skip
 
 
 def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: Robot, moving: Moving) -> Finding:
@@ -133,11 +175,6 @@ def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: 
         say=f"{named} {said}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
         f"{cure}",
     )  # fmt: skip
-
-
-def _moved(rows: Rows, fault: _Fault) -> WholeBody:
-    q, dq, ddq = (fault.undone(values) for values in (rows.q, rows.dq, rows.ddq))
-    return WholeBody.of(replace(rows, q=q, dq=dq, ddq=ddq))
 
 
 def _faults(rows: Rows, joints: np.ndarray) -> Iterator[_Fault]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.check.built_otherwise import tilted
 from irtwin.check.moving import Moving
 from irtwin.check.rigid_body import Rows, rows_of
 from irtwin.check.torque import scale_findings
@@ -211,7 +212,9 @@ def _zero(rows: Rows, fitted: Fitted, tilts: tuple[np.ndarray, ...], joint: int)
 
 def _tilts(rows: Rows, fitted: Fitted) -> tuple[np.ndarray, ...]:
     """Return how the torques change as the base tilts about x and y."""
-    return tuple(_change(replace(rows, tilt=tilt), fitted) for tilt in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0)))
+    return tuple(
+        _change(replace(rows, model=tilted(rows.model, by)), fitted) for by in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0))
+    )
 
 
 def _change(turned: Rows, fitted: Fitted) -> np.ndarray:

@@ -19,22 +19,18 @@ _EXACT = 0.01  # of a torque's deviation: less is left in simulated logs alone, 
 
 @dataclass(frozen=True)
 class Rows:
-    """N samples of a robot of n joints over all runs: motion and torque, each (N, n).
+    """N samples of a robot of n joints over all runs: motion and torque, each (N, n)."""
 
-    `tilt`: by which vector (3,), rad, its base is turned from where the URDF has it.
-    """
-
-    robot: Robot
+    model: pin.Model
     q: np.ndarray
     dq: np.ndarray
     ddq: np.ndarray
     torque: np.ndarray
-    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def nominal(self) -> np.ndarray:
         """Return the torque by the URDF's bodies, (N, n)."""
-        data = self.robot.model.createData()
-        return np.array([pin.rnea(self.robot.model, data, *state) for state in self._states()])
+        data, states = self.model.createData(), zip(self.q, self.dq, self.ddq, strict=True)
+        return np.array([pin.rnea(self.model, data, *state) for state in states])
 
     def columns(self) -> np.ndarray:
         """Return what bodies and, at each joint for itself, rotor and friction add to the torques, (N, n, 14 n)."""
@@ -62,14 +58,7 @@ class Rows:
         return np.clip(shares, _EXACT, 1.0)
 
     def _regressors(self) -> np.ndarray:
-        model = self.robot.model
-        if any(self.tilt):
-            model = model.copy()
-            model.gravity.linear = model.gravity.linear + np.cross(self.tilt, model.gravity.linear)
-        return body_regressor(model, self.q, self.dq, self.ddq)
-
-    def _states(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        return list(zip(self.q, self.dq, self.ddq, strict=True))
+        return body_regressor(self.model, self.q, self.dq, self.ddq)
 
 
 def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torque: float = 0.0) -> Rows | None:
@@ -92,7 +81,7 @@ def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torq
             if motion.torque is not None
         ]
     )
-    return Rows(robot, q, dq, ddq, torque)
+    return Rows(robot.model, q, dq, ddq, torque)
 
 
 def _alike(motions: list[Motion]) -> list[Motion]:

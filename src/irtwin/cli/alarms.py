@@ -25,6 +25,9 @@ def alarms(location: Location, robot: str | None, follow: bool, config: Path | N
     With --follow, each is told once when it begins and once when it is over, as a line of JSON on standard output,
     and to the webhooks and MQTT brokers of alarms.toml. It runs beside `irtwin live`, which it never slows. Ctrl-C
     stops.
+
+    \b
+    Example: irtwin alarms --follow
     """
     from irtwin.alarms.tell import listed, tell
 

@@ -1,4 +1,4 @@
-"""Commands that begin a data set: `import` from logs of others, `init` an empty one."""
+"""The command that begins a data set: of logs of others, or an empty one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import PLACE, Number, database_option, graph_option, payload_com_option, printable, say
+from irtwin.cli.options import PLACE, Number, database_option, graph_option, payload_com_option, printable, refuse, say
 from irtwin.errors import InputError
 from irtwin.location import Location
 
@@ -18,16 +18,19 @@ if TYPE_CHECKING:
     from irtwin.bring.doubt import Answer, DoubtError
     from irtwin.bring.taken import Taken
 
-_robot_help = "URDF file, data set or its dataset.toml, or the name of a robot that is known, as kuka_kr6_r700."
 _WIDE = 160  # characters of a table that goes into a file
-_name_option = click.option("--name", metavar="NAME", help="Robot's name in the data set. Default: its description's.")
 
 
 @click.command(name="import")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PLACE)
+@click.argument("files", metavar="[FILE]...", nargs=-1, type=PLACE)
 @click.option("--out", type=PLACE, help="New folder for the data set.")
-@click.option("--robot", metavar="ROBOT", help=f"{_robot_help} Left out of a meter's log, which has no joints.")
-@_name_option
+@click.option(
+    "--robot",
+    metavar="ROBOT",
+    help="URDF file, data set or its dataset.toml, or the name of a robot that is known, as kuka_kr6_r700. Left out of "
+    "a meter's log, which has no joints.",
+)
+@click.option("--name", metavar="NAME", help="Robot's name in the data set. Default: its description's.")
 @click.option(
     "--map", "maps", metavar="COLUMN=CHANNEL[:UNIT]", multiple=True,
     help="What a column is, as J1=q_joint_1:deg, or COLUMN=- to leave it out. * stands for any letters.",
@@ -65,7 +68,7 @@ def import_(
     graph_url: str | None,
     **told: Any,
 ) -> None:
-    """Make a data set of logs in other formats, a run a file; or take back an edited OWL file.
+    """Make a data set of logs in other formats, a run a file, or an empty one; or take back an edited OWL file.
 
     FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
     Parquet or an Excel file. Without --robot it is a meter's: time, and power or energy. Units are told by names and by
@@ -73,9 +76,15 @@ def import_(
     says what to give. What was written is checked, as by `irtwin check`: where something must be cured first, the exit
     status is 2.
 
+    Without FILE the data set is empty: a folder whose dataset.toml explains each key, to fill in.
+
     With --owl, FILE is a workspace, and what was changed since `irtwin export --owl`, in Protégé or elsewhere, is shown
     and, once you agree, kept with its author and time: rows follow, and the next `irtwin run` fits the twin to them.
     What would contradict is refused, with the reason, and nothing changes.
+
+    \b
+    Example: irtwin import robot_data.csv --robot ur10 --out my_robot
+    Example: irtwin import --robot my.urdf --out my_robot
     """
     if owl is not None:
         if len(files) != 1 or out is not None or robot is not None:
@@ -83,6 +92,9 @@ def import_(
         return _take_edited(owl, Location(files[0], database, graph_url), yes, author)
     if out is None:
         raise click.UsageError("Give --out, or --owl.")
+    if not files:
+        refuse(told.keys() - {"name"} | {"names"}, "says how to read a FILE: give one")
+        return _write_empty(out, robot, told["name"])
     from irtwin.bring.bring import Options, bring, found_in
 
     options = Options(names=tuple(one.strip() for one in names.split(",")) if names else (), **told)
@@ -99,23 +111,14 @@ def import_(
     say(f"Written: {out}. Read its dataset.toml; then: {command}")
 
 
-@click.command()
-@click.argument("dataset", type=PLACE)
-@click.option("--robot", metavar="ROBOT", help=_robot_help)
-@_name_option
-def init(dataset: Path, robot: str | None, name: str | None) -> None:
-    """Write an empty data set to fill in: a folder whose dataset.toml explains each key.
+def _write_empty(out: Path, robot: str | None, name: str | None) -> None:
+    from irtwin.bring.bring import init
 
-    DATASET is a new folder. Put logs into its folder runs/ and list them in dataset.toml; `irtwin import` does both for
-    logs in other formats.
-    """
-    from irtwin.bring.bring import init as write_empty
-
-    write_empty(dataset, robot, name)
+    init(out, robot, name)
     if robot is None:
-        say(f"Put the robot's URDF into {dataset} as robot.urdf.")
-    say(f"Put runs into {dataset / 'runs'}, list them in {dataset / 'dataset.toml'}; then: irtwin check {dataset}")
-    click.echo(dataset)
+        say(f"Put the robot's URDF into {out} as robot.urdf.")
+    say(f"Put runs into {out / 'runs'}, list them in {out / 'dataset.toml'}; then: irtwin check {out}")
+    click.echo(out)
 
 
 def _take_edited(owl: Path, location: Location, yes: bool, author: str | None) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from irtwin import __version__
-from irtwin.cli import alarms, bring, fleet, graph, motion, robot, service, twin, upkeep
+from irtwin.cli import alarms, bring, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
 from irtwin.cli.sections import Sections
 from irtwin.errors import GraphBehind, InputError
@@ -76,13 +76,22 @@ def _check_system() -> None:
 @click.group(
     cls=Sections,
     sections={
-        "Bring a log": (bring.import_, bring.init, twin.check, robot.robot),
-        "Build the twin": (twin.demo, twin.run, twin.improve, twin.adopt, twin.case_study, fleet.fleet),
-        "Find the gap": (twin.diagnose, motion.excite),
+        "Bring a log": (bring.import_, twin.check, robot.robot),
+        "Build the twin": (twin.demo, twin.run, twin.improve),
+        "Find the gap": (twin.diagnose,),
         "Plan and save": (motion.plan, motion.predict, motion.optimise),
-        "Ask": (graph.query, graph.explain, graph.docs, graph.export, graph.reason, graph.map_database),
+        "Ask": (graph.query, graph.explain, graph.export, graph.graph),
         "Watch": (service.serve, service.live, alarms.alarms),
-        "Keep": (*(upkeep.status, upkeep.trust, upkeep.backup, upkeep.restore), *(upkeep.repair, upkeep.drop)),
+        "Keep": (upkeep.workspace,),
+    },
+    moved={
+        "init": "import --robot ROBOT --out FOLDER",
+        "adopt": "improve ROBOT",
+        "case-study": "demo --case-study",
+        "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
+        "excite": "robot excite",
+        **{name: f"graph {name}" for name in graph.graph.commands},
+        **{name: f"workspace {name}" for name in upkeep.workspace.commands},
     },
     context_settings={"help_option_names": ["-h", "--help"]},
 )

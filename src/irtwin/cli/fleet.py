@@ -1,89 +1,77 @@
-"""Commands on many data sets."""
+"""What makes a command on one data set take many: each by itself, with results in one folder."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import FOLDER, announce, base_option, say, series_option
-from irtwin.errors import InputError
+from irtwin.cli.options import FOLDER, announce, refuse, say
 
 if TYPE_CHECKING:
     from irtwin.fleet.fleet import Status
 
 _SHOWN = 20  # data sets that were set aside
+_BATCH = {"run": 100, "diagnose": 20}  # data sets
+_OF_MANY = ("out", "batch", "workers", "scheduler")
 
 
-@click.group()
-def fleet() -> None:
-    """Take many data sets through `run` or `diagnose`, each by itself.
+def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a command on one data set, `run` or `diagnose`, the option --out, by which it takes all below a folder.
 
-    SOURCE is a folder with data sets below it, a text file with one folder a line, or object storage such as
-    s3://bucket/robots. What is done is not done again: after a crash the same command goes on. A data set that is
-    refused costs no other. The exit status is 3 where some were set aside.
+    Of the command's own options, `shared` alone go with that.
     """
 
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def either(dataset: str, **asked: Any) -> Any:
+            many = {name: asked.pop(name) for name in _OF_MANY}
+            if many["out"] is None:
+                refuse(_OF_MANY, "goes with --out")
+                return command(dataset=Path(dataset), **asked)
+            refuse(asked.keys() - set(shared), "is for one data set, and does not go with --out")
+            return _work(kind, dataset, **many, **{name: asked[name] for name in shared})
 
-def _options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for option in (
-        click.option(
-            "--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786, in place of processes."
-        ),
-        click.option("--workers", type=click.IntRange(1, 1024), help="Processes at once. Default: one a core."),
-        click.option("--out", type=FOLDER, required=True, help="Folder for the results."),
-        click.argument("source"),
-    ):
-        command = option(command)
-    return command
+        for option in (
+            click.option("--scheduler", metavar="ADDRESS", help="With --out: of Dask, as tcp://host:8786."),
+            click.option("--workers", type=click.IntRange(1, 1024), help="With --out: processes. Default: one a core."),
+            click.option(
+                "--batch",
+                type=click.IntRange(1, 1000),
+                default=_BATCH[kind],
+                show_default=True,
+                help="With --out: data sets of one batch.",
+            ),
+            click.option(
+                "--out", type=FOLDER, help="Take every data set below DATASET; the results go to this folder."
+            ),
+            click.argument("dataset", type=click.Path()),
+        ):
+            either = option(either)
+        return either
 
-
-@fleet.command()
-@_options
-@click.option("--batch", type=click.IntRange(1, 1000), default=100, show_default=True, help="Robots in one workspace.")
-@base_option
-@series_option
-def run(**asked: Any) -> None:
-    """Build twins, graphs and reports: one workspace for each batch of robots."""
-    _work("run", **asked)
-
-
-@fleet.command()
-@_options
-def diagnose(**asked: Any) -> None:
-    """Diagnose each data set: gap.json and twin.json in a folder of its own."""
-    _work("diagnose", batch=20, **asked)
-
-
-@fleet.command()
-@click.argument("folder", type=FOLDER)
-def status(folder: Path) -> None:
-    """Show how many data sets are done, refused, failed and left."""
-    from irtwin.fleet.fleet import batches_of, status_of
-
-    batches = batches_of(folder)
-    if not batches:
-        raise InputError(f"{folder}: holds no fleet; name the --out of `irtwin fleet run` or `diagnose`")
-    _show(status_of(batches))
+    return decorate
 
 
-def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
-    from irtwin.fleet.fleet import work
-
-    found = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
-    _show(found)
-    if found.set_aside:
-        sys.exit(3)
-
-
-def _show(found: Status) -> None:
+def show(found: Status) -> None:
+    """Print how many data sets are in each state, and say which were set aside."""
     for state, number in sorted(found.counts.items()):
         click.echo(f"{state:8} {number}")
     for record in found.set_aside[:_SHOWN]:
         say(f"{record.state}: {record.data_set}: {record.said}")
     if len(found.set_aside) > _SHOWN:
         say(f"... and {len(found.set_aside) - _SHOWN} more; their records say why")
+
+
+def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
+    from irtwin.fleet.fleet import work
+
+    found = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
+    show(found)
+    if found.set_aside:
+        sys.exit(3)

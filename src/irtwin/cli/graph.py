@@ -1,4 +1,4 @@
-"""Commands on the graph: ask, explain, reason, map, export."""
+"""Commands on the graph: ask, explain, export, and the group of those that few need."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ def query(question: str | None, robot: str | None, location: Location, form: str
     """Ask the graph a question, by name or in SPARQL.
 
     Without QUESTION, the named questions are listed by theme.
+
+    \b
+    Example: irtwin query energy_per_joint --format csv
+    Example: irtwin query 'SELECT ?robot WHERE { ?robot a irt:Industrial_Robot }'
     """
     from irtwin import asking
     from irtwin.knowledge.questions.queries import to_csv, to_json
@@ -68,6 +72,9 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
     TRIPLE is subject, predicate and object: prefixed names, IRIs or literals. `?` or a missing part matches anything.
     With --verify, a line for each file says whether its SHA-256 is still the one in the graph: whole, changed, missing,
     or why that cannot be checked. The exit status is 2 unless some are the same and none is not.
+
+    \b
+    Example: irtwin explain '? irt:Energy_Consumption ?'
     """
     import json
 
@@ -93,7 +100,12 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
         sys.exit(2)
 
 
-@click.command()
+@click.group()
+def graph() -> None:
+    """Work on the graph: draw its conclusions again, document its ontology, map a database."""
+
+
+@graph.command()
 @click.argument("source", type=PLACE, required=False)
 @click.option("--out", type=FILE, help="RDF file to write, with SOURCE.")
 @click.option(
@@ -108,10 +120,13 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
     """Draw all conclusions from the graph, or from an RDF file.
 
     Without SOURCE, the conclusions in the workspace's graph are drawn again, by the ontology, mappings and rules that
-    are there now. With SOURCE, OUT gets what SOURCE says
-    and all that follows; the file suffixes decide the formats. If it contradicts itself, nothing is written and the
-    exit status is 3. In a workspace nothing is concluded from the statements that contradict each other, all else is,
-    and the exit status is 3 too.
+    are there now. With SOURCE, OUT gets what SOURCE says and all that follows; the file suffixes decide the formats. If
+    it contradicts itself, nothing is written and the exit status is 3. In a workspace nothing is concluded from the
+    statements that contradict each other, all else is, and the exit status is 3 too.
+
+    \b
+    Example: irtwin graph reason --workspace plant
+    Example: irtwin graph reason robots.ttl --out all.ttl
 
     \b
     native  OWL 2 RL by the rules that ship. Takes under 1 s for 10,000 triples.
@@ -184,6 +199,9 @@ def export(
 
     --mcap and --bag write a run: positions, speeds and torques as /joint_states, each other column as a topic of
     numbers, such as /power. Needs irtwin[ros].
+
+    \b
+    Example: irtwin export --mjcf kr6.xml --robot KUKA_KR6_R700
     """
     every = {"owl": owl, "ros": ros, "urdf": urdf, "mjcf": mjcf, "sdf": sdf, "mcap": mcap, "bag": bag}
     form, out = _asked(every)
@@ -234,7 +252,7 @@ def _export_model(form: str, out: Path, location: Location, robot: str | None, t
         say(f"irtwin: {line}")
 
 
-@click.command("map")
+@graph.command("map")
 @click.argument("mapping", type=PLACE)
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=FILE, required=True, help="N-Quads file to write.")
@@ -244,13 +262,16 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
     """Map a database to triples with an R2RML document.
 
     Works with any R2RML document and any database that SQLAlchemy supports.
+
+    \b
+    Example: irtwin graph map plant.r2rml.ttl --database sqlite:///plant.db --out plant.nq
     """
     from irtwin.knowledge.mapping import map_to_file
 
     map_to_file(mapping, database, out, base, timeout)
 
 
-@click.command()
+@graph.command()
 @click.option(
     "--out",
     type=FILE,
@@ -269,7 +290,11 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
     help="HTML file to write the competency questions to: what the graph can be asked by name.",
 )
 def docs(out: Path, workspace: Path | None, questions: Path | None) -> None:
-    """Write the ontology's documentation as one HTML page, with what installed packages add."""
+    """Write the ontology's documentation as one HTML page, with what installed packages add.
+
+    \b
+    Example: irtwin graph docs --workspace plant --questions questions.html
+    """
     from irtwin import asking
     from irtwin.report.ontology import questions_page
     from irtwin.report.ontology.page import write_page

@@ -1,10 +1,9 @@
-"""Commands on motions: plan one, price one, design one that excites every base parameter."""
+"""Commands on motions: plan one, price one, time one anew."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from irtwin.cli.options import (
     FOLDER,
     PLACE,
     Number,
-    announce,
     database_option,
     graph_option,
     located,
@@ -25,7 +23,7 @@ from irtwin.cli.options import (
     payload_com_option,
     payload_mass_option,
     say,
-    speech,
+    say_unchecked,
 )
 from irtwin.errors import InputError
 from irtwin.location import Location
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
     from irtwin.planning.cycle import Cycle
     from irtwin.plans import Kept, Timings
 
-_LONG = 30.0  # s: of less nothing is said before
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -99,6 +96,9 @@ def plan(
     "pose:x,y,z,roll,pitch,yaw", in m and rad. The motion keeps to the limits of position, speed, acceleration, jerk and
     torque. With --workspace, SOURCE is the name of a robot there; its twin plans, and the plan is kept with what it
     will take, in the graph too.
+
+    \b
+    Example: irtwin plan twin.json --from 0,-1.57,1.57,0,0,0 --to 1,-1,1,0,0,0 --objective energy --out plan.csv
     """
     from irtwin import modelling, plans
     from irtwin.planning.plan import Task
@@ -124,7 +124,7 @@ def plan(
     else:
         name = name or (out.stem if out else _PLAN)
         made, kept = plans.plan(source, task, location, name=name, out=out, rate=rate, announce=say)
-    _say_unchecked(made.checks_itself)
+    say_unchecked(made.checks_itself)
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
     click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {(kept or made).price or _NO_POWER}")
 
@@ -148,8 +148,12 @@ def predict(
     """Predict torque, power and energy of a run with a saved twin.
 
     TWIN is a file that `irtwin diagnose --save-twin` wrote. RUN is a CSV or Parquet file with the motion: a log, or
-    what `plan` or `excite` wrote. A motion that leaves the robot's limits or in which two links meet is refused. With
-    --workspace, TWIN is the name of a robot there, and the motion is kept with what it will take, in the graph too.
+    what `irtwin plan` or `irtwin robot excite` wrote. A motion that leaves the robot's limits or in which two links
+    meet is refused. With --workspace, TWIN is the name of a robot there, and the motion is kept with what it will take,
+    in the graph too.
+
+    \b
+    Example: irtwin predict twin.json motion.csv --out predicted.parquet
     """
     from irtwin import modelling, plans
 
@@ -158,7 +162,7 @@ def predict(
         expected, kept = modelling.expect(twin, run, out, **payload), None
     else:
         expected, kept = plans.predict(twin, run, location, name=name or run.stem, out=out, announce=say, **payload)
-    _say_unchecked(expected.checks_itself)
+    say_unchecked(expected.checks_itself)
     click.echo(f"{_where(out, kept)}: {(kept or expected).price or _NO_POWER}")
 
 
@@ -182,6 +186,9 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
     torque. The motion is kept as a planned run, and the robot's report says what it saves.
+
+    \b
+    Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
     """
     from irtwin import plans
 
@@ -207,56 +214,6 @@ def _cycle_text(cycle: Cycle) -> str:
     return f"{cycle.seconds:.2f} s: {cycle.energy} J, {saved} J {'less' if cycle.saved.value >= 0 else 'more'}"
 
 
-@click.command()
-@click.argument("urdf", type=PLACE)
-@click.option("--seconds", type=Number(min=1.0), required=True, help="Duration of the motion, s.")
-@click.option("--out", type=FILE, required=True, help="CSV file to write.")
-@click.option("--rate", type=Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
-@click.option(
-    "--box",
-    type=Number(-1e3, 1e3),
-    nargs=6,
-    metavar="X Y Z X Y Z",
-    help="Keep the flange in a box, given by two corners in the base frame, m. Links always stay above the floor.",
-)
-def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
-    """Design a motion that excites every base parameter.
-
-    The motion is a finite Fourier series. It starts and ends at rest and keeps the joint limits, between samples too.
-    Links with collision shapes keep off one another, and torque by the URDF's bodies within its limits.
-    Ctrl-C keeps the best motion so far.
-    """
-    from irtwin.identification import excitation
-    from irtwin.identification.motion_limits import Box
-    from irtwin.robot.collision import CollisionModel
-    from irtwin.robot.urdf import read_urdf
-
-    robot = read_urdf(urdf)
-    within = None
-    if box is not None:
-        x, y, z, *other = box
-        within = Box(
-            lower=(min(x, other[0]), min(y, other[1]), min(z, other[2])),
-            upper=(max(x, other[0]), max(y, other[1]), max(z, other[2])),
-        )
-    checks_itself = CollisionModel(robot).checks_itself
-    expected = excitation.expected_seconds(len(robot.joints), seconds)
-    if expected > _LONG:
-        announce(f"  {len(robot.joints)} joints: about {10 * round(expected / 10)} s of processor")
-    motion = excitation.excite(robot, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
-    motion.write_csv(out)
-    _say_unchecked(checks_itself)
-    ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
-    if ended or not speech.quiet:
-        click.echo(f"\n{ended}This is the best motion so far." if ended else "", err=True)
-    click.echo(
-        f"{out}: condition number {motion.condition_number:.1f}, "
-        f"{motion.limit_margin:.1%} margin to the joint limits, "
-        + ("no wall within reach" if motion.clearance == math.inf else f"{motion.clearance:.3f} m to the nearest wall")
-    )
-
-
 def _check_kept(location: Location | None, name: str | None, out: Path | None) -> None:
     if location is None and out is None:
         raise InputError("nothing says where the motion is to go; give --out FILE, --workspace FOLDER, or both")
@@ -267,25 +224,3 @@ def _check_kept(location: Location | None, name: str | None, out: Path | None) -
 def _where(out: Path | None, kept: Kept | None) -> str:
     places = [str(out)] if out else []
     return " and ".join([*places, f'planned run "{kept.run}" of {kept.robot}'] if kept else places)
-
-
-def _say_unchecked(checks_itself: bool) -> None:
-    if not checks_itself:
-        say("The URDF has no collision shapes, so it was not checked whether the robot meets itself.")
-
-
-def _excitation_progress() -> Callable[[int, float, float], None]:
-    """Return a progress line that is rewritten in a terminal, and said every few seconds in a log."""
-    shown = [-5.0]
-
-    def progress(iteration: int, condition: float, elapsed: float) -> None:
-        if speech.quiet:
-            return
-        line = f"{elapsed:5.0f} s  step {iteration:4d}  condition number {condition:8.1f}"
-        if sys.stderr.isatty():
-            click.echo(f"\r{line}", err=True, nl=False)
-        elif elapsed - shown[0] >= 5.0:
-            shown[0] = elapsed
-            click.echo(line, err=True)
-
-    return progress

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from irtwin.location import WORKSPACE, Location
 
@@ -136,9 +137,24 @@ def say(line: str) -> None:
     click.echo(printable(line), err=True)
 
 
+def say_unchecked(checks_itself: bool) -> None:
+    """Say of a motion what could not be checked of it, where that is so."""
+    if not checks_itself:
+        say("The URDF has no collision shapes, so it was not checked whether the robot meets itself.")
+
+
 def printable(line: str) -> str:
     """Return a line without what breaks lines or steers a terminal: names that were read may hold it."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+
+
+def refuse(names: Collection[str], why: str) -> None:
+    """Raise UsageError where one of these parameters was given: what it is for was not."""
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        given = context.get_parameter_source(str(parameter.name)) is ParameterSource.COMMANDLINE
+        if given and parameter.name in names:
+            raise click.UsageError(f"{parameter.opts[0]} {why}.")
 
 
 def tell_contradictions(location: Location) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from irtwin.cli.exciting_motion import excite
 from irtwin.cli.options import FILE, FOLDER, PLACE, printable, say
 from irtwin.errors import InputError
 
@@ -30,11 +31,14 @@ _json = click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 
 @click.group()
 def robot() -> None:
-    """Show what a robot's description says, in other forms.
+    """Take a robot's description alone: its kinematics, its equations, other forms, a motion that excites it.
 
     SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lengths are in m, angles in rad, joint positions in
     rad (m where a joint slides). Poses are in the frame of the first link; roll, pitch and yaw turn about its x, y, z.
     """
+
+
+robot.add_command(excite)
 
 
 @robot.command()
@@ -53,6 +57,9 @@ def dh(source: Path, convention: str, link: str | None, as_json: bool) -> None:
 
     SOURCE is a URDF file, a data set's folder, or its dataset.toml. The table is exact for any axes: what the rows
     cannot hold stands in the transforms before the first (base) and after the last (tool).
+
+    \b
+    Example: irtwin robot dh my.urdf
     """
     from irtwin.robot.chain_table import deviation, table_of
     from irtwin.robot.kinematics import flange
@@ -111,6 +118,9 @@ def urdf(source: Path, out: Path) -> None:
 
     SOURCE is a data set's folder or its dataset.toml. Its Denavit-Hartenberg table becomes a URDF; where it has a URDF,
     that is written.
+
+    \b
+    Example: irtwin robot urdf my_robot --out my.urdf
     """
     from irtwin.signals.log import read_robot
     from irtwin.storage.files import check_place, write
@@ -128,6 +138,9 @@ def ros(source: Path, out: Path) -> None:
     """Write a robot as a ROS package.
 
     SOURCE is a URDF file, a data set's folder, or its dataset.toml. The package is that of `irtwin export --ros`.
+
+    \b
+    Example: irtwin robot ros my.urdf --out my_package
     """
     from irtwin.ros.ros_package import write_package
     from irtwin.signals.log import read_robot
@@ -148,6 +161,9 @@ def fk(source: Path, q: tuple[float, ...], file: Path | None, link: str | None, 
 
     This is forward kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Q is a number for each
     joint, base to flange, in rad (m where it slides). The poses of a file are printed as CSV.
+
+    \b
+    Example: irtwin robot fk my.urdf 0 -1.57 1.57 0 0 0
     """
     import numpy as np
 
@@ -256,6 +272,9 @@ def ik(source: Path, pose: tuple[float, ...], start: str | None, link: str | Non
     This is inverse kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lists all that a
     search within the joint limits finds, the nearest first; those that differ by whole turns of a joint count as one.
     Where the pose is out of reach, says by how much.
+
+    \b
+    Example: irtwin robot ik my.urdf --pose 0.4 0 0.6 0 1.57 0
     """
     import numpy as np
     import pinocchio as pin
@@ -308,6 +327,9 @@ def equations(source: Path, joint: str | None, latex: bool) -> None:
     SOURCE is a URDF file, a data set's folder, or its dataset.toml, of a robot of up to three joints. Prints each
     joint's torque by position (q), speed (dq) and acceleration (ddq), for rigid bodies of the masses in the
     description, without friction and rotors. Coefficients have six digits. Needs irtwin[symbolic].
+
+    \b
+    Example: irtwin robot equations my.urdf --latex
     """
     from irtwin.robot.equations import equations as derive
     from irtwin.signals.log import read_robot

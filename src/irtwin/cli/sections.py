@@ -8,15 +8,26 @@ from typing import Any
 
 import click
 
+from irtwin.errors import InputError
+
 _WHOLE = 1000  # characters: a sentence is wrapped, not cut
 
 
 class Sections(click.Group):
-    """A group whose help lists commands by what people do, and which answers `irtwin FILE`."""
+    """A group whose help lists commands by what people do, and which answers `irtwin FILE`.
 
-    def __init__(self, *arguments: Any, sections: Mapping[str, Sequence[click.Command]], **named: Any) -> None:
+    `moved` says of names that commands had before what they are called now.
+    """
+
+    def __init__(
+        self,
+        *arguments: Any,
+        sections: Mapping[str, Sequence[click.Command]],
+        moved: Mapping[str, str],
+        **named: Any,
+    ) -> None:
         super().__init__(*arguments, **named)
-        self._sections = sections
+        self._sections, self._moved = sections, moved
         for command in (one for commands in sections.values() for one in commands):
             self.add_command(command)
 
@@ -29,7 +40,12 @@ class Sections(click.Group):
     def resolve_command(
         self, context: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for: of a file's name, one that says what the file is for."""
+        """Return the command that is asked for: of a file's name, one that says what the file is for.
+
+        Raises InputError for a name that a command had before.
+        """
+        if now := self._moved.get(args[0]):
+            raise InputError(f"`irtwin {args[0]}` is now `irtwin {now}`")
         if args[0] not in self.commands and (path := Path(args[0])).exists():
             return None, click.Command("file", callback=lambda: _tell(path)), args[1:]
         return super().resolve_command(context, args)

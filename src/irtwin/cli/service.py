@@ -44,6 +44,9 @@ def serve(
     With --graph the pages and the endpoint ask the server that keeps the graph. Functions of series are not there
     then, and a query that is cancelled may go on at that server, up to its own limit. --database is read at the
     start, as the graph must know of robots if the database does, and to catch up.
+
+    \b
+    Example: irtwin serve --workspace plant
     """
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
@@ -81,6 +84,10 @@ def live(
     1970), position, velocity, effort, and optionally temperature, power and name; the first line may say in `performs`
     which plan is carried out. Ctrl-C stops; every sample that was read is stored. While it runs, `irtwin serve` shows
     the robots at /live.
+
+    \b
+    Example: irtwin live < states.jsonl
+    Example: irtwin live --rtde 192.168.0.20 --robot UR10
     """
     from irtwin.live.watch import watch
     from irtwin.report.extensions import check

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from irtwin.cli.fleet import of_many
 from irtwin.cli.options import (
     FILE,
     FOLDER,
@@ -23,6 +24,7 @@ from irtwin.cli.options import (
     locating,
     payload_com_option,
     payload_mass_option,
+    refuse,
     say,
     series_option,
     tell_contradictions,
@@ -34,19 +36,28 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("dataset", type=PLACE)
+@of_many("run", "base", "series_url")
 @located
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @base_option
 @series_option
 def run(dataset: Path, location: Location, **asked: Any) -> None:
-    """Build a twin, a graph and a report from a data set.
+    """Build a twin, a graph and a report from a data set, or from many.
 
     DATASET is a folder with dataset.toml, a URDF and one CSV or Parquet file per run.
 
     The base of IRIs may stand in `plant.toml` of the workspace instead, as base_iri = "https://plant.example/energy/".
     Where statements in the graph contradict each other, nothing is concluded from these alone; they are said, and the
     exit status is 3.
+
+    With --out, DATASET is a folder with data sets below it, a text file with one folder a line, or object storage such
+    as s3://bucket/robots. Each is taken by itself, a batch of them shares a workspace below --out, and one that is
+    refused costs no other. What is done is not done again: after a crash the same command goes on, and `irtwin
+    workspace status --workspace RESULTS` counts. The exit status is 3 where some were set aside.
+
+    \b
+    Example: irtwin run my_robot --workspace plant
+    Example: irtwin run robots/ --out results
     """
     from irtwin.workflow import run as run_all
 
@@ -63,6 +74,9 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 
     What the data leave no doubt of is mended where that is possible (never in your files). The exit status is 2 where
     something must be cured first; `run` and `diagnose` stop there, too.
+
+    \b
+    Example: irtwin check my_robot
     """
     from irtwin import modelling
 
@@ -81,45 +95,39 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @located
 @base_option
 @series_option
-@click.option("--no-open", is_flag=True, help="Do not show the report in a browser.")
-def demo(location: Location, base: str | None, series_url: str | None, no_open: bool) -> None:
-    """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser."""
-    from irtwin.workflow import run as run_all
-    from irtwin.workflow import unpack_demo
-
-    data_set = unpack_demo(location.folder)
-    announce(f"The example data set is in {data_set}. Use it as a template for your own.")
-    report = run_all(data_set, location, base=base, series_url=series_url, announce=announce)
-    click.echo(f"\nOpen the report in a browser: {report.resolve()}")
-    if not no_open and sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
-        webbrowser.open(report.resolve().as_uri())
-    click.echo(f"Ask the graph:                irtwin query energy_per_joint --workspace {location.folder}")
-
-
-@click.command(name="case-study")
+@click.option("--no-open", is_flag=True, help="Do not show the page in a browser.")
 @click.option(
-    "--workspace",
-    type=FOLDER,
-    default=Path("irtwin-case-study"),
-    show_default=True,
-    help="New folder to work in.",
+    "--case-study", is_flag=True, help="Plan, price, measure and show a motion instead, as the seed paper does."
 )
-def case_study(workspace: Path) -> None:
-    """Plan, price, measure and show a motion, as the seed paper does.
+def demo(location: Location, no_open: bool, case_study: bool, **asked: Any) -> None:
+    """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser.
 
-    The KUKA KR6 R700 goes from an initial to a final configuration. Its twin plans the motion and says what it will
-    take; that is kept and mapped, and read back from the graph. A simulated robot carries it out. One page shows all of
-    it beside the paper's figures. It needs the extra `plan`.
+    With --case-study, its twin plans a motion from an initial to a final configuration and says what it will take; that
+    is kept and mapped, and read back from the graph. A simulated robot carries it out, and one page shows all of it
+    beside the paper's figures. It needs a new workspace, and the extra `plan`.
+
+    \b
+    Example: irtwin demo --workspace my_demo
     """
-    from irtwin.case_study import case_study as carry_out
+    if case_study:
+        from irtwin.case_study import case_study as carry_out
 
-    page = carry_out(workspace, announce)
+        page, question = carry_out(location, announce=announce, **asked), "planned_against_measured"
+    else:
+        from irtwin.workflow import run as run_all
+        from irtwin.workflow import unpack_demo
+
+        data_set = unpack_demo(location.folder)
+        announce(f"The example data set is in {data_set}. Use it as a template for your own.")
+        page, question = run_all(data_set, location, announce=announce, **asked), "energy_per_joint"
     click.echo(f"\nOpen the page in a browser: {page.resolve()}")
-    click.echo(f"Ask the graph:              irtwin query planned_against_measured --workspace {workspace}")
+    if not no_open and sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        webbrowser.open(page.resolve().as_uri())
+    click.echo(f"Ask the graph:              irtwin query {question} --workspace {location.folder}")
 
 
 @click.command()
-@click.argument("dataset", type=PLACE)
+@of_many("diagnose")
 @click.option("--json", "json_file", type=FILE, help="JSON file to write the diagnosis to.")
 @click.option("--report", type=FILE, help="HTML file to write the report to.")
 @click.option("--save-twin", "twin_file", type=FILE, help="JSON file to write the twin to, with the causes added.")
@@ -168,6 +176,13 @@ def diagnose(
 
     The diagnosis says where the gap lies, which effects cause it, and how much of it closes when the twin gets them.
     A summary is printed; --report and --json write all of it.
+
+    With --out, every data set below the folder DATASET is diagnosed, as `irtwin run --out` takes many: gap.json and
+    twin.json go to a folder for each.
+
+    \b
+    Example: irtwin diagnose my_robot --report gap.html
+    Example: irtwin diagnose robots/ --out results
     """
     from irtwin.diagnosing import diagnose as judge
     from irtwin.report.gap import summary
@@ -204,19 +219,32 @@ def diagnose(
 
 @click.command()
 @click.argument("robot")
-@click.argument("new_log", metavar="LOG", type=PLACE)
+@click.argument("new_log", metavar="[LOG]", type=PLACE, required=False)
 @located
 @payload_mass_option
 @payload_com_option
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the log carried out.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
-def improve(robot: str, new_log: Path, location: Location, **asked: Any) -> None:
-    """Better a robot's twin by a new log.
+def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) -> None:
+    """Better a robot's twin: by the causes that its diagnosis found, or by a new log.
+
+    Without LOG, the twin of the robot's last diagnosis (`irtwin diagnose --workspace`) becomes the robot's: energy is
+    computed with it, and the energy report is written again.
 
     LOG is a CSV or Parquet file, such as of the motion that `irtwin run` proposed. The twin is fitted again, with the
     effects that it lacks where that is needed. The earlier twin stays unless the new one is better on what neither was
     fitted to.
+
+    \b
+    Example: irtwin improve KUKA_KR6_R700
+    Example: irtwin improve KUKA_KR6_R700 monday.csv --payload-mass 2.5
     """
+    if new_log is None:
+        refuse(asked, "says how LOG was made, and goes with it")
+        from irtwin import workflow
+
+        click.echo(workflow.adopt(robot, location, announce=say))
+        return
     from irtwin import improvement
 
     found = improvement.improve(robot, new_log, location, announce=announce, **asked)
@@ -228,19 +256,6 @@ def improve(robot: str, new_log: Path, location: Location, **asked: Any) -> None
         click.echo(f"Nothing helps yet: the twin is beyond the limit of {found.limit:g} %. What to log next:")
         for line in found.next.words if found.next else ():
             click.echo(line)
-
-
-@click.command()
-@click.argument("robot")
-@located
-def adopt(robot: str, location: Location) -> None:
-    """Replace a robot's twin by the one of its diagnosis.
-
-    The energy in the graph is then computed with the new twin, and the energy report is written again.
-    """
-    from irtwin import workflow
-
-    click.echo(workflow.adopt(robot, location, announce=say))
 
 
 def _state(finding: Finding) -> str:

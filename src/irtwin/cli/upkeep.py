@@ -1,4 +1,4 @@
-"""Commands that keep a workspace whole."""
+"""The group of commands that keep a workspace whole."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from pathlib import Path
 
 import click
 
+from irtwin.cli.fleet import show
 from irtwin.cli.options import FILE, located, say, series_option
 from irtwin.location import Location
 
 
-@click.command()
+@click.group()
+def workspace() -> None:
+    """Look after a workspace: how it stands, what it may do, backups, robots to remove."""
+
+
+@workspace.command()
 @click.argument("robot")
 @click.option("--run", metavar="NAME", help="Remove this run alone: a plan that was kept, or a live run.")
 @located
@@ -20,6 +26,9 @@ def drop(robot: str, run: str | None, location: Location) -> None:
 
     Its runs, twin, diagnosis, live runs and report are deleted, and everything that the graph says about it. With
     --run, one of its runs goes, and the report is written anew. Runs of a data set stay.
+
+    \b
+    Example: irtwin workspace drop KUKA_KR6_R700
     """
     from irtwin import upkeep
 
@@ -29,13 +38,16 @@ def drop(robot: str, run: str | None, location: Location) -> None:
         upkeep.drop_run(robot, run, location, say)
 
 
-@click.command()
+@workspace.command()
 @located
 def repair(location: Location) -> None:
     """Rebuild a damaged or lost graph from the database.
 
     Lists the series, twins and diagnoses that are missing or altered; the exit status is then 2. A damaged database
-    needs `restore`.
+    needs `irtwin workspace restore`.
+
+    \b
+    Example: irtwin workspace repair --workspace plant
     """
     from irtwin import upkeep
 
@@ -43,38 +55,49 @@ def repair(location: Location) -> None:
     click.echo(location.folder)
 
 
-@click.command()
-@click.argument("workspace", type=click.Path(path_type=Path, file_okay=False, exists=True))
+@workspace.command()
+@click.argument("folder", metavar="WORKSPACE", type=click.Path(path_type=Path, file_okay=False, exists=True))
 @click.option("--withdraw", is_flag=True, help="Allow nothing of it any more.")
-def trust(workspace: Path, withdraw: bool) -> None:
+def trust(folder: Path, withdraw: bool) -> None:
     """Allow what the files of a WORKSPACE ask for, and list it.
 
     A workspace may come from elsewhere. Rules, templates and the like in its folder, whom its alarms.toml tells, with
     which variables, and the object storage of its series.toml: none of it runs, sends or is written to before. You say
     so once; what a file asks for later is asked for again.
+
+    \b
+    Example: irtwin workspace trust plant
     """
     from irtwin import trust as word
     from irtwin import upkeep
 
     if withdraw:
-        word.withdraw(workspace)
-        click.echo(f"{workspace}: nothing is allowed")
+        word.withdraw(folder)
+        click.echo(f"{folder}: nothing is allowed")
         return
-    asked = upkeep.asked(workspace)
-    word.trust(workspace, asked)
+    asked = upkeep.asked(folder)
+    word.trust(folder, asked)
     for name in asked:
         click.echo(name)
-    click.echo(f"{workspace}: {'allowed' if asked else 'asks for nothing'}")
+    click.echo(f"{folder}: {'allowed' if asked else 'asks for nothing'}")
 
 
-@click.command()
+@workspace.command()
 @located
 def status(location: Location) -> None:
     """Show how a workspace stands.
 
     Lists robots and runs, tables, the graph's size, the files that extend what ships, and damage; where there is any,
-    the exit status is 2.
+    the exit status is 2. Of a folder that `irtwin run --out` or `diagnose --out` fills, it counts the data sets that
+    are done, refused, failed and left.
+
+    \b
+    Example: irtwin workspace status --workspace plant
     """
+    from irtwin.fleet.fleet import batches_of, status_of
+
+    if batches := batches_of(location.folder):
+        return show(status_of(batches))
     from irtwin import status as of_workspace
 
     found = of_workspace.status(location)
@@ -84,13 +107,16 @@ def status(location: Location) -> None:
         sys.exit(2)
 
 
-@click.command()
+@workspace.command()
 @click.argument("archive", type=FILE)
 @located
 def backup(archive: Path, location: Location) -> None:
     """Write a workspace into one ARCHIVE, even while others write to it.
 
     It holds graph, database (also the rows of a server), series, twins, diagnoses and reports, with checksums.
+
+    \b
+    Example: irtwin workspace backup plant.zip --workspace plant
     """
     from irtwin import workflow
 
@@ -98,14 +124,17 @@ def backup(archive: Path, location: Location) -> None:
     click.echo(archive)
 
 
-@click.command()
+@workspace.command()
 @click.argument("archive", type=FILE)
 @located
 @series_option
 def restore(archive: Path, location: Location, series_url: str | None) -> None:
-    """Create a new workspace from an ARCHIVE that `backup` wrote.
+    """Create a new workspace from an ARCHIVE that `irtwin workspace backup` wrote.
 
     A damaged archive restores nothing, and nothing is overwritten.
+
+    \b
+    Example: irtwin workspace restore plant.zip --workspace plant_again
     """
     from irtwin.knowledge.store.backup import restore as restore_all
 

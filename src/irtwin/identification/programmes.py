@@ -29,7 +29,7 @@ _HOLD = 2.0  # s
 _SMALL = (3e-3, 0.01, 0.03)  # rad (m): half of the way between reversals
 _STEPS = (0.25, 0.5, 1.0)  # of the largest acceleration
 _EXCITING = 20.0  # s
-_ITERATIONS = 5  # enough to compare; `irtwin excite` goes on from there
+_ITERATIONS = 5  # enough to compare; `irtwin robot excite` goes on from there
 _SET_UP = 300.0  # s to put a load on or take something off
 _WARM_UP = 1800.0  # s
 _COLD, _WARM = 25.0, 45.0  # degC
@@ -338,7 +338,7 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
         (Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff),),
-        settings=Settings(command=f"irtwin excite URDF --seconds {_EXCITING:g} --out motion.csv"),
+        settings=Settings(command=f"irtwin robot excite URDF --seconds {_EXCITING:g} --out motion.csv"),
     )
 
 

@@ -161,7 +161,7 @@ def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet,
     if any(row.kind not in WATCHED_RUNS for row in kept) and tuple(joints) != data_set.robot.joint_names:
         raise InputError(
             f"{toml}: the workspace keeps runs of this robot with the joints {', '.join(joints)}; remove the robot "
-            "with `irtwin drop` first, or give it another name"
+            "with `irtwin workspace drop` first, or give it another name"
         )
     taken = {row.run_id for row in kept}
     own = {row.run_id for row in runs if row.kind == PLANNED_RUN}
@@ -235,7 +235,7 @@ def check_name(workspace: Workspace, name: str) -> None:
         if (robot_id == identifier(name)) != same:
             raise InputError(
                 f'{workspace.folder}: robot "{known}" has the identifier {robot_id} of an earlier irtwin, which does '
-                f'not tell it from others; remove it with `irtwin drop "{known}"` and run its data set again'
+                f'not tell it from others; remove it with `irtwin workspace drop "{known}"` and run its data set again'
             )
         if not same and _folded(known) == _folded(name):
             raise InputError(
@@ -318,7 +318,7 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
     if lost := [name for name in bare.joint_names if name not in sheets]:
         raise WorkspaceFault(
             f'{workspace.folder}: the database has no row of joint "{lost[0]}" of "{row.name}"; run its data set '
-            "again, or restore a backup by `irtwin restore ARCHIVE --workspace NEW`"
+            "again, or restore a backup by `irtwin workspace restore ARCHIVE --workspace NEW`"
         )
     return _with_sheets(replace(bare, name=row.name), row, sheets)
 

@@ -109,7 +109,7 @@ def _base(location: Location) -> str:
         if knows and not graph.graphs(GRAPH_SOURCE):
             raise InputError(
                 f"{graph.shown}: the graph is empty, though the database knows of robots; "
-                f"`irtwin repair --workspace {location.folder}` with the same --database and --graph fills it"
+                f"`irtwin workspace repair --workspace {location.folder}` with the same --database and --graph fills it"
             )
         return graph.base
 

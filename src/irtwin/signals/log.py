@@ -220,6 +220,10 @@ def _document(file: Path) -> dict[str, Any]:
             f"`irtwin import {file.parent} --robot ROBOT --out FOLDER` makes one of a log"
         )
     if real is None or not real.exists():
+        if any(file.parent.glob(f"*/{file.name}")):
+            raise InputError(
+                f"{file.parent}: holds data sets, and is none itself; name one, or take all by --out RESULTS"
+            )
         raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
     return read_toml(file)
 

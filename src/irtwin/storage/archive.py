@@ -85,7 +85,7 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
     """Return checksum and size of each file, in the order of the archive; what the ZIP says itself must agree."""
     entries = {entry.filename: entry for entry in source.infolist()}
     manifest = entries.pop(_MANIFEST, None)
-    foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin backup FILE`")
+    foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin workspace backup FILE`")
     if manifest is None or manifest.file_size > _MOST_MANIFEST:
         raise foreign
     said = parse_json(source.read(manifest))

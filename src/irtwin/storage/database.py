@@ -60,8 +60,8 @@ from irtwin.storage.structure_schema import LinkShape
 Outcome = Literal["new", "unchanged", "replaced"]
 _DATABASE = "irtwin.db"
 _FROM_A_BACKUP = (
-    "`irtwin restore ARCHIVE --workspace NEW` makes another workspace of a backup; without one, run the data sets "
-    "again into a new one (where a server keeps the database, give --database)"
+    "`irtwin workspace restore ARCHIVE --workspace NEW` makes another workspace of a backup; without one, run the data "
+    "sets again into a new one (where a server keeps the database, give --database)"
 )
 TWINS, DIAGNOSES, MESHES = "twins", "diagnoses", "meshes"
 _MOST_OF_ROWS = 10_000_000  # bytes of a database whose rows are looked at when it is opened: 0.2 s, of a fleet seconds
@@ -157,8 +157,8 @@ class Workspace:
         if self.knows_robots() and not (self.graph_folder / "CURRENT").is_file():
             raise InputError(
                 f"{self.graph_folder}: the graph is missing, or some of its files; the database is intact: "
-                f"`irtwin repair --workspace {self.folder}` rebuilds the graph from it (if a server keeps the "
-                "graph, give --graph)"
+                f"`irtwin workspace repair --workspace {self.folder}` rebuilds the graph from it (if a server keeps "
+                "the graph, give --graph)"
             )
 
     def knows_robots(self) -> bool:

@@ -30,7 +30,7 @@ _OF_SERVER = {  # by the beginning of PostgreSQL's state
     "25006": "the server takes no changes now; try again later",
     "53": "the server is out of memory, disk or connections; ask who runs it",
 }
-TO_WRITE = "ask its owner for the right, or work on a copy, by `irtwin backup` and `irtwin restore`"
+TO_WRITE = "ask its owner for the right, or work on a copy, by `irtwin workspace backup` and `irtwin workspace restore`"
 BUSY_TIMEOUT = 30.0  # s that a writer waits for another one
 _NO_LOCK = "55P03"  # PostgreSQL's state of a lock that was not had in time
 _WRITER_LOCK = 0x697274776E  # "irtwn": the advisory lock that writers hold on PostgreSQL
@@ -217,7 +217,7 @@ def check_schema(engine: Engine, tables: Container[str], *, is_current: bool) ->
         if table in tables and not is_old:
             raise WorkspaceFault(
                 f"{engine.url.database}: holds the {kind} {name!r}, which irtwin did not make; drop it, or restore a "
-                "backup by `irtwin restore ARCHIVE --workspace NEW`"
+                "backup by `irtwin workspace restore ARCHIVE --workspace NEW`"
             )
 
 
@@ -227,7 +227,7 @@ def _tell(url: URL, error: BaseException) -> None:
     if any(text in reason for text in _NO_UTF8):
         raise WorkspaceFault(
             f"{url.database}: holds text that is not UTF-8 ({reason[:160]}); mend it with what wrote it, or "
-            "restore a backup by `irtwin restore ARCHIVE --workspace NEW`"
+            "restore a backup by `irtwin workspace restore ARCHIVE --workspace NEW`"
         ) from error
     if any(text in reason for text in _DAMAGE):
         raise WorkspaceFault(_damaged(url, reason)) from error
@@ -250,8 +250,8 @@ def _tell_of_server(url: URL, context: ExceptionContext) -> None:
 
 def _damaged(url: URL, reason: str) -> str:
     return (
-        f"{url.database}: the database is damaged ({reason[:160]}); `irtwin restore ARCHIVE --workspace NEW` makes "
-        "another of a backup; without one, run the data sets again into a new workspace"
+        f"{url.database}: the database is damaged ({reason[:160]}); `irtwin workspace restore ARCHIVE --workspace NEW` "
+        "makes another of a backup; without one, run the data sets again into a new workspace"
     )
 
 

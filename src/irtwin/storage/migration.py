@@ -63,7 +63,7 @@ def migrate(engine: Engine) -> None:
     if engines.is_read_only(engine):
         raise InputError(
             f"{engine.url.database}: its tables are of an older irtwin, and this user may only read it: "
-            "who may write it brings them up to date by `irtwin status`"
+            "who may write it brings them up to date by `irtwin workspace status`"
         )
     if newest() != (current or min(known())):
         _keep_copy(engine, current or min(known()))

@@ -14,7 +14,7 @@ from irtwin.toml_text import read_toml
 from irtwin.trust import how, trust, trusted
 
 FILE = "series.toml"
-_MOVE = "`irtwin backup FILE`, then `irtwin restore FILE --workspace NEW --series URL` moves them"
+_MOVE = "`irtwin workspace backup FILE`, then `irtwin workspace restore FILE --workspace NEW --series URL` moves them"
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ def _read(file: Path) -> _Said:
         return _Said(checked_url(str(said["url"])), str(said["workspace"]))
     except (KeyError, InputError):
         raise InputError(
-            f"{file}: damaged: it has to say url and workspace, as it did; put the file back, or `irtwin restore` a "
-            "backup into another folder"
+            f"{file}: damaged: it has to say url and workspace, as it did; put the file back, or restore "
+            "a backup into another folder"
         ) from None
 
 

@@ -151,7 +151,7 @@ def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) ->
     robots = ", ".join(sorted({file.robot_id for file in lost}))
     return (
         f"{place}: {lost[0].path}{f' and {len(lost) - 1} more files' if len(lost) > 1 else ''} {what}; {then}: run the "
-        f"data set of {robots} again, or take the robot out by `irtwin drop`"
+        f"data set of {robots} again, or take the robot out by `irtwin workspace drop`"
     )
 
 

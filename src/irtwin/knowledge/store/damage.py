@@ -60,7 +60,7 @@ def damaged(folder: Path, reason: str) -> str:
     """Return the line that says so, of the graph in a folder."""
     return (
         f"{folder}: the graph is damaged ({reason[:160]}); what the database holds is not lost: "
-        f"`irtwin repair --workspace {folder.parent}` rebuilds the graph from it"
+        f"`irtwin workspace repair --workspace {folder.parent}` rebuilds the graph from it"
     )
 
 

@@ -34,7 +34,7 @@ def render(
     questions = questions_of(shipped(), "case_study")
     case = ask(graph, {"case": questions["case"]}, {"robot": robot_iri})["case"].first
     if case is None:
-        raise InputError(f"{robot_iri}: the graph has no plan that was carried out; run `irtwin case-study`")
+        raise InputError(f"{robot_iri}: the graph has no plan that was carried out; run `irtwin demo --case-study`")
     bindings = {"robot": robot_iri} | {name: case[name] for name in ("plan", "run", "twin")}
     answers = ask(graph, questions, bindings)
     read = cache(read_series)

@@ -123,8 +123,11 @@
     if (!told) field.value = marked === null ? "" : String(Number(marked.toFixed(3)));
     history.replaceState(null, "", marked === null ? location.pathname + location.search : "#t=" + Number(marked.toFixed(3)));
     Plotly.relayout(place, { shapes: shapes(chooseTheme(false)) });
-    document.dispatchEvent(new CustomEvent("irtwin:time", { detail: { time: marked, curves: shown } }));
+    tell(marked);
   }
+
+  const tell = (time) => document.dispatchEvent(new CustomEvent("irtwin:time", { detail: { time, curves: shown } }));
+  const pointed = (event) => per * (event.xvals ? event.xvals[0] : event.points[0].x);
 
   function markedInAddress() {
     const found = /^#t=(-?[\d.]+)$/.exec(location.hash);
@@ -161,12 +164,15 @@
     said.className = "hint";
     said.textContent = shaded.length ? "Shaded " + shaded.map((span) => SHADES[span.channel].says).join("; ") + "." : "";
     await draw();
-    place.on("plotly_click", (event) => mark(per * (event.xvals ? event.xvals[0] : event.points[0].x)));
+    place.on("plotly_click", (event) => mark(pointed(event)));
+    place.on("plotly_hover", (event) => tell(pointed(event)));
+    place.on("plotly_unhover", () => tell(marked));
     place.on("plotly_relayout", zoomed);
     field.addEventListener("input", () => mark(field.value === "" ? NaN : Number(field.value), true));
     window.addEventListener("hashchange", () => mark(markedInAddress()));
     DARK.addEventListener("change", draw);
     if (Number.isFinite(markedInAddress())) mark(markedInAddress());
+    else tell(null);
   }
 
   begin();
