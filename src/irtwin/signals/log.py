@@ -220,7 +220,7 @@ def _document(file: Path) -> dict[str, Any]:
             f"`irtwin import {file.parent} --robot ROBOT --out FOLDER` makes one of a log"
         )
     if real is None or not real.exists():
-        if any(file.parent.glob(f"*/{file.name}")):
+        if real is not None and any(real.parent.glob(f"*/{file.name}")):
             raise InputError(
                 f"{file.parent}: holds data sets, and is none itself; name one, or take all by --out RESULTS"
             )
