@@ -19,6 +19,7 @@ from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
 
 _HOLDING = NAMES.index("holding")
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
+_PARTS = tuple(np.isin(NAMES, names)[:, None] for names in PARTS.values())
 _LEAST = 2e-4  # rad (m), a misfit that is none: less than encoders resolve
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
 _AGAIN, _PASSES = 2, 4  # passes after numbers were given back, and when one was added
@@ -71,11 +72,10 @@ class Choice:
 def choose(fit: Fit) -> Choice:
     """Return the numbers with most evidence."""
     fit, best = _all_free(fit)
-    robots, of_parts = np.zeros((len(NAMES), 1), dtype=bool), np.full((len(NAMES), 1), -np.inf)
-    for names in PARTS.values():
-        part = np.isin(NAMES, names)[:, None]
-        best, likely = _with_part(fit, best, part, robots)
-        of_parts[part], robots = likely, robots | (part & (likely > 0))
+    robots = np.zeros((len(NAMES), 1), dtype=bool)
+    for part in _PARTS:
+        best, there = _with_part(fit, best, part, robots)
+        robots = robots | (part & there)
     fit = _judged(fit, best) if robots.any() else fit
     for _ in range(2 if robots.any() else 1):  # what made up for a part of it is given back
         fit, best, differs = _given_back(fit, best)
@@ -83,28 +83,45 @@ def choose(fit: Fit) -> Choice:
     if differs.any():
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
         best = fit.solved(best, differs | robots, _AGAIN)
+    odds = np.full(differs.shape, -np.inf)
+    for part in (one for one in _PARTS if (one & robots).any()):  # beside few numbers it shows whether it is needed
+        back = _without(fit, best, part, differs | robots)
+        odds = np.where(part, _odds(fit, (best, differs | robots), (back, differs | (robots & ~part))), odds)
+        if odds[part[:, 0], 0][0] <= 0:
+            best, robots = back, robots & ~part
     differs |= robots
     slopes = fit.slopes(best)
     loss, worth = _weighed(fit, best, slopes, differs)
-    odds = np.where(_ROBOTS, of_parts, np.where(differs, loss - worth, -np.inf))
+    odds = np.where(differs, np.where(_ROBOTS, odds, loss - worth), -np.inf)
     return Choice(fit, best, slopes, differs, odds, _interval(fit, best, slopes, differs))
 
 
-def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> tuple[Played, float]:
-    """Return numbers with a payload, or a tilt, where it has evidence, and the odds of that, natural logarithms.
+def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> tuple[Played, bool]:
+    """Return numbers with a payload, or a tilt, where it has evidence, and whether it has.
 
     It is fitted to the model as it is, and beside what explains most without it: either may be in the other's way.
     `part` and `robots` (k, 1): what joints share of it, and of what was found before.
     """
-    own, without = fit.servos.chart(fit.servos.numbers), _free(fit) | robots
-    alone = np.broadcast_to(part, own.shape)
+    free, own = _free(fit) | robots, fit.servos.chart(fit.servos.numbers)
     begun = (best, fit.played(np.where(robots, best.at, own)))
-    found = fit.best([fit.solved(fit.solved(one, alone, _PASSES), without | part) for one in begun], together=True)
-    back = fit.solved(fit.played(np.where(part, own, found.at)), without)
+    alone = np.broadcast_to(part, own.shape)
+    found = fit.best([fit.solved(fit.solved(one, alone, _PASSES), free | part) for one in begun], together=True)
+    back = _without(fit, found, part, free | part)
     best = fit.best([best, back], together=bool(robots.any()))  # what came with it may be as good without
-    worth = np.log(len(NAMES)) + _known(fit, found, without | part) - _known(fit, best, without)
-    odds = float(fit.cost(best).sum() - fit.cost(found).sum() - worth)
-    return (found, odds) if odds > 0 else (best, -np.inf)
+    there = _odds(fit, (found, free | part), (best, free)) > 0
+    return (found if there else best), there
+
+
+def _without(fit: Fit, best: Played, part: np.ndarray, free: np.ndarray) -> Played:
+    """Return numbers fitted without a part, of those that are free (k, n)."""
+    own = fit.servos.chart(fit.servos.numbers)
+    return fit.solved(fit.played(np.where(part, own, best.at)), free & ~part)
+
+
+def _odds(fit: Fit, found: tuple[Played, np.ndarray], other: tuple[Played, np.ndarray]) -> float:
+    """Return the odds, natural logarithms, of numbers with a part to those without; each with what is free (k, n)."""
+    worth = np.log(len(NAMES)) + _known(fit, *found) - _known(fit, *other)
+    return float(fit.cost(other[0]).sum() - fit.cost(found[0]).sum() - worth)
 
 
 def _given_back(fit: Fit, best: Played) -> tuple[Fit, Played, np.ndarray]:
@@ -191,7 +208,8 @@ def _evidence(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
 def _all_free(fit: Fit) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted."""
     free, own = _free(fit), fit.servos.chart(fit.servos.numbers)
-    best = fit.best([fit.rolled(at) for at in (own, fit.begun().at)])
+    begun = [fit.rolled(at) for at in (own, fit.begun().at)]
+    best = fit.best([*begun, *(fit.rolled(fit.limited(fit.played(one.at)).at) for one in begun)])
     for _ in range(2):
         fit = _judged(fit, best)
         best = fit.solved(fit.limited(fit.played(best.at)), free)

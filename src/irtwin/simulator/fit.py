@@ -42,7 +42,7 @@ _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
 _DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
 _PASSES, _WORTH = 12, 0.05
-_LIMITS = (0.9, 0.6, 0.4, 0.25, 0.15)  # of the limit, or what a servo without any would have given, tried as limits
+_LIMITS = (0.95, 0.85, 0.7, 0.5, 0.35, 0.25, 0.15)  # of the limit, or of the most that the servo is asked for, tried
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
@@ -249,8 +249,12 @@ class Fit:
     def limited(self, best: Played) -> Played:
         """Return numbers with the limits of torque that are better, if any: one that is never reached has no slope."""
         numbers, row = self.servos.of_chart(best.at), NAMES.index("torque_limit")
-        off = [np.abs(one.commands(one.time, 1e-3, numbers) - one.q).max(axis=0) for one in self.stretches]
-        found, most = best, np.minimum(numbers[row], numbers[0] * np.max(off, axis=0))
+        _, servo = self.servos.dampings(numbers[NAMES.index("damping")])
+        asked = [
+            np.abs(numbers[0] * (one.commands(one.time, 1e-3, numbers) - one.q) - servo * one.speed).max(axis=0)
+            for one in self.stretches
+        ]
+        found, most = best, np.minimum(numbers[row], np.max(asked, axis=0))
         for shares, about in ((_LIMITS, most), (_NEARER, None)):
             middle = self.servos.of_chart(found.at)[row] if about is None else about
             tried = [np.where(np.arange(len(NAMES))[:, None] == row, middle * share, numbers) for share in shares]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.signals.log import Run
+from irtwin.signals.sampling import interval
 from irtwin.simulator.servos import NAMES, Servos
 
 _AROUND = 0.1  # s about a beginning, of which position and speed there are taken
@@ -32,6 +33,14 @@ class Stretch:
     def q(self) -> np.ndarray:
         """The robot's positions (N, n)."""
         return np.asarray(self.run.signals.q[self.rows])
+
+    @property
+    def speed(self) -> np.ndarray:
+        """The robot's speeds (N, n), over 0.1 s."""
+        apart = max(1, round(_AROUND / 2 / interval(self.time)))
+        rows = np.arange(len(self.time))
+        before, after = np.maximum(rows - apart, 0), np.minimum(rows + apart, len(rows) - 1)
+        return np.asarray((self.q[after] - self.q[before]) / (self.time[after] - self.time[before])[:, None])
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and speed (n,) of the robot where it begins."""
