@@ -229,7 +229,7 @@ def diagnose(
     proposal = next_experiment(
         case.robot,
         [(finding, equations[finding.name]) for finding in findings],
-        [one.effect for one in lacking] if open_because else [],
+        [one.effect for one in lacking],
         case.seen,
         thresholds,
     )
