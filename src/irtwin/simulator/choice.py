@@ -20,6 +20,7 @@ from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
 _HOLDING = NAMES.index("holding")
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
 _PARTS = tuple(np.isin(NAMES, names)[:, None] for names in PARTS.values())
+_SHOWS = 1.0  # natural logarithm of odds that one step of a payload or a tilt gains where there is one
 _LEAST = 2e-4  # rad (m), a misfit that is none: less than encoders resolve
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
 _AGAIN, _PASSES = 2, 4  # passes after numbers were given back, and when one was added
@@ -103,6 +104,10 @@ def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> 
     `part` and `robots` (k, 1): what joints share of it, and of what was found before.
     """
     free, own = _free(fit) | robots, fit.servos.chart(fit.servos.numbers)
+    _, normal, each = _of_robot(fit, best, free | part)
+    pull = each.sum(axis=0)
+    if pull @ np.linalg.solve(normal, pull) / 2 < _SHOWS:
+        return best, False
     begun = (best, fit.played(np.where(robots, best.at, own)))
     alone = np.broadcast_to(part, own.shape)
     found = fit.best([fit.solved(fit.solved(one, alone, _PASSES), free | part) for one in begun], together=True)
