@@ -62,11 +62,11 @@ def test_a_question_is_answered_under_headings_with_units_and_plotted(
     page.wait_for_selector("#answer table td")
     assert "PREFIX irt: <https://w3id.org/irtwin#>" in page.inner_text(".CodeMirror-code")
     assert page.inner_text("#said").startswith("7 rows, in ")
-    assert page.locator("#answer thead th").all_text_contents()[4:6] == ["Energy, J", "Mean power, W"]
+    assert page.locator("#answer thead th").all_text_contents()[4:6] == ["Energy, Wh", "Mean power, W"]
     page.click("#answer summary >> text=Plot")
     page.wait_for_selector("#answer .plot .barlayer .point")
     assert page.locator("#answer .legendtext").all_text_contents() == ["Arm_A", "Arm_B", "Arm_C"]
-    assert page.locator("#answer .xtitle, #answer .ytitle").all_text_contents() == ["Run", "Energy, J"]
+    assert page.locator("#answer .xtitle, #answer .ytitle").all_text_contents() == ["Run", "Energy, Wh"]
     page.locator("#answer label", has_text="over").locator("select").select_option("payload_kg")
     page.wait_for_selector("#answer .plot .scatterlayer .point")
     assert page.locator("#answer .modebar-btn").first.get_attribute("data-title") == "Download plot as a PNG"
