@@ -17,9 +17,9 @@ check: $(VENV)/test lint
 
 test: lint suite
 
-# Three processes on two cores: many tests wait for a server, a browser or a clock.
+# Two processes a core: many tests wait for a server, a browser or a clock.
 suite: $(VENV)/test
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 3 / 2 )) --dist worksteal -m "not nightly"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 2 )) --dist worksteal -m "not nightly"
 
 # What repeats at length what other tests hold in short.
 nightly: $(VENV)/test

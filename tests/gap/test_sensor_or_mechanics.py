@@ -43,7 +43,9 @@ def data_set(real=None, late=0.0):
     ("made", "said"),
     [
         ({"real": lambda m: 4 * np.sign(m.dq[:, 0]) * np.exp(-np.abs(m.dq[:, 0]) / 0.1)}, "mechanical"),
-        ({"real": lambda m: 3 * np.cos(4 * m.q[:, 0]) * np.sign(m.dq[:, 0])}, "mechanical"),
+        pytest.param(
+            {"real": lambda m: 3 * np.cos(4 * m.q[:, 0]) * np.sign(m.dq[:, 0])}, "mechanical", marks=pytest.mark.nightly
+        ),
         ({"late": 0.05}, "sensor"),
     ],
 )

@@ -131,7 +131,7 @@ def concluded(workspace: Path) -> set[Quad]:
         return {quad for name in graph.graphs(GRAPH_INFERRED) for quad in graph.quads_in(name)}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(workspace: Path) -> None:
     before = concluded(workspace)
     run = second_payload(workspace)

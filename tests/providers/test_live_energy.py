@@ -198,6 +198,7 @@ def test_what_a_crash_left_gets_its_energy_too(place: Workspace, graph: Knowledg
             twin.receive(said[5])
 
 
+@pytest.mark.nightly
 def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path: Path) -> None:
     with KnowledgeGraph.of_workspace(place) as graph, LiveTwin(place, graph) as twin:
         for state in states(log()):
