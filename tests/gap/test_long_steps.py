@@ -26,6 +26,9 @@ STEPS = {
 }
 
 
+pytestmark = pytest.mark.nightly
+
+
 @pytest.fixture(scope="module")
 def lines():
     with pytest.MonkeyPatch.context() as patch:
