@@ -30,8 +30,6 @@ from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
 
-_SEED_OF_DRAWS = 0
-
 
 def diagnose(
     dataset: Path | str,
@@ -88,7 +86,7 @@ def diagnose(
         from irtwin.workflow import keep_diagnosis
 
         keep_diagnosis(location, data_set, found, announce)
-    files.write(data_set, found, model, location, announce)
+    files.write(data_set, found, model, location, seed, announce)
     return found
 
 
@@ -119,11 +117,12 @@ class _Files:
         found: Diagnosis | Playing,
         model: Model | None,
         location: Location | None,
+        seed: int,
         announce: Announce,
     ) -> None:
         """Write the files that are asked for."""
         if model and self.simulator:
-            for file, content in zip((self.simulator, *self.draws), _models(found, model), strict=False):
+            for file, content in zip((self.simulator, *self.draws), _models(found, model, seed), strict=False):
                 write(file, content)
         if self.json is not None:
             write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
@@ -141,9 +140,9 @@ class _Files:
             render_alone(data_set, found.document, found.curves, self.report, resources)
 
 
-def _models(found: Diagnosis | Playing, model: Model) -> Iterator[bytes]:
+def _models(found: Diagnosis | Playing, model: Model, seed: int) -> Iterator[bytes]:
     """Yield the model's file with the robot's numbers, then, without end, with these as they could be."""
-    rng = np.random.default_rng(_SEED_OF_DRAWS)
+    rng = np.random.default_rng(seed)
     yield found.written() if isinstance(found, Playing) else written(model, found.document)
     while True:
         yield found.drawn(rng) if isinstance(found, Playing) else drawn(model, found.document, found.twin, rng)

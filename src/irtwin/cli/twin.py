@@ -164,7 +164,7 @@ def demo(location: Location, no_open: bool, case_study: bool, **asked: Any) -> N
     metavar="HZ",
     help="Cutoff of the low-pass filter that all runs pass. Default: that of dataset.toml, else it is found.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random resampling, and of draws.")
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @locating(
     click.option("--workspace", type=FOLDER, help="Also store the diagnosis there."), database_option, graph_option

@@ -14,7 +14,7 @@ from scipy.special import expit
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Equations, Fit, Played, Slopes, of_robot
+from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Equations, Fit, Played, Slopes, marginal
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
 
 _HOLDING = NAMES.index("holding")
@@ -50,7 +50,7 @@ class Choice:
         return self.fit.servos.of_chart(self.played.at)
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """Return numbers (k, n) as they could be: as far off as the intervals say, together as the fit's errors go."""
+        """Return numbers (k, n) as they could be: as far off as the intervals say, a joint's together as its errors."""
         ends = self.fit.servos.chart(self.interval)
         spread, at = (ends[1] - ends[0]) / (2 * NORMAL), self.played.at.copy()
         for joint in range(at.shape[1]):
@@ -306,8 +306,8 @@ def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[list[int], np.n
         parts = [
             one._replace(right=each[joint, [rows.index(row) for row in one.rows]]) for joint, one in enumerate(joints)
         ]
-        rights.append(of_robot(parts, alike)[1])
-    return alike, of_robot(joints, alike)[0], np.array(rights)
+        rights.append(marginal(parts, alike)[1])
+    return alike, marginal(joints, alike)[0], np.array(rights)
 
 
 def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:

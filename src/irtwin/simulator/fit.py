@@ -78,7 +78,7 @@ class Equations(NamedTuple):
     right: np.ndarray
 
 
-def of_robot(joints: Sequence[Equations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def marginal(joints: Sequence[Equations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal equations of rows that joints share, each joint's own numbers fitted beside."""
     normal, right = np.zeros((len(rows), len(rows))), np.zeros(len(rows))
     for one in joints:
@@ -206,7 +206,7 @@ class Fit:
             equations.append(one._replace(normal=one.normal + damping[joint] * np.diag(np.diag(one.normal))))
         alike = [row for row in rows if row in SHARED]
         if alike:
-            steps[alike] = _no_farther(np.linalg.solve(*of_robot(equations, alike)), alike)[:, None]
+            steps[alike] = _no_farther(np.linalg.solve(*marginal(equations, alike)), alike)[:, None]
         for joint, (own, normal, right) in enumerate(equations):
             of_joint = [place for place, row in enumerate(own) if row not in SHARED]
             right = (right - normal @ steps[own, joint])[of_joint]  # beside the step of what joints share
