@@ -86,7 +86,7 @@ def known(data_set: DataSet, model: Model) -> None:
                 true[NAMES.index(name), joint] = true[NAMES.index(name), joint] * times + more
             rng, runs = np.random.default_rng(1), []
             for run in data_set.runs[:6]:
-                q = play(own, [true], [whole(run)])[0][0]
+                q = play(own, [true], [whole(run)])[0][0][:, 0]
                 runs.append(replace(run, signals=replace(run.signals, q=q + _NOISE * rng.standard_normal(q.shape))))
             found = diagnose(replace(data_set, runs=tuple(runs)), base)
             print(f"  {_judged(found, data_set, changes, true)}", flush=True)
@@ -119,7 +119,7 @@ def _of(data_set: DataSet, names: Sequence[str]) -> DataSet:
 
 
 def _left(own: Servos, run: Run) -> float:
-    left = run.signals.q - play(own, [own.numbers], [whole(run)])[0][0]
+    left = run.signals.q - play(own, [own.numbers], [whole(run)])[0][0][:, 0]
     return 1e3 * float(np.sqrt((left**2).mean()))
 
 

@@ -96,11 +96,20 @@ def changed(own: Servos, **changes: tuple[float, float]) -> np.ndarray:
     return numbers
 
 
-def played(data_set: DataSet, own: Servos, numbers: np.ndarray, noise: float = 1e-3) -> DataSet:
-    """Return the data set with the positions that a robot of these numbers would have, from where it rests on."""
+def played(
+    data_set: DataSet, own: Servos, numbers: np.ndarray, noise: float = 1e-3, torque_noise: float | None = None
+) -> DataSet:
+    """Return the data set with the positions that a robot of these numbers would have, from where it rests on.
+
+    With `torque_noise`, N m, the torque of its servos is logged, too.
+    """
     rng, runs = np.random.default_rng(7), []
     for run in data_set.runs:
-        q = play(own, [numbers], [whole(run)])[0][0]
-        signals = replace(run.signals, q=q + noise * rng.standard_normal(q.shape))
+        logged = replace(run.signals, torque=None if torque_noise is None else np.zeros(run.signals.q.shape))
+        moved = play(own, [numbers], [whole(replace(run, signals=logged))])[0][0]
+        signals = replace(logged, q=moved[:, 0] + noise * rng.standard_normal(logged.q.shape))
+        if torque_noise is not None:
+            torque = moved[:, 1] + torque_noise * rng.standard_normal(logged.q.shape)
+            signals = replace(signals, torque=torque)
         runs.append(replace(run, signals=signals.rows(run.signals.time >= _REST / 2)))
     return replace(data_set, runs=tuple(runs))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from scipy.spatial.transform import Rotation
 
 from closed_loop.machine import Machine, build
 from closed_loop.models import SOURCES, read_model
@@ -29,12 +30,13 @@ ARMS = tuple(SOURCES)
 KINDS = (
     "armature", "damping", "friction", "stiffness", "payload", "delay", "backlash", "torque_limit", "offset",
 )  # fmt: skip
+TORQUE_NOISE = 0.01  # of the standard deviation of a joint's torque
 NULLS, PAIRS = 1 / 8, 1 / 4  # shares of the cases
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A number that the arm has another of; a payload, kg, is the whole robot's."""
+    """A number that the arm has another of; a payload, kg, and a tilt of the base, rad, are the whole robot's."""
 
     kind: str
     joint: int | None
@@ -56,6 +58,7 @@ class Arm:
     delay: np.ndarray
     backlash: np.ndarray  # rad to either side
     payload: float = 0.0
+    tilt: float = 0.0  # rad about the world's x axis
 
     def with_(self, differences: tuple[Difference, ...]) -> Arm:
         """Return the arm with other numbers."""
@@ -65,7 +68,7 @@ class Arm:
                 found[one.kind] = one.robot
             else:
                 found[one.kind][one.joint] = one.robot
-        return Arm(**{**found, "payload": float(found["payload"])})
+        return Arm(**{**found, "payload": float(found["payload"]), "tilt": float(found["tilt"])})
 
 
 @dataclass(frozen=True)
@@ -76,15 +79,17 @@ class Case:
     arm: str
     seed: int
     count: int  # of differences
+    torque: bool  # whether it is logged
 
 
-def plans(count: int, seed: int = SEED) -> Iterator[Case]:
+def plans(count: int, torque: bool) -> Iterator[Case]:
     """Yield cases in an order that tells nothing: nulls, pairs, and else one difference."""
+    seed = SEED + 1_000_000 * torque
     rng = np.random.default_rng(seed)
     nulls, pairs = round(NULLS * count), round(PAIRS * count)
     counts = rng.permutation([0] * nulls + [2] * pairs + [1] * (count - nulls - pairs))
     for number, of in enumerate(counts):
-        yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of))
+        yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of), torque)
 
 
 def make(case: Case, models: Path, folder: Path) -> list[Difference]:
@@ -92,8 +97,10 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
     rng = np.random.default_rng([case.seed, 7])
     machine = build(read_model(models, case.arm), case.seed)
     own = _drawn(machine, rng)
-    kinds = rng.choice(KINDS, case.count, replace=False)
+    kinds = rng.choice((*KINDS, "tilt") if case.torque else KINDS, case.count, replace=False)
     differences = tuple(_difference(str(kind), own, rng) for kind in kinds)
+    if case.torque:
+        differences = tuple(_reached(one, machine, own, rng) for one in differences)
     text, robot = _mjcf(machine, own), own.with_(differences)
     for part in ("data", "held_out"):
         (folder / case.name / part / "runs").mkdir(parents=True)
@@ -101,27 +108,31 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
         (folder / case.name / part / "dataset.toml").write_text(_described(machine, part == "data"), encoding="utf-8")
     (folder / case.name / "model.xml").write_text(text, encoding="utf-8")
     model = mujoco.MjModel.from_xml_string(_mjcf(machine, robot))
+    model.opt.gravity = Rotation.from_rotvec([robot.tilt, 0, 0]).apply(model.opt.gravity)
     for run in range(RUNS):
         programme = (exciting if run % 2 else working)(machine, SECONDS, rng)
         every = round(STEP * EVERY / machine.step)
         told = programme.q[::every]
-        q = simulate(model, robot, told)
+        q, torque = simulate(model, robot, told)
         part = "data" if run < RUNS - HELD_OUT else "held_out"
         columns = {"time": np.arange(len(told)) * STEP * EVERY}
         for k, name in enumerate(machine.model.joints):
             columns[f"q_{name}"] = q[:, k] + NOISE * rng.standard_normal(len(q))
             columns[f"cmd_{name}"] = told[:, k].copy()
+            if case.torque:
+                noise = TORQUE_NOISE * torque[:, k].std() * rng.standard_normal(len(q))
+                columns[f"tau_{name}"] = torque[:, k] + noise
         pq.write_table(pa.table(columns), folder / case.name / part / "runs" / f"run_{run}.parquet")
     return list(differences)
 
 
-def simulate(model: mujoco.MjModel, arm: Arm, told: np.ndarray) -> np.ndarray:
-    """Return the positions (N, n) of an arm that is told commands (N, n), each until the next."""
+def simulate(model: mujoco.MjModel, arm: Arm, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and servos' torques (N, n) of an arm that is told commands (N, n), each until the next."""
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION  # its servos are those below
     data = mujoco.MjData(model)
     data.qpos[:] = told[0]
     late = np.round(arm.delay / STEP).astype(int)
-    found, columns = np.empty_like(told), np.arange(told.shape[1])
+    found, torques, columns = np.empty_like(told), np.empty_like(told), np.arange(told.shape[1])
     settling = round(1.0 / STEP)  # the log begins when the robot stands
     for row in range(-settling, len(told) * EVERY):
         if row >= 0 and row % EVERY == 0:
@@ -131,8 +142,10 @@ def simulate(model: mujoco.MjModel, arm: Arm, told: np.ndarray) -> np.ndarray:
         off = np.sign(off) * np.maximum(np.abs(off) - arm.backlash, 0.0)
         torque = arm.stiffness * off - arm.servo_damping * data.qvel
         data.qfrc_applied[:] = np.clip(torque, -arm.torque_limit, arm.torque_limit)
+        if row >= 0 and row % EVERY == 0:
+            torques[row // EVERY] = data.qfrc_applied
         mujoco.mj_step(model, data)
-    return found
+    return found, torques
 
 
 def labels(found: dict[str, tuple[Case, list[Difference]]], joints: dict[str, tuple[str, ...]]) -> str:
@@ -168,6 +181,8 @@ def _drawn(machine: Machine, rng: np.random.Generator) -> Arm:
 
 
 def _difference(kind: str, own: Arm, rng: np.random.Generator) -> Difference:
+    if kind == "tilt":
+        return Difference(kind, None, 0.0, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.01, 0.05)))
     joint = int(rng.integers(len(own.stiffness)))
     if kind == "payload":
         return Difference(kind, None, 0.0, float(own.torque_limit[1] * rng.uniform(0.01, 0.03)))
@@ -184,6 +199,16 @@ def _difference(kind: str, own: Arm, rng: np.random.Generator) -> Difference:
         "offset": sign * rng.uniform(0.005, 0.03),
     }[kind]
     return Difference(kind, joint, before, float(after))
+
+
+def _reached(difference: Difference, machine: Machine, own: Arm, rng: np.random.Generator) -> Difference:
+    """Return a difference that motions show: a limit of torque below what the servo gives without it."""
+    if difference.kind != "torque_limit":
+        return difference
+    every = round(STEP * EVERY / machine.step)
+    told = exciting(machine, SECONDS, np.random.default_rng(rng.integers(1 << 32))).q[::every]
+    given = np.abs(simulate(mujoco.MjModel.from_xml_string(_mjcf(machine, own)), own, told)[1]).max(axis=0)
+    return replace(difference, robot=float(given[difference.joint] * rng.uniform(0.5, 0.8)))
 
 
 def _mjcf(machine: Machine, arm: Arm) -> str:

@@ -1,8 +1,9 @@
-"""`python -m commanded.run MODELS FOLDER [--count 24]`: make sealed cases, then diagnose and score them.
+"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque]`: make sealed cases, then diagnose and score them.
 
 MODELS is where `pip download --no-deps robosuite gymnasium-robotics -d MODELS` put its wheels. The first call makes the
 cases, writes `labels.json` in FOLDER_labels and prints its SHA-256: commit that. The second diagnoses those that are
-not yet diagnosed, one after another, and writes `RESULTS_COMMANDED.md`.
+not yet diagnosed, one after another, and writes `RESULTS_COMMANDED.md`, or where torque is logged, too,
+`RESULTS_COMMANDED_TORQUE.md`.
 """
 
 from __future__ import annotations
@@ -19,26 +20,26 @@ import numpy as np
 
 from closed_loop.models import read_model as read_arm
 from commanded.cases import NOISE, labels, make, plans
+from irtwin.diagnosing import diagnose
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
 from irtwin.simulator.model import read_model
 from irtwin.simulator.play import play, whole
-from irtwin.simulator.playing import diagnose
 from irtwin.simulator.servos import servos
 
 EFFECTS = {  # what each kind is called by a diagnosis
     "armature": "rotor_inertia", "damping": "viscous_friction", "friction": "coulomb_friction",
     "stiffness": "servo_stiffness", "payload": "payload", "delay": "command_delay", "backlash": "servo_dead_band",
-    "torque_limit": "servo_torque_limit", "offset": "command_offset",
+    "torque_limit": "servo_torque_limit", "offset": "command_offset", "tilt": "base_tilt",
 }  # fmt: skip
-OUT = Path(__file__).parents[1] / "RESULTS_COMMANDED.md"
+OUT = Path(__file__).parents[1]
 Label = Mapping[str, Any]
 
 
-def seal(models: Path, folder: Path, count: int) -> None:
+def seal(models: Path, folder: Path, count: int, torque: bool) -> None:
     """Make the cases and apart their labels; print the checksum of these."""
     made, joints = {}, {}
-    for case in plans(count):
+    for case in plans(count, torque):
         made[case.name] = case, make(case, models, folder)
         joints[case.name] = read_arm(models, case.arm).joints
         print(f"made {case.name}", flush=True)
@@ -51,16 +52,15 @@ def seal(models: Path, folder: Path, count: int) -> None:
 def judge(folder: Path) -> dict[str, Any]:
     """Diagnose a case; return its document, and what its written model leaves of the runs that were held out, rad."""
     begin = time.process_time()
-    data_set = read_data_set(folder / "data", commanded=True)
-    model = read_model(folder / "model.xml", data_set.robot)
-    found = diagnose(data_set, model)
     new = folder / "written.xml"
-    new.write_bytes(found.written())
+    new.unlink(missing_ok=True)
+    found = diagnose(folder / "data", simulator=folder / "model.xml", simulator_file=new)
+    robot = read_data_set(folder / "data", commanded=True).robot
     left = {}
     for name, file in (("before", folder / "model.xml"), ("after", new)):
-        own = servos(read_model(file, data_set.robot))
+        own = servos(read_model(file, robot))
         runs = read_data_set(folder / "held_out", commanded=True).runs
-        squares = [((run.signals.q - play(own, [own.numbers], [whole(run)])[0][0]) ** 2).mean() for run in runs]
+        squares = [((run.signals.q - play(own, [own.numbers], [whole(run)])[0][0][:, 0]) ** 2).mean() for run in runs]
         left[name] = float(np.sqrt(np.mean(squares)))
     return {"document": found.document.to_json(), "left": left, "seconds": time.process_time() - begin}
 
@@ -143,10 +143,11 @@ def main() -> None:
     parser.add_argument("models", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=24)
+    parser.add_argument("--torque", action="store_true", help="log the servos' torque, too")
     arguments = parser.parse_args()
     file = Path(f"{arguments.folder}_labels") / "labels.json"
     if not file.exists():
-        seal(arguments.models, arguments.folder, arguments.count)
+        seal(arguments.models, arguments.folder, arguments.count, arguments.torque)
         return
     told, found = json.loads(file.read_text(encoding="utf-8")), {}
     for name in told:
@@ -159,7 +160,8 @@ def main() -> None:
                 continue
         found[name] = json.loads(out.read_text(encoding="utf-8"))
         print(name, score(told[name], found[name]), found[name]["left"], flush=True)
-        OUT.write_text(page(told, found, _sum(file)), encoding="utf-8")
+        name_of_page = "RESULTS_COMMANDED_TORQUE.md" if arguments.torque else "RESULTS_COMMANDED.md"
+        (OUT / name_of_page).write_text(page(told, found, _sum(file)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from irtwin.simulator.differences import drawn, written
 from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
+from irtwin.simulator.servos import has_servos
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
@@ -53,13 +54,13 @@ def diagnose(
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
     in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
-    observed motions is held against the robot, as runs of a simulator are; of runs with commands and no torque, these
-    are played through it (channel "position"). `withhold` takes effects out of the twin and leaves them in the
-    catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is
-    kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at
-    all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
-    motion of the next experiment, where one is designed, `simulator_file` the simulator's model with the numbers that
-    the robot has, and beside it as many `draws` of what these could be, FILE-1 and so on.
+    observed motions is held against the robot, as runs of a simulator are; commands of runs are played through its
+    servos (channel "position"), and their torque is held against them. `withhold` takes effects out of the twin and
+    leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace`
+    the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each
+    whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added,
+    `motion_file` the motion of the next experiment, where one is designed, `simulator_file` the simulator's model with
+    the numbers that the robot has, and beside it as many `draws` of what these could be, FILE-1 and so on.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
@@ -74,14 +75,17 @@ def diagnose(
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
     model = None if simulator is None else read_model(Path(simulator), data_set.robot)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
-    _check_asked(data_set, lacking | {"an effect to withhold": withhold or None})
+    asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     data_set = _with_cutoff(data_set, cutoff)
     if location is not None:
         from irtwin.workflow import as_asserted
 
         data_set = as_asserted(location, data_set)
     with telling(announce):
-        data_set, found = _found(data_set, model, given, withhold, seed)
+        found: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model)
+        if found is None:
+            data_set = data_set if model is None else with_simulated_runs(data_set, model)
+            found = gap.diagnose(data_set, twin=given, simulator=model, withhold=withhold, seed=seed)
     if location is not None:  # first, as a damaged workspace is to leave no file beside its error
         from irtwin.workflow import keep_diagnosis
 
@@ -156,22 +160,29 @@ def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:
     return replace(data_set, cutoff=checked_cutoff(cutoff, signals, "cutoff"))
 
 
-def _check_asked(data_set: DataSet, lacking: Mapping[str, object]) -> None:
-    """Raise InputError where something is given or asked for that a diagnosis by playing lacks."""
-    for name, value in lacking.items():
-        if data_set.is_commanded and value is not None:
-            raise InputError(
-                f"{data_set.folder}: has commands and no torque: {name} is of no use for it; leave that out"
-            )
+def _asked(data_set: DataSet, lacking: Mapping[str, object]) -> bool:
+    """Return whether anything is given or asked for that a diagnosis by playing lacks.
+
+    Raises InputError where there is no other.
+    """
+    asked = [name for name, value in lacking.items() if value is not None]
+    if asked and data_set.is_commanded:
+        raise InputError(
+            f"{data_set.folder}: has commands and no torque: {asked[0]} is of no use for it; leave that out"
+        )
+    return bool(asked)
 
 
-def _found(
-    data_set: DataSet, model: Model | None, twin: Twin | None, withhold: Sequence[str], seed: int
-) -> tuple[DataSet, Diagnosis | Playing]:
-    """Return the diagnosis, and the data set with the runs of a simulator, if any were made."""
-    if model is not None and data_set.is_commanded:
-        return data_set, diagnose_by_playing(data_set, model)
-    if model is not None:
-        data_set = with_simulated_runs(data_set, model)
-    found = gap.diagnose(data_set, twin=twin, simulator=model, withhold=withhold, seed=seed)
-    return data_set, found
+def _played(data_set: DataSet, model: Model) -> Playing | None:
+    """Return the diagnosis by playing; None where what the model lacks is to be looked for in the torque."""
+    if not data_set.is_commanded and not _can_play(data_set, model):
+        return None
+    played = diagnose_by_playing(data_set, model)
+    return None if played.is_open else played
+
+
+def _can_play(data_set: DataSet, model: Model) -> bool:
+    """Return whether all runs are the robot's own and have commands, and the model's joints are driven by them."""
+    return has_servos(model) and all(
+        run.role == "observed" and run.signals.command is not None for run in data_set.runs
+    )

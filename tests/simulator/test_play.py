@@ -22,7 +22,7 @@ def test_commands_are_held_until_the_next_and_come_late(tmp_path):
 def test_a_servo_settles_where_its_load_lets_it(tmp_path):
     text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))
-    q = play(own, [own.numbers], [whole(data_set.runs[0])])[0][0][-1]
+    q = play(own, [own.numbers], [whole(data_set.runs[0])])[0][0][-1, 0]
     sags = 9.81 * 0.1 * 0.1 * np.cos(q.sum()) / 15
     assert q[1] == pytest.approx(sags, rel=1e-3)
 
@@ -31,7 +31,7 @@ def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(tmp_path):
     text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))
     numbers = [own.numbers, servo_arm.changed(own, dead_band=(0.0, 0.03)), servo_arm.changed(own, torque_limit=(5, 0))]
-    tight, loose, weak = (q[0][-1] for q in play(own, numbers, [whole(data_set.runs[0])]))
+    tight, loose, weak = (q[0][-1, 0] for q in play(own, numbers, [whole(data_set.runs[0])]))
     assert loose[1] - tight[1] == pytest.approx(0.03, rel=0.02)
     assert weak[1] > 0.5
 
@@ -56,6 +56,6 @@ def test_a_joint_by_itself_plays_nearly_as_the_whole_model(tmp_path):
     )
     stretches = each(data_set.runs[0], 2.0, 2)
     single, whole_ = alone(own, stretches, 0.005).play([numbers])[0], play(own, [numbers], stretches)[0]
-    far = max(np.abs(one.q - own_).max() for one, own_ in zip(stretches, whole_, strict=True))
+    far = max(np.abs(one.measured - own_).max() for one, own_ in zip(stretches, whole_, strict=True))
     near = max(np.abs(one - other).max() for one, other in zip(single, whole_, strict=True))
     assert near < 0.02 < far

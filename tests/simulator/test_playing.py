@@ -15,6 +15,7 @@ from tests.data_sets import irtwin
 
 from irtwin.document.document import Change, Document
 from irtwin.report.gap.headline import line
+from irtwin.simulator.playing import diagnose
 
 
 def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), **numbers):
@@ -156,3 +157,45 @@ def test_commands_that_the_model_clips_are_said(tmp_path):
     lines = _clipped(own, data_set.runs)
     assert len(lines) == 2
     assert "of its commands are beyond the model's ctrlrange, which clips them" in lines[0]
+
+
+def with_torque(folder, **numbers):
+    """Return a data set whose runs have commands, positions and torque, and a model that it is held against."""
+    told = {name: servo_arm.swings(6, seed) for seed, name in enumerate("ab")}
+    data_set, model, own = servo_arm.read(*servo_arm.write(folder, told))
+    return servo_arm.played(data_set, own, servo_arm.changed(own, **numbers), torque_noise=5e-3), model
+
+
+@pytest.mark.slow
+def test_torque_says_what_motion_leaves_open(tmp_path):
+    found = diagnose(*with_torque(tmp_path, delay=(0.04, 0.0), stiffness=(20.0, 12.0)))
+    assert {one.id for one in found.document.causes} == {"command_delay@lift", "servo_stiffness@elbow"}
+    numbers = found.document.causes[0].parameters + found.document.causes[1].parameters
+    assert sorted(one.robot for one in numbers) == pytest.approx([0.04, 12.0], rel=0.01)
+    assert found.document.gap.torque["elbow"].rmse > 0.05
+    assert found.document.shrink.torque_rmse.after < 6e-3 < found.document.shrink.torque_rmse.before
+    assert not found.is_open
+
+
+@pytest.mark.slow
+def test_where_no_number_differs_a_torque_that_stays_is_left_open(tmp_path):
+    data_set, model = with_torque(tmp_path)
+    assert not diagnose(data_set, model).is_open
+    rippled = [
+        replace(run, signals=replace(run.signals, torque=run.signals.torque + 0.3 * np.sin(9 * run.signals.q)))
+        for run in data_set.runs
+    ]
+    assert diagnose(replace(data_set, runs=tuple(rippled)), model).is_open
+
+
+@pytest.mark.slow
+def test_who_asks_for_a_twin_is_answered_from_the_torque(tmp_path):
+    data_set, _ = with_torque(tmp_path)
+    for run in data_set.runs:
+        servo_arm.log(run.file, data_set.robot, run.signals)
+    said = irtwin(
+        "diagnose", tmp_path / "data", "--simulator", tmp_path / "arm.xml", "--save-twin", tmp_path / "t.json"
+    )
+    assert said.status == 0, said.err
+    assert "Playing" not in said.err
+    assert (tmp_path / "t.json").exists()

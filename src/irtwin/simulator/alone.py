@@ -45,8 +45,8 @@ class Alone:
     begun: np.ndarray
 
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
-        """Return, for each set of numbers (k, n) and each stretch, the positions (N, n) at its samples."""
-        most = max(1, _AT_ONCE // self.load[0].size)
+        """Return, for each set of numbers (k, n) and each stretch, what the joints do at its samples, as `measured`."""
+        most = max(1, _AT_ONCE // (self.load[0].size * self.stretches[0].measured.shape[1]))
         found: list[list[np.ndarray]] = []
         for first in range(0, len(numbers), most):
             found += self._some(np.array(numbers[first : first + most]))
@@ -56,15 +56,15 @@ class Alone:
         steps = self.load.shape[1]
         begin = np.arange(steps) * self.step
         told = np.array([[one.commands(begin, self.step, each) for one in self.stretches] for each in numbers])
-        positions = self._moved(numbers, np.moveaxis(told, 2, 0))
+        moved = self._moved(numbers, np.moveaxis(told, 2, 0))
         at = [one.time / self.step for one in self.stretches]
         return [
-            [_between(positions[:, one, place], at[place]) for place in range(len(self.stretches))]
+            [_between(moved[:, :, one, place], at[place]) for place in range(len(self.stretches))]
             for one in range(len(numbers))
         ]
 
     def _moved(self, numbers: np.ndarray, told: np.ndarray) -> np.ndarray:
-        """Return positions (steps + 1, v, p, n) under the commands told (steps, v, p, n)."""
+        """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n)."""
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at, dof = servos.actuators, servos.model.speeds
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
@@ -82,8 +82,8 @@ class Alone:
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
         followed, changed = q.copy(), changes.any()
-        positions = np.empty((len(told) + 1, *told.shape[1:]))
-        positions[0] = q
+        moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
+        moved[0, 0] = q
         for row in range(len(told)):
             load, bodies = self.load[0, row], self.inertia[0, row]
             if changed:
@@ -94,13 +94,15 @@ class Alone:
             off = followed - q
             off -= np.minimum(np.maximum(off, -band), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
+            moved[row, 1:] = force
             force -= joint * v + load
             held = (force * inverse + back * v) / (inverse + soft)
             force -= np.minimum(np.maximum(held, -friction), friction)
             v = v + step * force * inverse / (1 + step * damping * inverse)
             q = q + step * v
-            positions[row + 1] = q
-        return positions
+            moved[row + 1, 0] = q
+        moved[-1, 1:] = moved[-2, 1:]
+        return moved
 
 
 def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
@@ -151,8 +153,8 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: Stretch) -> tuple
     return torque, inertia
 
 
-def _between(positions: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return positions (N, n) at places (N,) between those of the steps."""
-    before = np.clip(at.astype(int), 0, len(positions) - 2)
-    share = np.clip(at - before, 0.0, 1.0)[:, None]
-    return np.asarray(positions[before] * (1 - share) + positions[before + 1] * share)
+def _between(moved: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return values (N, c, n) at places (N,) between those of the steps."""
+    before = np.clip(at.astype(int), 0, len(moved) - 2)
+    share = np.clip(at - before, 0.0, 1.0)[:, None, None]
+    return np.asarray(moved[before] * (1 - share) + moved[before + 1] * share)

@@ -21,7 +21,6 @@ _HOLDING = NAMES.index("holding")
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
 _PARTS = tuple(np.isin(NAMES, names)[:, None] for names in PARTS.values())
 _SHOWS = 1.0  # natural logarithm of odds that one step of a payload or a tilt gains where there is one
-_LEAST = 2e-4  # rad (m), a misfit that is none: less than encoders resolve
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
 _AGAIN, _PASSES = 2, 4  # passes after numbers were given back, and when one was added
 _FEW = 2  # numbers of a joint that may stand for many
@@ -48,6 +47,20 @@ class Choice:
     def numbers(self) -> np.ndarray:
         """The robot's numbers (k, n)."""
         return self.fit.servos.of_chart(self.played.at)
+
+    @property
+    def torque_left(self) -> np.ndarray:
+        """What is left of each joint's torque but noise that is new in each sample, (n,), as a share of it.
+
+        None, (0, n), where no torque was logged.
+        """
+        left, logged = (
+            [one[:, 1:] for one in some]
+            for some in (self.played.remainders, [one.measured for one in self.fit.stretches])
+        )
+        alike = np.mean([(one[1:] * one[:-1]).mean(axis=0) for one in left], axis=0)
+        whole = np.mean([(one**2).mean(axis=0) for one in logged], axis=0)
+        return np.asarray(np.sqrt(np.maximum(alike, 0.0) / np.maximum(whole, 1e-300)))
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
         """Return numbers (k, n) as they could be: as far off as the intervals say, a joint's together as its errors."""
@@ -185,6 +198,8 @@ def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played
     begun = begins[-1] if row == _HOLDING else fit.best(begins)
     if NAMES[row] == "torque_limit":
         begun = fit.limited(begun)
+    if NAMES[row] == "delay":
+        begun = fit.delayed(begun)
     return fit.solved(begun, more, _PASSES), more
 
 
@@ -214,17 +229,17 @@ def _all_free(fit: Fit) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted."""
     free, own = _free(fit), fit.servos.chart(fit.servos.numbers)
     begun = [fit.rolled(at) for at in (own, fit.begun().at)]
-    best = fit.best([*begun, *(fit.rolled(fit.limited(fit.played(one.at)).at) for one in begun)])
+    best = fit.best([*begun, *(fit.rolled(fit.delayed(fit.limited(fit.played(one.at))).at) for one in begun)])
     for _ in range(2):
         fit = _judged(fit, best)
-        best = fit.solved(fit.limited(fit.played(best.at)), free)
+        best = fit.solved(fit.delayed(fit.limited(fit.played(best.at))), free)
     return fit, best
 
 
 def _judged(fit: Fit, best: Played) -> Fit:
     """Return the fit about numbers, what they leave taken for what is left at best."""
     usual = np.sqrt(np.median(best.squares, axis=0))
-    return replace(fit, floor=np.maximum(usual, _LEAST), certainty=_certainty(best)).about(best.at)
+    return replace(fit, floor=np.maximum(usual, fit.least), certainty=_certainty(best)).about(best.at)
 
 
 def _free(fit: Fit) -> np.ndarray:
@@ -234,7 +249,7 @@ def _free(fit: Fit) -> np.ndarray:
 
 
 def _certainty(best: Played) -> np.ndarray:
-    """Return how many independent samples the remainder of a stretch has, (n,): the median of all."""
+    """Return how many independent samples the remainder of a stretch has, (c, n): the median of all."""
     counts = []
     for left in best.remainders:
         spectrum = np.abs(np.fft.rfft(left, 2 * len(left), axis=0)) ** 2

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from irtwin.identification.progress import tell_step
+from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import Stretch, play
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, Servos
@@ -16,6 +18,8 @@ from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, Servos
 _HOLDING = NAMES.index("holding")
 SMOOTH = tuple(NAMES.index(name) for name in OF_JOINTS if name != "holding")  # rows of joints that least squares finds
 SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
+_LEAST, _LEAST_OF_TORQUE = 2e-4, 1e-3  # rad (m); share of a joint's torque
+_BEGUN, _LOOKS = 50.0, 3.0  # times that, and independent samples, before either is known
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
 _STEP = {
     "offset": 0.002,
@@ -43,6 +47,7 @@ _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
 _DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
 _PASSES, _WORTH = 12, 0.05
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.35, 0.25, 0.15)  # of the limit, or of the most that the servo is asked for, tried
+_LATE = (-2, -1, 1, 2, 3, 4, 6, 8)  # samples by which a delay is tried
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
@@ -55,10 +60,13 @@ STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKEL
 
 @dataclass(frozen=True)
 class Played:
-    """What is left of stretches beside numbers (k, n): squares (p, n), rad^2, means over each stretch; `remainders`."""
+    """What is left of stretches beside numbers (k, n): squares (p, c, n), means over each stretch; `remainders`.
+
+    Of positions, rad, and of torques, N m, where they were logged.
+    """
 
     at: np.ndarray  # (k, n), in the chart
-    remainders: tuple[np.ndarray, ...]  # a stretch: (N, n), robot less model
+    remainders: tuple[np.ndarray, ...]  # a stretch: (N, c, n), robot less model
     squares: np.ndarray
 
 
@@ -101,13 +109,19 @@ class Fit:
     """What numbers are fitted to, and how a misfit counts.
 
     A stretch counts by the logarithm of its mean square: how much any may be off is not known before. `certainty`
-    (n,): independent samples a stretch has; `floor` (n,), rad: misfits below it are none.
+    (c, n): independent samples a stretch has; `floor` (c, n), rad and N m: misfits below it are none.
     """
 
     alone: Alone
     floor: np.ndarray
     certainty: np.ndarray
-    beyond: tuple[np.ndarray, ...] | None = None  # a stretch: (N, n), what the whole model plays beyond single joints
+    beyond: tuple[np.ndarray, ...] | None = None  # a stretch: (N, c, n), the whole model beyond single joints
+
+    @cached_property
+    def least(self) -> np.ndarray:
+        """A misfit that is none (c, n): less than encoders resolve, and torques are measured to."""
+        squares = np.mean([(one.measured**2).mean(axis=0) for one in self.stretches], axis=0)
+        return np.vstack([np.full_like(squares[:1], _LEAST), _LEAST_OF_TORQUE * np.sqrt(squares[1:])])
 
     @property
     def servos(self) -> Servos:
@@ -128,8 +142,8 @@ class Fit:
         found = self.alone.play([self.servos.of_chart(at) for at in many])
         beyond = self.beyond or (0.0,) * len(self.stretches)
         return [
-            self._left(at, [q + more for q, more in zip(positions, beyond, strict=True)])
-            for at, positions in zip(many, found, strict=True)
+            self._left(at, [one + more for one, more in zip(moved, beyond, strict=True)])
+            for at, moved in zip(many, found, strict=True)
         ]
 
     def rolled(self, at: np.ndarray) -> Played:
@@ -142,10 +156,10 @@ class Fit:
         single = self.alone.play([self.servos.of_chart(at)])[0]
         return replace(self, beyond=tuple(one - other for one, other in zip(whole, single, strict=True)))
 
-    def _left(self, at: np.ndarray, positions: Sequence[np.ndarray]) -> Played:
+    def _left(self, at: np.ndarray, moved: Sequence[np.ndarray]) -> Played:
         left = [
-            np.nan_to_num((one.q - q)[one.time >= _SETTLED], nan=1e3, posinf=1e3, neginf=-1e3)
-            for one, q in zip(self.stretches, positions, strict=True)
+            np.nan_to_num((one.measured - played)[one.time >= _SETTLED], nan=1e3, posinf=1e3, neginf=-1e3)
+            for one, played in zip(self.stretches, moved, strict=True)
         ]
         return Played(at, tuple(left), np.array([(each**2).mean(axis=0) for each in left]))
 
@@ -155,7 +169,7 @@ class Fit:
 
     def misfit(self, one: Played) -> np.ndarray:
         """Return what is left as a logarithm of probability, (n,)."""
-        return np.asarray(self.certainty / 2 * np.log1p(one.squares / self.floor**2).sum(axis=0))
+        return np.asarray((self.certainty / 2 * np.log1p(one.squares / self.floor**2)).sum(axis=(0, 1)))
 
     def away(self, at: np.ndarray) -> np.ndarray:
         """Return how far numbers (k, n) are from the simulator's, in standard deviations of what is likely."""
@@ -172,8 +186,8 @@ class Fit:
                 [(left - each.remainders[place]) / STEP[row, 0] for row, each in zip(rows, moved, strict=True)], axis=-1
             )
             weight = self.certainty / (len(left) * (one.squares[place] + self.floor**2))
-            normal.append(np.einsum("tnk,tnl->nkl", columns, columns) * weight[:, None, None])
-            right.append(np.einsum("tnk,tn->nk", columns, left) * weight[:, None])
+            normal.append(np.einsum("tcnk,tcnl,cn->nkl", columns, columns, weight, optimize=True))
+            right.append(np.einsum("tcnk,tcn,cn->nk", columns, left, weight, optimize=True))
         return Slopes(np.array(normal), np.array(right))
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
@@ -191,7 +205,8 @@ class Fit:
             chosen = np.argmin(self._costs(tried, together), axis=0)
             best = self.best((best, *tried), together)
             damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
-            tell_step(f"  numbers of servos, pass {number + 1}: {1e3 * np.sqrt(best.squares.mean()):.3g} mrad left")
+            left = 1e3 * np.sqrt(best.squares[:, 0].mean())
+            tell_step(f"  numbers of servos, pass {number + 1}: {left:.3g} mrad left")
             if (before - self.cost(best) < _WORTH).all():
                 break
         return best
@@ -237,7 +252,7 @@ class Fit:
         chosen = np.argmin(self._costs(tried, together), axis=0)
 
         def mixed(parts: Sequence[np.ndarray]) -> np.ndarray:
-            return np.column_stack([parts[one][:, joint] for joint, one in enumerate(chosen)])
+            return np.stack([parts[one][..., joint] for joint, one in enumerate(chosen)], axis=-1)
 
         stretches = range(len(self.stretches))
         return Played(
@@ -261,6 +276,17 @@ class Fit:
             found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))
         return found
 
+    def delayed(self, best: Played) -> Played:
+        """Return numbers with the delays that are better, if any, by whole samples.
+
+        Torque has a step at each command, so that a delay between samples is worse than any next to it.
+        """
+        numbers, row = self.servos.of_chart(best.at), NAMES.index("delay")
+        is_delay = np.arange(len(NAMES))[:, None] == row
+        apart = interval(self.stretches[0].time)
+        tried = [np.where(is_delay, numbers + late * apart, numbers) for late in _LATE]
+        return self.best((best, *self.all_played([self.servos.chart(one) for one in tried])))
+
     def begun(self) -> Played:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
         own, tried = self.servos.numbers, []
@@ -273,3 +299,9 @@ class Fit:
             begun = self.best(self.all_played([self.servos.chart(one) for one in grid]))
             tried.append(self.solved(begun, free, 3))
         return self.best(tried)
+
+
+def unjudged(alone: Alone) -> Fit:
+    """Return a fit that knows nothing of its misfit yet."""
+    fit = Fit(alone, np.array(0.0), np.array(0.0))
+    return replace(fit, floor=_BEGUN * fit.least, certainty=np.full(fit.least.shape, _LOOKS))

@@ -155,6 +155,11 @@ def _compiled(file: MjcfFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjMode
             one.delay, one.nsample = 0.0, 0
         for joint in paired:
             _add_second(spec, joint, mujoco)
+        for joint in spec.joints:
+            if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+                spec.add_sensor(
+                    type=mujoco.mjtSensor.mjSENS_JOINTACTFRC, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint.name
+                )
         return spec.compile(), delays
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error

@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
 from irtwin.simulator.servos import NAMES, Servos
+
+if TYPE_CHECKING:
+    import mujoco
 
 _AROUND = 0.1  # s about a beginning, of which position and speed there are taken
 _MOST = 20_000_000  # values of states that are held at a time: 160 MB
@@ -33,6 +37,12 @@ class Stretch:
     def q(self) -> np.ndarray:
         """The robot's positions (N, n)."""
         return np.asarray(self.run.signals.q[self.rows])
+
+    @property
+    def measured(self) -> np.ndarray:
+        """What the robot did, (N, c, n): positions, and torques where they were logged."""
+        torque = self.run.signals.torque
+        return self.q[:, None] if torque is None else np.stack([self.q, torque[self.rows]], axis=1)
 
     @property
     def speed(self) -> np.ndarray:
@@ -86,7 +96,7 @@ def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
 def play(
     servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], step: float | None = None
 ) -> list[list[np.ndarray]]:
-    """Return, for each set of numbers (k, n) and each stretch, the positions (N, n) of the model at its samples.
+    """Return, for each set of numbers (k, n) and each stretch, what the model does at its samples, as `measured`.
 
     `step`, s, is that of the simulation, None the model's own. Joints that the robot lacks are told zero.
     """
@@ -99,6 +109,7 @@ def play(
 def _played(
     servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], steps: int, step: float
 ) -> Iterator[np.ndarray]:
+    """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     import mujoco
     from mujoco.rollout import rollout
 
@@ -108,6 +119,7 @@ def _played(
     datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
     states = [_state(servos, one, size) for one in stretches]
     models = [servos.compiled(one, step, paired) for one in numbers]
+    efforts = _efforts(compiled, servos)
     pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
     at_once = max(1, _MOST // (steps * size))
     begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
@@ -118,11 +130,31 @@ def _played(
             commands = stretches[place].commands(begin, step, numbers[one])
             for drives in (servos.actuators, *([servos.paired.second] if paired else [])):
                 told[row][:, drives] = commands
-        found, _ = rollout([models[one] for one, _ in some], datas, np.array([states[at] for _, at in some]), told)
+        begun = np.array([states[at] for _, at in some])
+        found, sensed = rollout([models[one] for one, _ in some], datas, begun, told)
         for row, (_, place) in enumerate(some):
-            begun, time = states[place][1 + servos.model.positions], stretches[place].time
-            q = np.vstack([begun, found[row][:, 1 + servos.model.positions]])
-            yield np.column_stack([np.interp(time, np.concatenate([[0.0], after]), values) for values in q.T])
+            time = stretches[place].time
+            q = np.vstack([begun[row], found[row]])[:, 1 + servos.model.positions]
+            played = [_at(time, np.concatenate([[0.0], after]), q)]
+            if stretches[place].run.signals.torque is not None:
+                played.append(_at(time, begin, sensed[row][:, efforts]))
+            yield np.stack(played, axis=1)
+
+
+def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.interp(time, times, each) for each in values.T])
+
+
+def _efforts(compiled: mujoco.MjModel, servos: Servos) -> np.ndarray:
+    """Return where among the sensors' values are the torques of the joints' actuators (n,)."""
+    import mujoco
+
+    of = {
+        int(joint): int(compiled.sensor_adr[sensor])
+        for sensor, joint in enumerate(compiled.sensor_objid)
+        if compiled.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTACTFRC
+    }
+    return np.array([of[compiled.joint(joint).id] for joint in servos.model.joints])
 
 
 def _state(servos: Servos, stretch: Stretch, size: int) -> np.ndarray:

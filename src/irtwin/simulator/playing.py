@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
 from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import Choice, choose
-from irtwin.simulator.fit import Fit
+from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import Stretch, each
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
@@ -25,6 +25,7 @@ from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
+_AGREES = 0.03  # share of a joint's torque that is no gap
 _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 
 
@@ -38,6 +39,12 @@ class Playing:
     against: str = "simulated"  # the role of what the observed runs are held against
     twin: None = None  # positions alone make none
 
+    @property
+    def is_open(self) -> bool:
+        """Whether no number differs, and yet the torque, if it was logged, has more than noise beside the model's."""
+        named = any(one.matters for one in self.document.findings)
+        return not named and bool((self.chosen.torque_left > _AGREES).any())
+
     def written(self) -> bytes:
         """Return the model's file with the robot's numbers."""
         return self.chosen.fit.servos.written(self.chosen.numbers, self.chosen.differs)
@@ -48,7 +55,7 @@ class Playing:
 
 
 def diagnose(data_set: DataSet, model: Model) -> Playing:
-    """Hold a model against the observed runs by playing their commands.
+    """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
 
     Raises InputError where a run has no commands or they are in degrees, or the model has no position servos.
     """
@@ -57,14 +64,15 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
         raise InputError(f"{data_set.folder}: no run is observed; there is nothing to hold the model against")
     for run in runs:
         _check_commands(run, data_set.robot)
+    if any(run.signals.torque is None for run in runs):
+        runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = servos(model)
     for line in _clipped(own, runs):
         tell(line)
     tell("Fitting numbers of servos")
     stretches = _stretches(runs)
     step = max(_STEP, model.compiled.opt.timestep)
-    begun = Fit(alone(own, stretches, step), np.full(len(model.joints), 1e-2), np.full(len(model.joints), 3.0))
-    chosen = choose(begun)
+    chosen = choose(unjudged(alone(own, stretches, step)))
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))

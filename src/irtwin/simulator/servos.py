@@ -203,23 +203,24 @@ def tilted(compiled: mujoco.MjModel, angles: Sequence[float]) -> np.ndarray:
     return np.asarray(Rotation.from_rotvec([*angles, 0.0]).apply(compiled.opt.gravity))
 
 
+def has_servos(model: Model) -> bool:
+    """Return whether each joint of the robot is driven by one position servo."""
+    return all(_servo(model, joint) is not None for joint in model.joints)
+
+
 def servos(model: Model) -> Servos:
     """Return the servos of a model. Raises InputError where a joint is not driven by one position servo."""
     import mujoco
 
     compiled = model.compiled
-    found = []
-    for joint in model.joints:
-        place = compiled.joint(joint).id
-        own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
-        (drives,) = np.nonzero(own)
-        if len(drives) != 1 or not _follows_position(compiled, drives[0]):
+    found = {joint: _servo(model, joint) for joint in model.joints}
+    for joint, one in found.items():
+        if one is None:
             raise InputError(
                 f"{model.file.path}: joint {joint} is not driven by one position servo; its commands need one to be "
                 f'played: <position joint="{joint}" kp="..."/>'
             )
-        found.append(drives[0])
-    at, dof = np.array(found), model.speeds
+    at, dof = np.array(list(found.values())), model.speeds
     stiffness = compiled.actuator_gainprm[at, 0]
     own = np.vstack(
         [
@@ -243,6 +244,16 @@ def servos(model: Model) -> Servos:
     scale = np.array([_NEAR_ZERO.get(name, np.nan) for name in NAMES])[:, None] * np.diag(inertia)[dof]
     scale[NAMES.index("payload")] = _LIGHT * compiled.body_subtreemass[compiled.jnt_bodyid[compiled.dof_jntid[dof[0]]]]
     return Servos(model, at, own, scale)
+
+
+def _servo(model: Model, joint: str) -> int | None:
+    """Return the actuator that alone drives a joint, if it is a position servo."""
+    import mujoco
+
+    compiled, place = model.compiled, model.compiled.joint(joint).id
+    own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
+    (drives,) = np.nonzero(own)
+    return int(drives[0]) if len(drives) == 1 and _follows_position(compiled, int(drives[0])) else None
 
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:

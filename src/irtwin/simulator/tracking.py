@@ -1,4 +1,4 @@
-"""Tracking error: what a robot's positions have beyond a model's, by run, by horizon and by what differs."""
+"""Tracking error: what a robot's positions and torques have beyond a model's, by run, horizon and what differs."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from irtwin.simulator.servos import NAMES, Servos, part_of
 _FOLDS = 3
 _BEGUN_ANEW, _MOST = 0.5, 60  # s; how often in a run
 _HORIZONS = (0.1, 0.2, 0.3, 0.4, 0.5)  # s
+_NONE = 1e-14  # rad^2 (m^2), a mean square as good as none
 _POSES = 500  # of a run, of which the flange's place is told
 
 OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
@@ -27,7 +28,7 @@ OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
 
 @dataclass(frozen=True)
 class Tracked:
-    """Tracking error of a run played as a whole: mean `squares` (n,) by joint, rad^2; `flange`, m, RMS."""
+    """Tracking error of a run played as a whole: mean `squares` (c, n), rad^2 and N^2 m^2; `flange`, m, RMS."""
 
     squares: np.ndarray
     flange: float
@@ -35,7 +36,7 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Parts:
-    """Mean squares (G, n) of what groups of stretches leave, by which names' numbers are the robot's, not the model's.
+    """Mean squares (G, c, n) of what groups of stretches leave, by which names' numbers are the robot's.
 
     A group is a run; a stretch where there is one run.
     """
@@ -61,6 +62,10 @@ class Parts:
         """What is left with all numbers but those of one name."""
         return self.squares[frozenset(self.names) - {name}]
 
+    def relative(self, squares: np.ndarray) -> np.ndarray:
+        """Return squares (G,) summed over joints, and over channels, each in units of what the model leaves of it."""
+        return np.asarray((squares / np.maximum(self.before.mean(axis=(0, 2)), _NONE)[:, None]).sum(axis=(1, 2)))
+
     def closed(self, names: Sequence[str], of: Sequence[Sequence[str]]) -> np.ndarray:
         """Return what some names close (G,), summed over joints, averaged over the orders in which parts `of` join."""
         others, found = [part for part in of if part != names], np.zeros(len(self.before))
@@ -68,7 +73,7 @@ class Parts:
             weight = factorial(count) * factorial(len(others) - count) / factorial(len(of))
             for some in combinations(others, count):
                 there = frozenset(name for part in some for name in part)
-                found += weight * (self.squares[there] - self.squares[there | set(names)]).sum(axis=1)
+                found += weight * self.relative(self.squares[there] - self.squares[there | set(names)])
         return found
 
 
@@ -88,9 +93,10 @@ def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> l
     found = []
     for run in runs:
         tell_step(f"  run {run.name}")
-        left = run.signals.q - play(own, [numbers[run.name]], [whole(run)])[0][0]
+        every = whole(run)
+        left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
         some = slice(None, None, max(1, len(left) // _POSES))
-        places = [placements(robot, q[some])[:, :3, 3] for q in (run.signals.q, run.signals.q - left)]
+        places = [placements(robot, q[some])[:, :3, 3] for q in (every.q, every.q - left[:, 0])]
         flange = float(np.sqrt(((places[0] - places[1]) ** 2).sum(axis=1).mean()))
         found.append(Tracked((left**2).mean(axis=0), flange))
     return found
@@ -104,7 +110,7 @@ def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[fl
         stretches = each(run, _BEGUN_ANEW, _MOST)
         times += [one.time for one in stretches]
         for way, played in enumerate(play(own, [own.numbers, numbers[run.name]], stretches)):
-            left[way] += [(one.q - q) ** 2 for one, q in zip(stretches, played, strict=True)]
+            left[way] += [(one.q - moved[:, 0]) ** 2 for one, moved in zip(stretches, played, strict=True)]
     time = np.concatenate(times)
     squares = [np.concatenate(way).mean(axis=1) for way in left]
     found = []
@@ -133,7 +139,7 @@ def parts(chosen: Choice, numbers: OfRun, families: Sequence[Sequence[str]]) -> 
         own = chosen.fit.servos.numbers
         told = [np.where(_rows(one), numbers[some[0].run.name], own) for one in wanted]
         rows += list(zip(same, np.moveaxis(_squares(chosen.fit.servos, told, some), 1, 0), strict=True))
-    squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, n)
+    squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, c, n)
     runs = [one.run.name for one in stretches]
     group = [runs.index(name) for name in runs] if len(set(runs)) > 1 else list(range(len(runs)))
     means = np.array(
@@ -157,5 +163,6 @@ def _rows(names: frozenset[str]) -> np.ndarray:
 def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch]) -> np.ndarray:
     played = play(own, numbers, stretches)
     return np.array([
-        [((one.q - q) ** 2).mean(axis=0) for one, q in zip(stretches, way, strict=True)] for way in played
+        [((one.measured - moved) ** 2).mean(axis=0) for one, moved in zip(stretches, way, strict=True)]
+        for way in played
     ])  # fmt: skip

@@ -22,15 +22,15 @@ from irtwin.simulator.servos import OF_JOINTS, PARTS, row_of
 from irtwin.simulator.tracking import Parts, Tracked
 
 AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
+_NONE = 1e-9  # as good as none of what the model leaves
 _ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
-_LEAST = 1e-14  # rad^2 (m^2), a mean square as good as none
 _NOT_HELD = "dead_band"  # no number of MuJoCo's servos
 _SYMBOLS = {
     "payload": ("m", "kg"),
     **{f"payload_{axis}": (f"c_{axis}", "m") for axis in "xyz"},
     **{f"tilt_{axis}": (f"angle_{axis}", "rad") for axis in "xy"},
 }
-_SHARE_OF = "the mean square of the tracking error"
+_SHARE_OF = ("the mean square of the tracking error", "the mean squares of the tracking error and of the torque's")
 
 Horizons = Sequence[tuple[float, float, float]]
 
@@ -73,21 +73,20 @@ def document(
 ) -> said.Document:
     """Return the document; `before`, `after`: each run played as a whole, by the model and by numbers of other runs."""
     squares = [np.array([one.squares for one in some]) for some in (before, after)]
-    names = sorted(parts.names, key=lambda name: -parts.without(name).sum())
+    names = sorted(parts.names, key=lambda name: -parts.relative(parts.without(name)).sum())
     causes = _causes(robot, chosen, parts, names)
     findings = _findings(robot, dict(zip(names, causes, strict=True)), parts)
     named = any(finding.matters for finding in findings)
-    closed, interval = share((squares[0] - squares[1]).sum(axis=1), squares[0].sum(axis=1))
-    verdict = _verdict(named, closed, *map(_rms, squares))
+    places, torques = [one[:, 0] for one in squares], [one[:, 1:] for one in squares]
+    closed, interval = share((places[0] - places[1]).sum(axis=1), places[0].sum(axis=1))
+    verdict = _verdict(named, closed, *map(_rms, places))
     return said.Document(
         verdict=verdict,
         robot=robot.name,
         gap=said.Gap(
             energy_error_percent=None,
-            position={
-                joint: said.Size(rmse=float(np.sqrt(mean)), noise_floor=None, excess=None)
-                for joint, mean in zip(robot.joint_names, squares[0].mean(axis=0), strict=True)
-            },
+            torque=_sizes(robot, torques[0][:, 0]) if torques[0].size else None,
+            position=_sizes(robot, places[0]),
         ),
         locations=(),
         findings=findings,
@@ -96,19 +95,26 @@ def document(
         shrink=said.Shrink(
             held_out_runs=tuple(runs) if len(runs) > 1 else (),
             noise_floor_from=None,
-            torque_rmse=None,
+            torque_rmse=_together(*(one[:, 0] for one in torques)) if torques[0].size else None,
             power_rmse=None,
             energy_error_percent=None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
             yardstick={},
-            position_rmse=_together(*squares),
+            position_rmse=_together(*places),
         ),
         next_experiment=None,
         unexplained_because="much_is_left" if verdict == "unexplained" else None,
         simulator=simulator,
         horizons=tuple(said.Horizon(seconds=at, before=one, after=other) for at, one, other in horizons),
     )
+
+
+def _sizes(robot: Robot, squares: np.ndarray) -> Mapping[str, said.Size]:
+    return {
+        joint: said.Size(rmse=float(np.sqrt(mean)), noise_floor=None, excess=None)
+        for joint, mean in zip(robot.joint_names, squares.mean(axis=0), strict=True)
+    }
 
 
 def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Curves:
@@ -120,11 +126,12 @@ def _errors(
     robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]
 ) -> Iterator[RunError]:
     for run, one, other in zip(runs, before, after, strict=True):
-        found: dict[tuple[str, str | None], tuple[float, float]] = {}
-        found["position", None] = _rms(one.squares), _rms(other.squares)
+        found: dict[tuple[str | None, str | None], tuple[float, float]] = {}
+        found["position", None] = _rms(one.squares[0]), _rms(other.squares[0])
         found["flange", None] = one.flange, other.flange
-        for place, joint in enumerate(robot.joint_names):
-            found["position", joint] = _rms(one.squares[place]), _rms(other.squares[place])
+        for channel, left, then in zip(("position", None), one.squares, other.squares, strict=False):
+            for place, joint in enumerate(robot.joint_names):
+                found[channel, joint] = _rms(left[place]), _rms(then[place])
         for (of, at), (left, then) in found.items():
             yield RunError(run=run, joint=at, before=left, after=then, floor=None, of=of)
 
@@ -172,13 +179,13 @@ def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) ->
 
 def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
     at = chosen.differs[row_of(name)]
-    everywhere, left = (max(float(some.sum()), _LEAST) for some in (parts.without(name), parts.after))
-    without, after = (max(float(some[:, at].sum()), _LEAST) for some in (parts.without(name), parts.after))
+    everywhere, left = (float(parts.relative(some).sum()) for some in (parts.without(name), parts.after))
+    without, after = (float(parts.relative(some * at).sum()) for some in (parts.without(name), parts.after))
     return said.Evidence(
         channel="position",
         share_of_what_is_closed=None,
-        closed_where_it_acts=1 - after / without,
-        gain=everywhere / left - 1,
+        closed_where_it_acts=1 - after / max(without, _NONE),
+        gain=everywhere / max(left, _NONE) - 1,
         log_odds=float(chosen.odds[row_of(name)].max()),
         probability_of_rivals={},
     )
@@ -214,7 +221,7 @@ def _parameter(chosen: Choice, name: str, place: int, joint: str | None, unit: s
 
 def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:
     before, alone, without, after = (
-        tuple(map(float, np.sqrt(some.mean(axis=0))))
+        tuple(map(float, np.sqrt(some[:, 0].mean(axis=0))))
         for some in (parts.before, parts.alone(name), parts.without(name), parts.after)
     )
     return said.CauseChange(
@@ -233,7 +240,7 @@ def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:
 
 def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> tuple[said.Finding, ...]:
     """Return the causes by family, the one that closes most first."""
-    of, whole = families(parts.names), parts.before.sum(axis=1)
+    of, whole = families(parts.names), parts.relative(parts.before)
     found = []
     for some in of:
         own = [cause for name, cause in causes.items() if name in some]
@@ -250,7 +257,7 @@ def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> t
                 confidence=max(cause.confidence for cause in own),
                 share=value,
                 share_interval95=interval,
-                share_of=_SHARE_OF,
+                share_of=_SHARE_OF[parts.before.shape[1] - 1],
                 matters=value >= DEFAULT.matters.share,
                 members=tuple(
                     said.Member(cause=one.id, effect=one.effect, family=family, confidence=one.confidence)
