@@ -74,7 +74,7 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
     joint = bool(first and right and first["joints"] == [one for one in [wanted[first["effect"]]["joint"]] if one])
     within = [
         number["interval95"][0]
-        <= wanted[cause["effect"]]["robot"] - number.get("simulator", 0.0)
+        <= wanted[cause["effect"]]["robot"] - wanted[cause["effect"]]["simulator"]
         <= number["interval95"][1]
         for cause in causes
         for number in cause["parameters"]
