@@ -79,7 +79,7 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
         for cause in causes
         for number in cause["parameters"]
         if cause["effect"] in wanted and number["joint"] == wanted[cause["effect"]]["joint"] and number["interval95"]
-        if not number["name"].startswith("c_")  # where a payload is: of its mass alone there is a label
+        if not number["name"].startswith(("c_", "angle_y"))  # labels have a payload's mass and a tilt's first angle
     ]
     return {
         "first": right,
