@@ -22,6 +22,9 @@ from irtwin.location import Location
     "--allow-origin", "origins", metavar="ORIGIN", multiple=True, help="Site whose pages may ask the endpoint."
 )
 @click.option("--token-file", type=PLACE, help="File with the token that permits updates.")
+@click.option(
+    "--mcp", is_flag=True, help="Serve tools of the Model Context Protocol instead, on standard input and output."
+)
 def serve(
     location: Location,
     port: int,
@@ -30,6 +33,7 @@ def serve(
     memory: int,
     origins: tuple[str, ...],
     token_file: Path | None,
+    mcp: bool,
 ) -> None:
     """Serve the plant's pages at / and the graph as a SPARQL endpoint at /sparql.
 
@@ -45,9 +49,18 @@ def serve(
     then, and a query that is cancelled may go on at that server, up to its own limit. --database is read at the
     start, as the graph must know of robots if the database does, and to catch up.
 
+    With --mcp the named questions, SPARQL, explanations, diagnoses and predictions are tools that read and write
+    nothing, of data sets below the current folder. Needs irtwin[mcp].
+
     \b
     Example: irtwin serve --workspace plant
+    Example: irtwin serve --workspace plant --mcp
     """
+    if mcp:
+        from irtwin.serve.tools import server
+
+        server(location, timeout).run()
+        return
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
     from irtwin.serve.server import serve as serve_graph
