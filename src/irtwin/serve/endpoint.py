@@ -11,16 +11,17 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from irtwin.serve import description, negotiation, page
+from irtwin.serve import description, graph_store, negotiation, page
 from irtwin.serve.answer import Answer, Answers
 from irtwin.serve.asking import Asking
 from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
-from irtwin.serve.protocol import Operation, Refusal, read_get, read_post
+from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
+_METHODS_OF_GRAPH = "GET, HEAD, PUT, POST, DELETE, OPTIONS"
 _ROOM = 4  # largest answers that may wait for their clients
 _TRIES = 3  # workers that may be lost before a query begins
 _log = logging.getLogger(__name__)
@@ -58,6 +59,8 @@ class Endpoint:
     async def _read(self, request: Request) -> Operation | None:
         """Read what is asked; None for the service itself."""
         query_string = request.scope["query_string"].decode("ascii", errors="replace")
+        if graph_store.names_graph(parameters := read_parameters(query_string)):
+            return await self._of_graph(request, parameters)
         if request.method in ("GET", "HEAD"):
             return read_get(query_string)
         if request.method == "POST":
@@ -65,6 +68,22 @@ class Endpoint:
         if request.method == "OPTIONS":
             raise Refusal(204, "", {"Allow": _METHODS})
         raise Refusal(405, f"{request.method} is not for this address", {"Allow": _METHODS})
+
+    async def _of_graph(self, request: Request, parameters: graph_store.Parameters) -> Operation:
+        """Read what is to be done with a graph; who may not change one is refused before he is listened to."""
+        method = request.method
+        if method in ("GET", "HEAD"):
+            return graph_store.read(parameters)
+        if method == "OPTIONS":
+            raise Refusal(204, "", {"Allow": _METHODS_OF_GRAPH})
+        if method not in ("PUT", "POST", "DELETE"):
+            raise Refusal(405, f"{method} is not for a graph", {"Allow": _METHODS_OF_GRAPH})
+        self._updates.admit(request.headers.get("authorization", ""))
+        if method == "DELETE":
+            return graph_store.dropped(parameters)
+        sent = request.headers.get("content-type", ""), await self._body(request), _address(request)
+        change = graph_store.replaced if method == "PUT" else graph_store.merged
+        return await asyncio.to_thread(change, parameters, *sent)
 
     async def _body(self, request: Request) -> bytes:
         body = bytearray()

@@ -36,20 +36,10 @@ class Operation:
 
 def read_get(query_string: str) -> Operation | None:
     """Read a GET request; None where it asks nothing, so that the service describes itself."""
-    parameters = _parameters(query_string)
+    parameters = read_parameters(query_string)
     if "update" in parameters:
         raise Refusal(400, "an update is sent by POST, not by GET")
-    if "query" not in parameters and {"graph", "default"} & parameters.keys():
-        return _graph(parameters)
     return _operation("query", parameters) if "query" in parameters else None
-
-
-def _graph(parameters: Mapping[str, Sequence[str]]) -> Operation:
-    """Read which graph is asked for (SPARQL 1.1 Graph Store HTTP Protocol, section 4.2)."""
-    named = parameters.get("graph", ())
-    if len(named) > 1 or (named and "default" in parameters):
-        raise Refusal(400, "ask for one graph: `graph=IRI` or `default`")
-    return Operation("query", "CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }", tuple(named))
 
 
 def read_post(content_type: str, query_string: str, body: bytes) -> Operation:
@@ -59,9 +49,9 @@ def read_post(content_type: str, query_string: str, body: bytes) -> Operation:
     if "charset" in rest.lower() and "utf-8" not in rest.lower():
         raise Refusal(415, "the charset of a request is UTF-8")
     if kind == FORM:
-        return _form(_parameters(_text(body)))
+        return _form(read_parameters(_text(body)))
     if kind in (QUERY, UPDATE):
-        parameters = _parameters(query_string)
+        parameters = read_parameters(query_string)
         name = "query" if kind == QUERY else "update"
         if "query" in parameters or "update" in parameters:
             raise Refusal(400, f"the {name} is in the body: leave it out of the address")
@@ -84,7 +74,8 @@ def _operation(name: str, parameters: Mapping[str, Sequence[str]]) -> Operation:
     return Operation(name, texts[0], default, named)
 
 
-def _parameters(encoded: str) -> dict[str, list[str]]:
+def read_parameters(encoded: str) -> dict[str, list[str]]:
+    """Read the parameters of an address or a form."""
     try:
         return parse_qs(encoded, keep_blank_values=True, errors="strict", max_num_fields=_MOST_PARAMETERS)
     except UnicodeDecodeError:

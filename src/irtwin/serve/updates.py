@@ -41,15 +41,19 @@ class Updates:
         """Whether an update is so young that a worker may not have seen it."""
         return time.monotonic() - self._last < 2 * OLDEST
 
+    def admit(self, authorization: str) -> None:
+        """Raise Refusal where this is not who may update."""
+        if self._token is None:
+            raise Refusal(403, "this endpoint is read-only")
+        if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
+            raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
+
     async def do(self, operation: Operation, base: str, authorization: str, author: str) -> None:
         """Do an update, whole or not at all; relative IRIs are below `base`. Raises Refusal.
 
         It is over when the graph says what the database has been told.
         """
-        if self._token is None:
-            raise Refusal(403, "this endpoint is read-only")
-        if not hmac.compare_digest(authorization.encode(), f"Bearer {self._token}".encode()):
-            raise Refusal(401, "an update needs the token: Authorization: Bearer TOKEN", {"WWW-Authenticate": "Bearer"})
+        self.admit(authorization)
         async with self._turn:
             await self._run(
                 {**asdict(operation), "location": self._location.telling(), "base": base, "author": _named(author)}
