@@ -118,7 +118,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     assert page.locator(".is-run option").all_inner_texts() == [case_study.PLANNED, case_study.MEASURED]
     page.evaluate("document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time: 1e9}}))")
     (row,) = ask("planned_against_measured", done[1]).rows
-    assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_Wh"] * 3600, abs=0.6)
+    assert float(page.inner_text(".is-energy")) == pytest.approx(row["planned_Wh"], abs=2e-4)
     assert page.evaluate("document.documentElement.scrollWidth") == 1440
     assert faults(page) == []
     assert narrow_and_dark(page) == []

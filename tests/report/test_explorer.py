@@ -34,7 +34,7 @@ def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
     assert curves
     run = curves["runs"][0]
     assert [chart["unit"] for chart in run["torque"]] == ["N m", "N", "N m", "N m", "N m", "N m"]
-    assert (run["power"]["unit"], run["energy"]["unit"]) == ("W", "J")
+    assert (run["power"]["unit"], run["energy"]["unit"]) == ("W", "Wh")
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):
     assert figure
     measured, modelled = figure["data"]
     assert len(measured["x"]) == len(modelled["x"]) == 6
-    assert modelled["y"] == [9.0] * 6  # kJ
-    assert figure["layout"]["yaxis"]["title"]["text"] == "energy, kJ"
+    assert modelled["y"] == [2.5] * 6  # Wh
+    assert figure["layout"]["yaxis"]["title"]["text"] == "energy, Wh"
 
 
 def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(graph: KnowledgeGraph):
@@ -27,14 +27,14 @@ def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(gr
 
 def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: KnowledgeGraph):
     drawn = figures(answers(graph, six_axis(graph)))
-    total = 6 * 9.0
+    total = 6 * 2.5  # Wh
     for name in ("energy_per_effect", "energy_per_joint_and_effect"):
         figure = drawn[name]
         assert figure
-        assert sum(sum(trace["y"]) for trace in figure["data"]) == pytest.approx(total)
+        assert sum(sum(trace["y"]) for trace in figure["data"]) == pytest.approx(total, rel=1e-4)
     by_joint = drawn["energy_per_joint"]
     assert by_joint and len(by_joint["data"]) == 6
-    assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0, rel=1e-4)
+    assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0 / 3.6, rel=1e-4)
 
 
 def test_effects_are_named_by_the_ontology_and_keep_their_colour(graph: KnowledgeGraph):

@@ -73,8 +73,8 @@ def test_the_timing_that_saves_most_is_said(graph: KnowledgeGraph) -> None:
         )
     said = plain(lead.retimed(answers(graph, factory.into(graph))))
     assert said == (
-        f"Timed as b, in 1.5 times its time, {run['run_name']} would save 1.80 kJ each time (95 % interval 1.70 to "
-        "1.90 kJ), 20 % of what it takes, where the robot waits after it anyway."
+        f"Timed as b, in 1.5 times its time, {run['run_name']} would save 0.500 Wh each time (95 % interval 0.472 to "
+        "0.528 Wh), 20 % of what it takes, where the robot waits after it anyway."
     )
 
 
@@ -86,16 +86,18 @@ def test_what_a_piece_took(graph: KnowledgeGraph) -> None:
     assert lead.retimed(answers(graph, factory)) is None
     piece, cycle = map(plain, lead.made(answers(graph, factory.into(graph))))
     assert piece == (
-        f"Each bracket took {each:.0f} J, measured: the mean of 10 pieces, waiting within the runs included."
+        f"Each bracket took {each / 3600:.3g} Wh, measured: the mean of 10 pieces, waiting within the runs included."
     )
-    assert cycle and cycle.startswith(f"Each cycle of bracket took {each / 100:.2f} kJ, measured: the mean of 1 cycle,")
+    assert cycle and cycle.startswith(
+        f"Each cycle of bracket took {each / 100 / 3.6:.3g} Wh, measured: the mean of 1 cycle,"
+    )
 
 
 def test_mechanical_energy_is_called_so_and_never_added(graph: KnowledgeGraph) -> None:
     factory = Factory("M", "M", power=False).robot().run("a").run("b").twin(["a", "b"], [])
     said = plain(lead.taken(answers(graph, factory.into(graph))))
     assert said == (
-        "The joints of this robot did 18.0 kJ of mechanical work in 2 runs of 40.0 s, by its twin. "
+        "The joints of this robot did 5.00 Wh of mechanical work in 2 runs of 40.0 s, by its twin. "
         "What that took from the supply is not known: no electrical power was measured."
     )
     electrical = [text.replace('"mechanical"', '"modelled"') if "/M.b>" in text else text for text in factory.text]

@@ -110,8 +110,8 @@ def test_alarms_are_not_counted_as_none_beside_a_contradiction(answers: Answers)
 
 def test_a_piece_and_a_cycle(answers: Answers) -> None:
     said = text(drawn(answers))
-    assert "bracket Arm_A electrical, measured 40 75.0 J 15 133 J" in said.replace("\N{NO-BREAK SPACE}", " ")
-    assert "not named Arm_C mechanical, by the twin – – 4 100 J" in said.replace("\N{NO-BREAK SPACE}", " ")
+    assert "bracket Arm_A electrical, measured 40 0.0208 Wh 15 0.0370 Wh" in said.replace("\N{NO-BREAK SPACE}", " ")
+    assert "not named Arm_C mechanical, by the twin – – 4 0.0278 Wh" in said.replace("\N{NO-BREAK SPACE}", " ")
     rows = {row[0]: row[2:] for row in overview.made_sheet(answers).rows}
     assert rows["Arm_A"] == ("bracket", "measured", 40, 75.0, 15, pytest.approx(2000 / 15))
     assert rows["Arm_C"] == (None, "mechanical", None, None, 4, 100.0)
@@ -143,8 +143,8 @@ def test_a_robots_page(graph: KnowledgeGraph, name: str) -> None:
     assert "<script" not in html
     said = text(html)
     assert {
-        "Arm_A": "Electrical energy, measured, at mains From logged power. Runs 3 Time 60.0 s Energy 0.00128 kWh",
-        "Arm_C": "Runs 2 Time 20.0 s Energy 0.000233 kWh Mean power 42.0 W 2026-03-04: 400 J",
+        "Arm_A": "Electrical energy, measured, at mains From logged power. Runs 3 Time 60.0 s Energy 1.28 Wh",
+        "Arm_C": "Runs 2 Time 20.0 s Energy 0.233 Wh Mean power 42.0 W 2026-03-04: 0.111 Wh",
         "Arm_D": "No energy yet: neither was power logged, nor has the robot a twin.",
     }[name] in said
     assert ("Cost" in said) is (name == "Arm_A")
@@ -165,11 +165,11 @@ def test_a_robots_runs_as_a_table(graph: KnowledgeGraph) -> None:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("Arm_A.fit_1", "Energy 0.278 Wh In joules 1.00 kJ Cost"),
+        ("Arm_A.fit_1", "Energy 0.278 Wh Cost"),
         ("Arm_A.fit_1", "Drives on at rest, the log says 55.0 W and the twin 50.0 W: they differ by more than"),
         ("Arm_C.press_1", "which is mechanical energy alone"),
         ("Arm_B.live_1", "power is up to 80 W from the twin"),
-        ("Arm_A.pick", "It is planned and did not take place: the twin says that it will take 1.90 kJ"),
+        ("Arm_A.pick", "It is planned and did not take place: the twin says that it will take 0.528 Wh"),
         ("Arm_D.first", "No energy: neither was power logged"),
     ],
 )

@@ -22,7 +22,8 @@ def test_number_keeps_significant_digits(value: float | None, text: str):
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(8900.0, "8.90 kJ"), (12.0, "12.0 J"), (3.6e6, "3.60 MJ"), (-150.0, "−150 J"), (None, "–")]
+    ("value", "text"),
+    [(8900.0, "2.47 Wh"), (12.0, "3.33 mWh"), (3.6e6, "1.00 kWh"), (-150.0, "−0.0417 Wh"), (None, "–")],
 )
 def test_energy_finds_its_unit(value: float | None, text: str):
     assert spaced(wording.energy(value)) == text

@@ -93,7 +93,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     with subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True) as live:
         wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
         wait_for(lambda: page.inner_text("#stream") == "flowing")
-        wait_for(lambda: page.inner_text("#energy") not in ("–", "0.0"))
+        wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
         assert page.evaluate("irtwinLive.time") == pytest.approx(time.time(), abs=5)
         _, said = live.communicate(timeout=120)
     assert "800 samples stored" in said or "801 samples stored" in said, said
@@ -119,4 +119,4 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
 
 
 def written(joules: float) -> str:
-    return f"{joules:.1f}" if abs(joules) < 100 else f"{joules:.0f}"
+    return f"{joules / 3600:.2f}"

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.system
 ENERGY = """PREFIX irt: <https://w3id.org/irtwin#>
 SELECT ?name ?energy { ?run irt:Run_Name ?name ; irt:Modelled_Energy ?energy } ORDER BY ?name"""
 SEEK = "time => document.dispatchEvent(new CustomEvent('irtwin:time', {detail: {time}}))"
-JOULES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6}
+JOULES = {"Wh": 3.6e3, "kWh": 3.6e6}
 
 
 @pytest.mark.nightly

@@ -19,6 +19,7 @@ ReadSeries = Callable[[str, str], pa.Table]  # path in the workspace, checksum
 _POINTS = 2_000  # a curve, more than a screen is wide
 _FEWEST = 300
 _BUDGET = 160_000  # points of all charts of all runs: about 1.3 MB of page
+_JOULES = 3600.0  # of a Wh
 
 _TORQUE, _POWER = CHANNELS["torque"], CHANNELS["power"]
 _MODEL = "_model"
@@ -103,12 +104,16 @@ def _run(row: Row, columns: Columns, points: int, kinds: Mapping[str, str | None
         "held_out": _held_out(row, columns),
         "torque": torques,
         "power": _chart(columns, _POWER.prefix, "power", _POWER.unit, points),
-        "energy": _chart(columns, "energy", "energy used so far", "J", points),
+        "energy": _chart(columns, "energy", "energy used so far", "Wh", points, _JOULES),
     }
 
 
-def _chart(columns: Columns, name: str, title: str, unit: str, points: int) -> dict[str, Any] | None:
-    modelled, measured = columns.get(f"{name}{_MODEL}"), columns.get(name)
+def _chart(
+    columns: Columns, name: str, title: str, unit: str, points: int, per_unit: float = 1.0
+) -> dict[str, Any] | None:
+    modelled, measured = (
+        None if values is None else values / per_unit for values in (columns.get(f"{name}{_MODEL}"), columns.get(name))
+    )
     if modelled is None:
         return None
     time = columns["time"] - columns["time"][0]

@@ -64,7 +64,7 @@ def environment(resources: Resources) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
-        wording.shown, wording.kilowatt_hours, tables.is_unsure, tables.scaled_interval, heading,
+        wording.shown, tables.is_unsure, tables.scaled_interval, heading,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -14,7 +14,7 @@ _THIN = "\N{NARROW NO-BREAK SPACE}"  # between thousands
 _MINUS = "\N{MINUS SIGN}"
 _POWER = re.compile(r"\^(-?\d+)")
 _LEAST_SHARE = 0.1  # per cent
-_ENERGY_UNITS = ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"))
+_ENERGY_UNITS = ((3.6e5, 3.6e6, "kWh"), (36.0, 3.6e3, "Wh"), (0.0, 3.6, "mWh"))  # J from which on, J of the unit
 
 
 def number(value: float | int | None, digits: int = 3) -> str:
@@ -89,21 +89,13 @@ def part(value: float | None) -> str:
 def energy_unit(values: Iterable[float | None]) -> tuple[float, str]:
     """Return the divisor and the unit in which energies (J) of one table or figure are written."""
     largest = max((abs(value) for value in values if value is not None), default=0.0)
-    return next(((size, unit) for size, unit in _ENERGY_UNITS if largest >= size), (1.0, "J"))
+    return next((size, unit) for least, size, unit in _ENERGY_UNITS if largest >= least)
 
 
 def energy(value: float | None, digits: int = 3) -> str:
-    """Write an energy (J) in the unit that suits it."""
+    """Write an energy (J) as a bill does: in kWh, in Wh below a tenth of one."""
     size, unit = energy_unit([value])
     return NONE if value is None else quantity(value / size, unit, digits)
-
-
-def kilowatt_hours(joules: float | None, digits: int = 3) -> str:
-    """Write an energy (J) as a bill does: in kWh, in Wh below a tenth of one."""
-    if joules is None:
-        return NONE
-    hours = joules / 3.6e6
-    return quantity(hours, "kWh", digits) if abs(hours) >= 0.1 else quantity(1000 * hours, "Wh", digits)
 
 
 def duration(seconds: float | None) -> str:

@@ -85,12 +85,13 @@ class Choice:
 
 def choose(fit: Fit) -> Choice:
     """Return the numbers with most evidence."""
-    fit, best = _all_free(fit)
+    own = fit.rolled(fit.servos.chart(fit.servos.numbers))
+    fit, best = _all_free(fit, own)
     robots = np.zeros((len(NAMES), 1), dtype=bool)
     for part in _PARTS:
         best, there = _with_part(fit, best, part, robots)
         robots = robots | (part & there)
-    fit = _judged(fit, best) if robots.any() else fit
+    fit = _judged(fit, best, own) if robots.any() else fit
     for _ in range(2 if robots.any() else 1):  # what made up for a part of it is given back
         fit, best, differs = _given_back(fit, best)
         best = fit.solved(best, differs | robots, _AGAIN)
@@ -225,20 +226,22 @@ def _evidence(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
     return found
 
 
-def _all_free(fit: Fit) -> tuple[Fit, Played]:
-    """Return the fit with what its misfit and certainty are, and all numbers fitted."""
-    free, own = _free(fit), fit.servos.chart(fit.servos.numbers)
-    begun = [fit.rolled(at) for at in (own, fit.begun().at)]
+def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:
+    """Return the fit with what its misfit and certainty are, and all numbers fitted; `own`: the simulator's, played."""
+    free, begun = _free(fit), [own, fit.rolled(fit.begun().at)]
     best = fit.best([*begun, *(fit.rolled(fit.delayed(fit.limited(fit.played(one.at))).at) for one in begun)])
+    best = fit.solved(fit.played(best.at), free, _PASSES)  # before what is left says how much each channel counts
     for _ in range(2):
-        fit = _judged(fit, best)
-        best = fit.solved(fit.delayed(fit.limited(fit.played(best.at))), free)
+        fit = _judged(fit, best, own)
+        tried = fit.delayed(fit.limited(fit.played(best.at)))
+        fit = fit.about(tried.at)
+        best = fit.solved(fit.played(tried.at), free)
     return fit, best
 
 
-def _judged(fit: Fit, best: Played) -> Fit:
-    """Return the fit about numbers, what they leave taken for what is left at best."""
-    usual = np.sqrt(np.median(best.squares, axis=0))
+def _judged(fit: Fit, best: Played, own: Played) -> Fit:
+    """Return the fit about numbers; the least that they or the simulator's leave is taken for what is left at best."""
+    usual = np.sqrt(np.minimum(*(np.median(one.squares, axis=0) for one in (best, own))))
     return replace(fit, floor=np.maximum(usual, fit.least), certainty=_certainty(best)).about(best.at)
 
 

@@ -47,7 +47,7 @@ _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
 _DAMPINGS = (0.2, 1.0, 8.0, 64.0)  # times that of the pass before
 _PASSES, _WORTH = 12, 0.05
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.35, 0.25, 0.15)  # of the limit, or of the most that the servo is asked for, tried
-_LATE = (-2, -1, 1, 2, 3, 4, 6, 8)  # samples by which a delay is tried
+_LATE = (0, 1, 2, 3, 4, 6, 8)  # samples by which commands are tried later
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
@@ -284,7 +284,7 @@ class Fit:
         numbers, row = self.servos.of_chart(best.at), NAMES.index("delay")
         is_delay = np.arange(len(NAMES))[:, None] == row
         apart = interval(self.stretches[0].time)
-        tried = [np.where(is_delay, numbers + late * apart, numbers) for late in _LATE]
+        tried = [np.where(is_delay, self.servos.numbers + late * apart, numbers) for late in _LATE]
         return self.best((best, *self.all_played([self.servos.chart(one) for one in tried])))
 
     def begun(self) -> Played:

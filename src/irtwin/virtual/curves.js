@@ -130,9 +130,8 @@ window.irtwinCurves = (function () {
   }
 
   function unitOf(joules) {
-    if (joules >= 1e6) return { unit: "MJ", divide: 1e6, digits: 3 };
-    if (joules >= 1e4) return { unit: "kJ", divide: 1e3, digits: 2 };
-    return { unit: "J", divide: 1, digits: joules >= 100 ? 0 : 2 };
+    if (joules >= 3.6e5) return { unit: "kWh", divide: 3.6e6, digits: 4 };
+    return { unit: "Wh", divide: 3600, digits: 4 };
   }
 
   function panel(root, joints) {

@@ -29,10 +29,10 @@ def taken(answers: Answers) -> str:
         return f"This robot's energy has no sum over {runs}: of {some} only mechanical work is known, by its twin."
     by = "measured" if totals["runs_with_power"] == totals["runs_with_energy"] else "in part by its twin"
     by = by if totals["runs_with_power"] else "by its twin, as no power was measured"
-    said = f"This robot took {wording.kilowatt_hours(totals['energy_j'])} in {runs}, {by}"
+    said = f"This robot took {wording.energy(totals['energy_j'])} in {runs}, {by}"
     if totals["runs_with_energy"] == totals["runs"] and totals["duration_s"]:
         hour = totals["energy_j"] / totals["duration_s"] * _HOUR
-        said += f": {wording.kilowatt_hours(hour)} for each hour of such work"
+        said += f": {wording.energy(hour)} for each hour of such work"
     days = answers["energy_per_day"].rows
     logged = sum(day["duration_s"] for day in days)
     if (
@@ -41,7 +41,7 @@ def taken(answers: Answers) -> str:
         and all(day["day_from"] == "log" for day in days)
     ):
         mean = sum(day["energy_j"] for day in days) / len(days)
-        said += f", {wording.kilowatt_hours(mean)} on a day with runs"
+        said += f", {wording.energy(mean)} on a day with runs"
     return f"{said}."
 
 
@@ -50,7 +50,7 @@ def could_save(answers: Answers) -> str | None:
     row = answers["waiting"].first
     if row is None:
         return None
-    saved, lower, upper = map(wording.kilowatt_hours, (row["energy_j"], row["lower_j"], row["upper_j"]))
+    saved, lower, upper = map(wording.energy, (row["energy_j"], row["lower_j"], row["upper_j"]))
     return (
         f"It stood still for {wording.share(row['waiting_share'])} of the time. Switched off while it waits, it would "
         f"save up to {saved} (95 % interval {lower} to {upper}), {wording.share(row['share'])} of the energy: its "

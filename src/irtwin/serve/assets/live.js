@@ -183,7 +183,7 @@
     find(place).replaceChildren(...(made.length ? made : [element("span", "not known yet", "quiet")]));
   }
 
-  const inJoules = (value) => (Math.abs(value) >= 1e5 ? [written(value / 1e3, 1), "kJ"] : [written(value, Math.abs(value) < 100 ? 1 : 0), "J"]);
+  const inHours = (joules) => (Math.abs(joules) >= 3.6e5 ? [written(joules / 3.6e6, 3), "kWh"] : [written(joules / 3600, 2), "Wh"]);
 
   function showRun(run) {
     document.title = run.name + ", live";
@@ -193,10 +193,10 @@
     find("stream").className = "stream " + (run.stream || "");
     document.querySelector("main").classList.toggle("is-stale", stream === "stale");
     find("why").textContent = run.why && stream === "stale" ? run.why + "; the last good state is of " + new Date(run.since).toLocaleTimeString() : "";
-    const [energy, unit] = run.energy === undefined ? ["–", "J"] : inJoules(Number(run.energy));
+    const [energy, unit] = run.energy === undefined ? ["–", "Wh"] : inHours(Number(run.energy));
     find("energy").value = energy;
     find("energy-unit").textContent = unit;
-    const plan = run.plan && "plan " + run.plan + (run.expected === undefined ? "" : ": " + inJoules(Number(run.expected)).join(" "));
+    const plan = run.plan && "plan " + run.plan + (run.expected === undefined ? "" : ": " + inHours(Number(run.expected)).join(" "));
     const said = [run.from, plan].filter(Boolean).join("; ");
     find("from").textContent = said && "(" + said + ")";
     find("mean").value = run.mean === undefined ? "–" : written(Number(run.mean), 0);
@@ -227,7 +227,7 @@
         const of = (query) => ask(query.replace(/\?RUN/g, "<" + run.run + ">"));
         const [joints, effects, gaps, alarms] = await Promise.all([JOINTS, EFFECTS, GAPS, ALARMS].map(of));
         const energies = (rows) => { const most = Math.max(...rows.map((row) => Math.abs(row.energy)), 1e-9); return (row) => Math.abs(row.energy) / most; };
-        const joules = (row) => inJoules(Number(row.energy)).join(" ");
+        const joules = (row) => inHours(Number(row.energy)).join(" ");
         bars("by-joint", joints, joules, energies(joints));
         bars("by-effect", effects, joules, energies(effects));
         bars("gaps", gaps, (row) => written(Number(row.residual), 1) + " of " + written(Number(row.band), 1) + " " + row.unit, (row) => row.ratio / 2,

@@ -31,7 +31,7 @@
       cell(row, "").append(link);
       cell(row, value("stream"), "stream " + value("stream"));
       cell(row, value("at") ? new Date(value("at")).toLocaleString() : "");
-      cell(row, number(value("energy"), "J"), "number");
+      cell(row, value("energy") ? (Number(value("energy")) / 3600).toFixed(2) + " Wh" : "", "number");
       cell(row, number(value("power"), "W"), "number");
       cell(row, value("alarms") === "0" ? "none" : value("alarms") + " active", value("alarms") === "0" ? "" : "alarm");
     }
