@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,10 @@ from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
 from tests.screens import faults, narrow_and_dark
 
-pytest.importorskip("ompl")
-pytest.importorskip("toppra")
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (find_spec("ompl") and find_spec("toppra")), reason="needs irtwin[plan]"),
+]
 
 Done = tuple[Said, Path]
 

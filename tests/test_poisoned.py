@@ -64,8 +64,8 @@ def test_what_cannot_be_worked_out_changes_nothing(folder: Path, robot: str, kin
         assert not [step for step in steps if step.startswith("irtwin: ")]
     else:
         assert Path(said.out.strip()).is_file()
-    again = irtwin("run", folder / "data", "--workspace", folder / "workspace")
-    assert again.status == 0, again.err
+        again = irtwin("run", folder / "data", "--workspace", folder / "workspace")
+        assert again.status == 0, again.err
 
 
 def test_the_line_names_the_data_set(folder: Path) -> None:

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import expit
-from scipy.stats import f as fisher
+import scipy
 
 from blind.library import Explained, Library, power_library, swept, torque_library
 from irtwin.gap.data.case import Case, case_of
@@ -126,13 +125,14 @@ Criterion = Callable[[float, np.ndarray, np.ndarray, float, int], _Verdicts]
 
 def _by_bic(before: float, gain: np.ndarray, count: np.ndarray, rows: float, used: int) -> _Verdicts:
     lower = -rows * np.log1p(-np.minimum(gain / before, 1 - 1e-12)) - count * np.log(rows)
-    return _Verdicts(lower, lower > 0, expit(lower / 2), STRONG)
+    return _Verdicts(lower, lower > 0, scipy.special.expit(lower / 2), STRONG)
 
 
 def _by_f(before: float, gain: np.ndarray, count: np.ndarray, rows: float, used: int) -> _Verdicts:
     free = rows - used - count
     ratio = gain / count / (np.maximum(before - gain, 1e-12 * before) / free)
-    log_p = np.maximum(fisher.logsf(ratio, count, free), -1e6) - ratio * 1e-9  # which still ranks what underflows
+    log_p = np.maximum(scipy.stats.f.logsf(ratio, count, free), -1e6)
+    log_p -= ratio * 1e-9  # which still ranks what underflows
     return _Verdicts(-log_p, log_p < np.log(ALPHA / len(gain)), -np.expm1(log_p), 0.0)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy
 
 from plant.arm import Arm
 from plant.friction import NearZero
@@ -16,7 +16,8 @@ SLOW = 0.02  # rad/s
 
 def low_pass(signal: np.ndarray, interval: float) -> np.ndarray:
     """Return a signal (T, ...) without what lies above the band."""
-    return np.asarray(sosfiltfilt(butter(4, BAND, fs=1 / interval, output="sos"), signal, axis=0))
+    sections = scipy.signal.butter(4, BAND, fs=1 / interval, output="sos")
+    return np.asarray(scipy.signal.sosfiltfilt(sections, signal, axis=0))
 
 
 def rigid_body(arm: Arm, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:

@@ -53,8 +53,12 @@ def _individual(table: Table) -> str:
     return table.individual.name
 
 
-@pytest.mark.parametrize(("term", "owner", "wanted"), sorted(set(properties())))
-def test_the_ontology_declares_each_property(ontology: Store, term: str, owner: str, wanted: str) -> None:
+def test_the_ontology_declares_each_property(ontology: Store) -> None:
+    missing = [one for one in sorted(set(properties())) if not declared(ontology, *one)]
+    assert missing == [], "declare these, of their class and with their range, in ontology/gap.ttl"
+
+
+def declared(ontology: Store, term: str, owner: str, wanted: str) -> bool:
     """With a definition, a domain that the individual is in, the range that the mapping gives; numbers with a unit."""
     range_ = f"a {wanted} ; rdfs:range ?any" if wanted.startswith("owl:") else f"rdfs:range {wanted}"
     unit = f"irt:{term} qudt:hasUnit|irt:unit_given_by ?unit ." if wanted in ("xsd:double", "xsd:integer") else ""
@@ -63,4 +67,4 @@ def test_the_ontology_declares_each_property(ontology: Store, term: str, owner: 
         irt:{owner} a owl:Class ; rdfs:subClassOf* ?class .
         FILTER (?domain = ?class || EXISTS {{ ?domain owl:unionOf/rdf:rest*/rdf:first ?class }})
     }}"""
-    assert ontology.query(asked), f"declare irt:{term} of irt:{owner} in ontology/gap.ttl: {wanted} {unit}"
+    return bool(ontology.query(asked))

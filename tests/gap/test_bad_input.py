@@ -20,7 +20,7 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import Run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
 ROBOT = arm(3)
 SIX = arm(6)

@@ -18,6 +18,8 @@ from irtwin.signals.log import DataSet
 from irtwin.twin.files import from_json, to_json
 from irtwin.twin.identify import identify
 
+pytestmark = pytest.mark.usefixtures("no_experiment")
+
 ROBOT = arm(2)
 OTHERS = {"another count": arm(3), "another joint": arm(2, slides=(1,))}
 

@@ -20,7 +20,7 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import DataSet
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
 ROBOT = arm(2)
 
@@ -73,12 +73,6 @@ def test_no_gap_is_found_where_there_is_none(seed):
     assert diagnosis.verdict == "no_gap"
     assert diagnosis.causes == ()
     assert diagnosis.floor.source == "repeats"
-
-
-def test_a_stated_cutoff_is_that_of_document_and_twin():
-    diagnosis = diagnose(replace(data_set(runs()), cutoff=7.25))
-    assert valid(diagnosis)["cutoff"] == {"hz": 7.25, "stated": True, "why": "stated"}
-    assert diagnosis.twin.cutoff == 7.25
 
 
 def test_what_two_runs_differ_by_in_the_mean_is_not_blamed_on_an_effect():
@@ -165,10 +159,13 @@ def test_withheld_friction_comes_back():
     json.dumps(document, allow_nan=False)
 
 
-def test_power_lacks_the_loss_in_the_windings():
-    diagnosis = diagnose(data_set(runs(4), effects=WITH_LOSS), withhold=["copper_loss"])
+def test_power_lacks_the_loss_in_the_windings_and_a_stated_cutoff_is_that_of_document_and_twin():
+    stated = replace(data_set(runs(4), effects=WITH_LOSS), cutoff=7.25)
+    diagnosis = diagnose(stated, withhold=["copper_loss"])
     channel, cause = diagnosis.causes[0]
     assert (channel.name, cause.effect) == ("power", "copper_loss")
+    assert valid(diagnosis)["cutoff"] == {"hz": 7.25, "stated": True, "why": "stated"}
+    assert diagnosis.twin.cutoff == 7.25
 
 
 def test_an_effect_that_the_search_does_not_know_is_neither_named_nor_a_rival():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
+import scipy
 
 from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.thresholds import DEFAULT
@@ -38,7 +38,7 @@ def white(seed=0):
 
 
 def smoothed(torque):
-    return sosfiltfilt(butter(2, 8.0, fs=RATE, output="sos"), torque)
+    return scipy.signal.sosfiltfilt(scipy.signal.butter(2, 8.0, fs=RATE, output="sos"), torque)
 
 
 def test_white_noise_is_known_from_above_the_band():

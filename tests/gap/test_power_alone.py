@@ -13,7 +13,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import DataSet
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
 ROBOT = arm(2)
 WITH_LOSS = (*BASELINE, "copper_loss")

@@ -15,6 +15,8 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.refusal import _beyond
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.usefixtures("no_experiment")
+
 ROBOT = arm(2)
 
 

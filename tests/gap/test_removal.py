@@ -10,7 +10,7 @@ from tests.gap.test_diagnosis import WITH_LOSS, data_set, runs, valid
 
 from irtwin.gap.diagnosis import diagnose
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
 
 def with_signal(made, name, added):

@@ -19,6 +19,8 @@ from irtwin.robot.kinematics import flange
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 
+pytestmark = pytest.mark.usefixtures("no_experiment")
+
 ROBOT = arm(3)
 LOAD, GAIN = 3.0, 1.09  # kg at the flange; of every drive's torque constant
 LIMITS = DEFAULT.scale_of_torque

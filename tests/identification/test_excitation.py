@@ -73,7 +73,7 @@ def test_its_condition_number_is_what_another_way_finds() -> None:
     assert scaled_condition_number(TWO, q, dq, ddq) == pytest.approx(found.condition_number, rel=0.5)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(st.integers(0, 10_000), st.floats(1.0, 45.0))
 def test_limits_hold_between_the_samples_for_any_seed(seed: int, seconds: float) -> None:
     found = excite(TWO, seconds, seed=seed, iterations=10)

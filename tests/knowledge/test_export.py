@@ -6,9 +6,7 @@ import rdflib
 from rdflib.namespace import OWL, RDF, RDFS
 
 from irtwin.knowledge import owl_dl  # noqa: F401  tells owlready2 where Java is
-from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.export import export_owl
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.resources import shipped
@@ -18,13 +16,17 @@ pytestmark = pytest.mark.slow
 IRT = rdflib.Namespace("https://w3id.org/irtwin#")
 
 
-@pytest.fixture
-def exported(graph: KnowledgeGraph, tmp_path: Path) -> Path:
-    reason(graph)
-    validate(graph)
-    file = tmp_path / "deep" / "irtwin.owl"
-    export_owl(graph, file)
+@pytest.fixture(scope="module")
+def exported(concluded: KnowledgeGraph, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("export") / "deep" / "irtwin.owl"
+    export_owl(concluded, file)
     return file
+
+
+@pytest.fixture(scope="module")
+def written(exported: Path) -> rdflib.Graph:
+    """What is in the file."""
+    return rdflib.Graph().parse(exported, format="xml")
 
 
 @pytest.mark.nightly
@@ -37,15 +39,13 @@ def test_owlready2_opens_it_and_hermit_finds_it_consistent(exported: Path) -> No
     assert list(world.inconsistent_classes()) == []
 
 
-def test_it_is_one_ontology_that_imports_nothing(exported: Path) -> None:
-    graph = rdflib.Graph().parse(exported, format="xml")
-    assert list(graph.subjects(RDF.type, OWL.Ontology)) == [rdflib.URIRef("https://w3id.org/irtwin")]
-    assert (None, OWL.imports, None) not in graph
+def test_it_is_one_ontology_that_imports_nothing(exported: Path, written: rdflib.Graph) -> None:
+    assert list(written.subjects(RDF.type, OWL.Ontology)) == [rdflib.URIRef("https://w3id.org/irtwin")]
+    assert (None, OWL.imports, None) not in written
     assert "shacl" not in exported.read_text(encoding="utf-8")
 
 
-def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph, exported: Path) -> None:
-    written = rdflib.Graph().parse(exported, format="xml")
+def test_everything_that_is_asserted_or_inferred_is_in_it(written: rdflib.Graph) -> None:
     runs = set(written.subjects(RDF.type, IRT.IR_RunProcess))
     assert len(runs) == 5
     assert all((run, RDF.type, OWL.NamedIndividual) in written for run in runs)
@@ -55,8 +55,7 @@ def test_everything_that_is_asserted_or_inferred_is_in_it(graph: KnowledgeGraph,
     assert len(set(written.subjects(RDF.type, IRT.Effect))) == 46
 
 
-def test_each_individual_has_a_label_and_each_rule_is_there_or_named(exported: Path) -> None:
-    written = rdflib.Graph().parse(exported, format="xml")
+def test_each_individual_has_a_label_and_each_rule_is_there_or_named(written: rdflib.Graph) -> None:
     individuals = set(written.subjects(RDF.type, OWL.NamedIndividual))
     assert individuals - set(written.subjects(RDFS.label)) == set()
     run = rdflib.URIRef("https://w3id.org/irtwin/id/run/Arm_A.idle_1")
@@ -73,19 +72,19 @@ def test_each_individual_has_a_label_and_each_rule_is_there_or_named(exported: P
     assert sum(each.startswith("The rule ") for each in comments) + len(in_swrl) == len(all_rules(shipped()))
 
 
-def test_times_are_cut_to_what_hermit_reads(graph: KnowledgeGraph, exported: Path) -> None:
-    assert ".106403Z" in "".join(map(str, graph.triples()))
+def test_times_are_cut_to_what_hermit_reads(concluded: KnowledgeGraph, exported: Path) -> None:
+    assert ".106403Z" in "".join(map(str, concluded.triples()))
     text = exported.read_text(encoding="utf-8")
     assert "2026-03-05T12:00:01.106Z" in text
     assert ".106403Z" not in text
 
 
 def test_failed_export_leaves_the_former_file(
-    graph: KnowledgeGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    concluded: KnowledgeGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "irtwin.owl"
     file.write_text("former")
     monkeypatch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OSError):
-        export_owl(graph, file)
+        export_owl(concluded, file)
     assert file.read_text() == "former"

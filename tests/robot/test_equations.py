@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import given, settings
 from tests.robot.chains import chains
 from tests.synthetic import arm
@@ -24,7 +23,13 @@ def test_they_are_those_of_newton_and_euler(urdf):
     assert equations(parse_urdf(urdf)).deviation < 1e-9
 
 
-def test_a_pendulum_is_a_pendulum():
+@pytest.fixture
+def sympy():
+    """Imported where it is used: it takes half a second."""
+    return pytest.importorskip("sympy")
+
+
+def test_a_pendulum_is_a_pendulum(sympy):
     row = Row(0.5, 0.0, 0.0, mass=2.0, inertia=(0.0,) * 6)
     lying = ((0, 0, 1, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # z, the axis, along the base's x
     found = equations(from_table("pendulum", Table((row,), base=np.array(lying, dtype=float))))
@@ -34,7 +39,7 @@ def test_a_pendulum_is_a_pendulum():
     assert found.latex(0) == r"\tau_{1} = 0.5 \ddot{q}_{1} + 9.81 \cos{\left(q_{1} \right)}"
 
 
-def test_parts_are_sums_of_waves():
+def test_parts_are_sums_of_waves(sympy):
     found = equations(arm(3))
     assert found.mass == found.mass.T
     assert found.mass[0, 0].has(sympy.cos(2 * sympy.Symbol("q2") + sympy.Symbol("q3")))  # no product of cosines
@@ -42,7 +47,7 @@ def test_parts_are_sums_of_waves():
     assert found.text(1).count("\n") > 4
 
 
-def test_a_joint_that_slides_has_a_force():
+def test_a_joint_that_slides_has_a_force(sympy):
     found = equations(arm(2, slides=(1,)))
     assert found.deviation < 1e-9
     assert found.mass[0, 0].has(sympy.Symbol("q2") ** 2)

@@ -14,7 +14,7 @@ from itertools import combinations, starmap
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from irtwin.check.built_otherwise import turned_axes
 from irtwin.check.moving import Moving
@@ -206,6 +206,6 @@ def _pairs(field: str, joints: np.ndarray) -> Iterator[_Fault]:
 def _assigned(rows: Rows, joints: np.ndarray) -> np.ndarray | None:
     """Return in which column each joint's torque stands, by what its motion alone explains; None where vague."""
     shares = np.log(rows.unexplained(joints))
-    own, order = linear_sum_assignment(shares)
+    own, order = scipy.optimize.linear_sum_assignment(shares)
     moved = order != own
     return None if (shares[own, order][moved] > np.log(_FITTED)).any() else np.asarray(order)

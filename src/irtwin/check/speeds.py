@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from irtwin.check.moving import Moving
 from irtwin.check.robust_fit import fit
@@ -14,6 +13,7 @@ from irtwin.signals.filter import low_pass
 from irtwin.signals.finding import Finding
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 _ALIKE = 0.9  # correlation of two speeds of one joint
 _UNITS = {"deg/s": 180 / np.pi, "rpm": 30 / np.pi, "turns/s": 0.5 / np.pi}
@@ -67,7 +67,7 @@ def _speeds(run: Run, motion: Motion) -> tuple[np.ndarray, np.ndarray] | None:
     signals = run.signals
     if signals.dq is None or motion.cutoff is None:
         return None
-    logged = low_pass(make_interp_spline(signals.time, signals.dq, k=1)(motion.time), motion.rate, motion.cutoff)
+    logged = low_pass(interpolated(signals.time, signals.dq, motion.time), motion.rate, motion.cutoff)
     return differentiate(motion.q, motion.rate), logged
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.signal import lfilter
 
 from irtwin.effects.effect import (
     Coefficients,
@@ -23,6 +22,7 @@ from irtwin.effects.effect import (
 )
 from irtwin.effects.rigid_body import torque_slope
 from irtwin.robot.description import Joint, Robot
+from irtwin.signals.filter import lagged
 from irtwin.signals.motion import Motion
 
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
@@ -185,9 +185,8 @@ class MeterLag(Effect):
         """Return (N, 1) (lagged - P)/T, from rest at the run's first value."""
         assert predicted is not None and predicted.power is not None
         keep = np.exp(-1 / (motion.rate * self.T))
-        start = [keep * predicted.power[0]]
-        lagged = lfilter([1 - keep], [1.0, -keep], predicted.power, zi=start)[0]
-        return np.asarray(lagged - predicted.power)[:, None] / self.T
+        power = predicted.power
+        return np.asarray(lagged(power, keep, before=power[0]) - power)[:, None] / self.T
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Effect, force_unit
@@ -89,7 +89,7 @@ def _choices(case: Case, finding: Finding) -> Iterator[Choice]:
     yield from (_worth(case, finding, cause) for cause in finding.causes)
     open_ones: dict[str, list[tuple[str | None, float]]] = {}
     for one, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
-        chance = float(expit(odds))
+        chance = float(scipy.special.expit(odds))
         if one.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
             open_ones.setdefault(one.effect, []).append((one.joint, chance))
     for effect, places in open_ones.items():

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from irtwin.document import document
 from irtwin.document.document import cause_ids
@@ -121,7 +121,7 @@ class NotRepeating:
                     effect=one.effect.id,
                     joints=one.joints,
                     scope=MISSING,
-                    confidence=float(expit(evidence.log_odds)),
+                    confidence=float(scipy.special.expit(evidence.log_odds)),
                     parameters=tuple(map(parameter, one.quantities)),
                     indistinguishable_from=(),
                     evidence=evidence,

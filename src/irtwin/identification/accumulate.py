@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from scipy.linalg import lapack
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell_step
@@ -241,7 +241,7 @@ def triangle(rows: np.ndarray) -> np.ndarray:
     if not rows.size:
         return np.zeros((0, rows.shape[1]))
     # numpy's keeps other threads waiting
-    factored, _, _, _ = lapack.dgeqrf(rows, lwork=_PANEL * rows.shape[1])
+    factored, _, _, _ = scipy.linalg.lapack.dgeqrf(rows, lwork=_PANEL * rows.shape[1])
     return np.triu(factored[: rows.shape[1]])
 
 
@@ -282,7 +282,7 @@ def root(products: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.diag(products))
     size[size == 0] = 1.0
     scaled = products / size / size[:, None]
-    factored, order, rank, _ = lapack.dpstrf(scaled, tol=_ROUNDING)
+    factored, order, rank, _ = scipy.linalg.lapack.dpstrf(scaled, tol=_ROUNDING)
     found = np.empty((rank, len(size)))
     found[:, order - 1] = np.triu(factored)[:rank] * size[order - 1]
     return found

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
+import scipy
 
 from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
@@ -67,7 +67,7 @@ class _Problem:
         size = np.linalg.norm(rows, axis=0)
         factor = triangle(np.column_stack([rows / size, target]))
         step = np.zeros(len(x))
-        step[free] = solve_triangular(factor[:-1, :-1], factor[:-1, -1]) / size
+        step[free] = scipy.linalg.solve_triangular(factor[:-1, :-1], factor[:-1, -1]) / size
         return step, float(np.linalg.norm(factor[:-1, -1]))
 
 

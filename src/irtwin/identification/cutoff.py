@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from irtwin.document.document import Cutoff
 from irtwin.effects.catalogue import EXCITED
@@ -21,6 +20,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition, cutoff_of_motion
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 _MOST_SAMPLES = 40_000  # of all runs that are looked at: enough to tell one cutoff from its half
 _FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
@@ -74,7 +74,9 @@ def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
     for fitted, judged in _halves(motions):
         values = fit_torque(stack, fitted)[1].values
         for motion in judged:
-            torque = make_interp_spline(logged[motion.run].time, logged[motion.run].torque, k=1)(motion.time)
+            run = logged[motion.run]
+            assert run.torque is not None
+            torque = interpolated(run.time, run.torque, motion.time)
             decided = ~stack.undecided(motion)
             squares += np.sum((torque - stack.shown_torque(motion, values)) ** 2, axis=0, where=decided)
             count += decided.sum(axis=0)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
@@ -118,6 +118,6 @@ def _solve(
     deviation = np.linalg.solve(left, right)
     bounds = (lowest - expected) / spread
     if np.any(deviation < bounds):
-        deviation = lsq_linear(left, right, bounds=(bounds, np.inf), method="bvls").x
+        deviation = scipy.optimize.lsq_linear(left, right, bounds=(bounds, np.inf), method="bvls").x
     equations = np.column_stack([left / spread, right + left @ (expected / spread)])
     return np.maximum(expected + deviation * spread, lowest), equations

@@ -9,7 +9,7 @@ from pathlib import Path
 from time import monotonic
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.identification.base_condition import BaseRegressor
@@ -307,7 +307,7 @@ class _Search:
 
         room = 0.9 * self._limits.ranges[0]
         bounds = list(zip(self._limits.centre - room, self._limits.centre + room, strict=True))
-        return np.asarray(minimize(outside, posture, jac=True, bounds=bounds, method="L-BFGS-B").x)
+        return np.asarray(scipy.optimize.minimize(outside, posture, jac=True, bounds=bounds, method="L-BFGS-B").x)
 
     def _start(self, posture: np.ndarray) -> np.ndarray:
         """Return a random motion about the posture, as large as the limits let it be: (2 K - 1, n)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+import scipy
 
 GRID_PER_HARMONIC = 32
 
@@ -66,7 +66,7 @@ def rest_basis(harmonics: int) -> tuple[np.ndarray, np.ndarray]:
     every period, so a motion of whole periods ends as it starts: at rest, in the same pose.
     """
     k = np.arange(1.0, harmonics + 1)
-    return null_space(k[None]), null_space(k[None] ** 2)
+    return scipy.linalg.null_space(k[None]), scipy.linalg.null_space(k[None] ** 2)
 
 
 class RestSeries:

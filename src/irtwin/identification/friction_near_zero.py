@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import rankdata
 
 from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
@@ -135,7 +134,7 @@ def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequ
 
 def _everywhere(saved: np.ndarray) -> bool:
     """Whether squares are saved in nearly all blocks, by Wilcoxon's signed ranks: reversals are few and weigh much."""
-    ranks = rankdata(np.abs(saved))
+    ranks = np.argsort(np.argsort(np.abs(saved))) + 1
     return bool(ranks[saved > 0].sum() >= _NEARLY_ALL * ranks.sum())
 
 

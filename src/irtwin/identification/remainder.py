@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from irtwin.effects.effect import NORMAL, Term
 from irtwin.identification.accumulate import Block
@@ -57,7 +57,7 @@ def remainder(blocks: Sequence[Block], terms: Sequence[Term], known: np.ndarray 
         squares += float(left @ left) / rows
         seconds += sum(block.stop - block.start for block in group)
     count = len(groups)
-    grown = float(student.ppf((1 + LEVEL) / 2, count - 1)) / NORMAL
+    grown = float(scipy.special.stdtrit(count - 1, (1 + LEVEL) / 2)) / NORMAL
     return Remainder((squares / count) ** 0.5, grown * max(float(np.mean(more)), 0.0) ** 0.5, seconds / count)
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.stats import t as student
+import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.accumulate import Block, triangle
@@ -42,7 +41,7 @@ def covariance(
             scores[number, used] += factor[:, :-1].T @ (factor @ extended)
     rows = np.concatenate([factor[:, :-1] / level for factor, level in zip(factors, noise, strict=True)])
     # in units of the spread; through a triangle, as normal equations would lose what the prior alone decides
-    root = solve_triangular(triangle(np.concatenate([rows * spread, prior])), np.eye(len(values)))
+    root = scipy.linalg.solve_triangular(triangle(np.concatenate([rows * spread, prior])), np.eye(len(values)))
     groups = max(len(blocks), 2)
     between = (scores * spread) @ root
     own = prior @ root
@@ -61,10 +60,10 @@ def half_widths(covariance: np.ndarray, spread: np.ndarray, blocks: int) -> np.n
     `spread`: (K,) the prior's standard deviations; `blocks`: how many the covariance rests on (Student's t).
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # a sure sum of unsure terms may round below
-    factor = float(student.ppf((1 + LEVEL) / 2, max(blocks - 1, 1)))
+    factor = float(scipy.special.stdtrit(max(blocks - 1, 1), (1 + LEVEL) / 2))
     return np.where(deviation < _LEARNT * spread, factor * deviation, np.nan)
 
 
 def normal_covariance(covariance: np.ndarray, blocks: int) -> np.ndarray:
     """Return the (K, K) covariance grown so that `NORMAL` deviations are half a 95 % interval by Student's t."""
-    return np.asarray(covariance * (student.ppf((1 + LEVEL) / 2, max(blocks - 1, 1)) / NORMAL) ** 2)
+    return np.asarray(covariance * (scipy.special.stdtrit(max(blocks - 1, 1), (1 + LEVEL) / 2) / NORMAL) ** 2)

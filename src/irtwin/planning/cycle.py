@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.planning.programme import Programme
@@ -95,7 +95,7 @@ class CycleTimes:
                 factors.append(factor)
                 energies.append(self._twin.energy(motion))
         dense = np.geomspace(factors[0], factors[-1], _DENSE)
-        return own * dense, PchipInterpolator(np.log(factors), energies)(np.log(dense))
+        return own * dense, scipy.interpolate.PchipInterpolator(np.log(factors), energies)(np.log(dense))
 
     def _keeps_limits(self, motion: Motion) -> bool:
         joints = self._twin.robot.joints

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.optimize import minimize
+import scipy
 
 from irtwin.planning.timing import MotionLimits, Timed, Torque, along, shares
 from irtwin.robot.collision import CollisionModel
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 Power = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From time (N,), q, dq, ddq (N, n) to electrical power (N,), W."""
@@ -119,7 +121,7 @@ class _Spline:
         count = free + 6  # three equal points at each end are rest: no speed, no acceleration
         inner = np.linspace(0, time[-1], count - _DEGREE + 1)
         self._knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, time[-1])])
-        basis = BSpline(self._knots, np.eye(count), _DEGREE)
+        basis = scipy.interpolate.BSpline(self._knots, np.eye(count), _DEGREE)
         self.bases = [basis(time, order) for order in range(4)]
         self._ends = values[[0, -1]]
         place = self.bases[0]
@@ -129,7 +131,7 @@ class _Spline:
 
     def through(self, points: np.ndarray) -> BSpline:
         """Return the spline of free points."""
-        return BSpline(self._knots, self._all(points), _DEGREE)
+        return scipy.interpolate.BSpline(self._knots, self._all(points), _DEGREE)
 
     def states(self, points: np.ndarray) -> list[np.ndarray]:
         """Return its values and their first three derivatives at the times, (N, ...) each."""
@@ -161,7 +163,9 @@ class _OnPath:
     def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
         """Return points of less cost, with walls of a stiffness, J."""
         options = {"maxiter": _ITERATIONS, "eps": 1e-5}
-        return np.asarray(minimize(self._cost, points, args=(stiffness,), method="L-BFGS-B", options=options).x)
+        return np.asarray(
+            scipy.optimize.minimize(self._cost, points, args=(stiffness,), method="L-BFGS-B", options=options).x
+        )
 
     def _cost(self, points: np.ndarray, stiffness: float) -> float:
         s, ds, dds, ddds = self.spline.states(points)
@@ -193,7 +197,7 @@ class _Search:
 
     def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
         """Return points of less cost, with walls of a stiffness, J."""
-        found = minimize(
+        found = scipy.optimize.minimize(
             lambda x: self._cost(x.reshape(points.shape), stiffness),
             points.ravel(),
             jac=True,

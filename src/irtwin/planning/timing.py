@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import BSpline, PPoly, make_interp_spline
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
 from irtwin.robot.description import Robot
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline, PPoly
 
 Torque = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From q, dq, ddq, (N, n) each, to the joint torques (N, n), N m."""
@@ -108,7 +111,7 @@ def rounded(corners: np.ndarray, is_clear: Callable[[np.ndarray], bool]) -> BSpl
 def through(poses: np.ndarray) -> BSpline:
     """Return the smooth path through near poses (k, n)."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses, axis=0), axis=1))])
-    return make_interp_spline(way / way[-1], poses, k=5)
+    return scipy.interpolate.make_interp_spline(way / way[-1], poses, k=5)
 
 
 def fastest(path: BSpline, limits: MotionLimits, torque: Torque) -> Timed:
@@ -144,7 +147,7 @@ def shares(
 
 def _clamped(points: np.ndarray) -> BSpline:
     inner = np.linspace(0, 1, len(points) - _DEGREE + 1)
-    return BSpline(np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)]), points, _DEGREE)
+    return scipy.interpolate.BSpline(np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)]), points, _DEGREE)
 
 
 def _topp_ra(path: BSpline, limits: MotionLimits, torque: Torque) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -233,7 +236,8 @@ def _smoothed(path: BSpline, time: np.ndarray, place: np.ndarray, speed: np.ndar
     squares = np.concatenate([[0.0], gains / 2, [0.0]])
     slopes = np.concatenate([[0.0], speed[:-1], [0.0]])
     starts = np.concatenate([[0.0], place[:-1], [place[-1]]])
-    return Timed(path, PPoly(np.array([squares, slopes, starts]), times).antiderivative(), window, 1.0)
+    speeds = scipy.interpolate.PPoly(np.array([squares, slopes, starts]), times)
+    return Timed(path, speeds.antiderivative(), window, 1.0)
 
 
 def _within(timed: Timed, limits: MotionLimits, torque: Torque) -> Timed | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pyarrow as pa
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from irtwin.identification.validation import APART
 from irtwin.providers import live_energy
@@ -186,7 +186,7 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
     for suffix, power in (("", motion.power), ("_model", twin.power(motion))):
         if power is not None:
             columns[f"{CHANNELS['power'].prefix}{suffix}"] = power
-            columns[f"energy{suffix}"] = cumulative_trapezoid(power, motion.time, initial=0.0)
+            columns[f"energy{suffix}"] = scipy.integrate.cumulative_trapezoid(power, motion.time, initial=0.0)
     return pa.table(columns)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from scipy.integrate import cumulative_trapezoid
+import scipy
 from sqlalchemy import select
 
 from irtwin.errors import InputError
@@ -241,7 +241,7 @@ def _modelled_series(joints: tuple[str, ...], stretches: list[Stretch], began: f
         )
         columns |= {name.replace("energy", "power"): power for name, power in powers.items()}
         for name, power in powers.items():
-            columns[name] = energies[name] + cumulative_trapezoid(power, motion.time, initial=0.0)
+            columns[name] = energies[name] + scipy.integrate.cumulative_trapezoid(power, motion.time, initial=0.0)
             energies[name] = float(columns[name][-1])
         new = slice(0 if stretch.begins else 1, None)
         for name, values in columns.items():

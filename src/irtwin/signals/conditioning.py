@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
@@ -15,7 +15,7 @@ from irtwin.signals.filter import FEWEST_PERIODS, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
-from irtwin.signals.sampling import holes, interval
+from irtwin.signals.sampling import holes, interpolated, interval
 
 _BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
 _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
@@ -54,7 +54,7 @@ def condition(
     rate = 1 / (time[1] - time[0])
 
     def clean(values: np.ndarray, cutoff: float, order: int = 1) -> np.ndarray:
-        return low_pass(make_interp_spline(signals.time, values, k=order)(time), rate, cutoff)
+        return low_pass(scipy.interpolate.make_interp_spline(signals.time, values, k=order)(time), rate, cutoff)
 
     cutoffs = dict.fromkeys(_STATES, states_cutoff or cutoff)
     logged = {name: it for name, it in signals.logged().items() if name not in REQUIRED}
@@ -68,7 +68,7 @@ def condition(
         dq,
         ddq,
         run=run.name,
-        standing=_standing(make_interp_spline(signals.time, signals.q, k=1)(time), rate),
+        standing=_standing(interpolated(signals.time, signals.q, time), rate),
         payload_mass=run.payload_mass,
         payload_com=run.payload_com,
         cutoff=cutoff,
@@ -105,7 +105,7 @@ def cutoff_of_motion(runs: Iterable[Run]) -> tuple[float, str]:
 def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
     """Return the time derivative of an even (N, ...) signal through the quintic spline that interpolates it."""
     time = np.arange(len(signal)) / rate
-    return np.asarray(make_interp_spline(time, signal, k=5).derivative()(time))
+    return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5).derivative()(time))
 
 
 def _standing(q: np.ndarray, rate: float) -> np.ndarray:
@@ -126,7 +126,7 @@ def _cutoff(run: Run) -> tuple[float, str]:
     time, q = run.signals.time, run.signals.q
     even = _even_time(run)
     rate = 1 / (even[1] - even[0])
-    speed = np.diff(make_interp_spline(time, q, k=1)(even), axis=0)
+    speed = np.diff(interpolated(time, q, even), axis=0)
     power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(speed), 1 / rate)
     gain = np.sin(np.pi * frequency / rate)[:, None] ** 2  # white positions, differenced

@@ -7,11 +7,12 @@ pieces that join exactly, and decimated while it is filtered.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import oaconvolve
+import scipy
 
 _LOBES = 3  # of the sinc on either side: 1e-4 lost at a tenth of the cutoff, nothing left from twice it on
 FEWEST_PERIODS = 10  # of the cutoff in a run: the kernel spans six
 _OVERSAMPLING = 4  # samples kept per cutoff period after decimation
+_BLOCK = 8  # times the kernel, at least, that an FFT takes at once
 _AT_ONCE = 16  # samples that are filtered and decimated as one product of matrices
 
 
@@ -41,8 +42,15 @@ def low_pass(signal: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
     before = 2 * signal[0] - signal[half:0:-1]
     after = 2 * signal[-1] - signal[-2 : -half - 2 : -1]
     padded = np.concatenate([before, signal, after])
-    shape = (-1,) + (1,) * (signal.ndim - 1)
-    return np.asarray(oaconvolve(padded, (taps / taps.sum()).reshape(shape), mode="valid", axes=0))
+    return _convolved(padded, taps / taps.sum())
+
+
+def lagged(values: np.ndarray, keep: float, before: float = 0.0) -> np.ndarray:
+    """Return (N, ...) under a lag of first order: of each value `keep` is of the one before, the first's `before`."""
+    bands = np.array([np.ones(len(values)), np.full(len(values), -keep)])
+    driven = (1 - keep) * values
+    driven[0] += keep * before
+    return np.asarray(scipy.linalg.solve_banded((1, 0), bands, driven))
 
 
 def decimation(rate: float, cutoff: float) -> int:
@@ -71,3 +79,14 @@ def _band(taps: np.ndarray, step: int, rows: int) -> np.ndarray:
     for row in range(rows):
         band[row, row * step : row * step + len(taps)] = taps
     return band
+
+
+def _convolved(signal: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    """Return (N, ...) under (K,) taps where these have all their samples, (N - K + 1, ...): in blocks, by FFT."""
+    length = _BLOCK << (len(taps) - 1).bit_length()
+    step, count = length - len(taps) + 1, len(signal) - len(taps) + 1
+    missing = -(-count // step) * step - count
+    whole = np.pad(signal, [(0, missing), *[(0, 0)] * (signal.ndim - 1)])
+    blocks = np.lib.stride_tricks.sliding_window_view(whole, length, axis=0)[::step]
+    filtered = np.fft.irfft(np.fft.rfft(blocks) * np.fft.rfft(taps, length), length)[..., len(taps) - 1 :]
+    return np.moveaxis(filtered, -1, 1).reshape(-1, *signal.shape[1:])[:count]

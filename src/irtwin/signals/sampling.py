@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
@@ -51,6 +52,11 @@ def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Findin
     found = f"{path}: no samples {first}{others}; taken as {taken}{dropped}"
     evidence = {"holes": float(len(pieces) - 1), "left_out": float(left_out)}
     return long, [*said, Finding("hole", "time", (path.stem,), True, True, evidence, found)]
+
+
+def interpolated(time: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Return values (N, ...) of rising times (N,) at other times (M,), (M, ...): on straight lines between samples."""
+    return np.asarray(scipy.interpolate.make_interp_spline(time, values, k=1)(at))
 
 
 def holes(time: np.ndarray) -> np.ndarray:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.signal import savgol_filter
+import scipy
 
 from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
@@ -120,7 +119,7 @@ def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
         found[2:5] = (found[2:5] - found[1]) / _ASIDE
         found[5:] = (found[5:] - found[0]) / _ASIDE
         found[1] -= found[0]
-        between = make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
+        between = scipy.interpolate.make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
         times = np.minimum(np.arange(steps) * step, one.time[-1])
         load[:, :, place], inertia[:, :, place] = np.moveaxis(between(times), 2, 0).swapaxes(1, 2)
     return Alone(
@@ -141,7 +140,8 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: Stretch) -> tuple
     gap = interval(stretch.time)
     rows = min(2 * max(2, round(_SMOOTH / gap / 2)) + 1, (len(stretch.q) - 1) // 2 * 2 + 1)
     q, dq, ddq = (
-        savgol_filter(stretch.q, rows, min(3, rows - 1), deriv=order, delta=gap, axis=0) for order in range(3)
+        scipy.signal.savgol_filter(stretch.q, rows, min(3, rows - 1), deriv=order, delta=gap, axis=0)
+        for order in range(3)
     )
     torque, inertia = np.empty(q.shape), np.empty(q.shape)
     for row in range(len(q)):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
@@ -342,7 +342,7 @@ def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: i
         variance, step = np.diag(np.linalg.inv(normal)), np.linalg.solve(normal, right)
         own, others = some.index(row), [some.index(one) for one in rows]
         worth = np.log(len(NAMES)) + np.log(LIKELY[row, 0] ** 2 / variance[own]) / 2
-        chance = expit(step[own] ** 2 / variance[own] / 2 - worth)
+        chance = scipy.special.expit(step[own] ** 2 / variance[own] / 2 - worth)
         found += chance * (np.maximum(variance[others] - before, 0.0) + step[others] ** 2)
     return found
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from irtwin.errors import InputError
 from irtwin.simulator.mjcf_file import Tag
@@ -200,7 +200,7 @@ def row_of(name: str) -> int:
 
 def tilted(compiled: mujoco.MjModel, angles: Sequence[float]) -> np.ndarray:
     """Return a model's gravity (3,), m/s^2, turned by two angles, rad, about the world's x and y axes."""
-    return np.asarray(Rotation.from_rotvec([*angles, 0.0]).apply(compiled.opt.gravity))
+    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec([*angles, 0.0]).apply(compiled.opt.gravity))
 
 
 def has_servos(model: Model) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from scipy.special import expit
+import scipy
 
 from irtwin.document import document as said
 from irtwin.document.curves import Curves, RunError
@@ -168,7 +168,7 @@ def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) ->
             effect=effects()[name][0],
             joints=tuple(on),
             scope="changed",
-            confidence=float((1 - DEFAULT.criterion.unknown) * expit(chosen.odds[row].max())),
+            confidence=float((1 - DEFAULT.criterion.unknown) * scipy.special.expit(chosen.odds[row].max())),
             parameters=tuple(_parameters(robot, chosen, name)),
             indistinguishable_from=(),
             evidence=_evidence(chosen, parts, name),

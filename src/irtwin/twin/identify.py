@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
@@ -106,7 +106,7 @@ def identify(
         condition_number=condition,
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
         quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
-        covariance=block_diag(*(normal_covariance(result.covariance, result.blocks) for _, result in found)),
+        covariance=scipy.linalg.block_diag(*(normal_covariance(it.covariance, it.blocks) for _, it in found)),
         remainder=remaining,
         body_change=change,
     )

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.optimize import minimize_scalar
-from scipy.signal import correlate
+import scipy
 
 from irtwin.effects.friction import CoulombFriction
 from irtwin.gap.thresholds import Data
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 _FEWEST = 20  # samples that both have
 
@@ -36,7 +35,7 @@ class Pair:
     def moving(self) -> np.ndarray:
         """(M, n) where each joint moves in both: at rest friction holds what it has to, and no fit is asked there."""
         still = CoulombFriction().undecided
-        there = make_interp_spline(self.second.time + self.shift, still(self.second).astype(float), k=1)(self.time)
+        there = interpolated(self.second.time + self.shift, still(self.second).astype(float), self.time)
         return np.asarray(~still(self.first)[self.inside] & (there == 0))
 
     def difference(self, signal: str) -> np.ndarray | None:
@@ -46,7 +45,7 @@ class Pair:
 
     def of(self, one: np.ndarray, two: np.ndarray) -> np.ndarray:
         """Return the difference of what the first and the second have at their own times, (M, ...)."""
-        return np.asarray(one[self.inside] - make_interp_spline(self.second.time + self.shift, two, k=1)(self.time))
+        return np.asarray(one[self.inside] - interpolated(self.second.time + self.shift, two, self.time))
 
 
 def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data) -> list[Pair]:
@@ -71,7 +70,7 @@ def _laid(first: Motion, second: Motion, limits: Data) -> Pair | None:
     inside = (first.time >= start) & (first.time <= stop)
     if inside.sum() < _FEWEST:
         return None
-    q = make_interp_spline(second.time + shift, second.q)(first.time[inside])
+    q = scipy.interpolate.make_interp_spline(second.time + shift, second.q)(first.time[inside])
     if np.sqrt(np.mean((q - first.q[inside]) ** 2)) > limits.little * max(float(first.q.std()), 1e-3):
         return None
     return Pair(first, second, shift, inside)
@@ -79,10 +78,10 @@ def _laid(first: Motion, second: Motion, limits: Data) -> Pair | None:
 
 def _shift(first: Motion, second: Motion) -> float:
     """Return by how much later (s) the second motion has to be moved to lie on the first: where speeds agree most."""
-    spline = make_interp_spline(second.time, second.q)
+    spline = scipy.interpolate.make_interp_spline(second.time, second.q)
     even = np.arange(second.time[0], second.time[-1], 1 / first.rate)
     both = zip(first.dq.T, spline.derivative()(even).T, strict=True)
-    agree = np.sum([correlate(one, other, method="fft") for one, other in both], axis=0)
+    agree = np.sum([scipy.signal.correlate(one, other, method="fft") for one, other in both], axis=0)
     lag = int(np.argmax(agree)) - (len(even) - 1)
     every = slice(None, None, max(1, len(first.time) // 500))
     time, q = first.time[every], first.q[every]
@@ -92,4 +91,4 @@ def _shift(first: Motion, second: Motion) -> float:
         return float(np.mean((spline(time[inside] - shift) - q[inside]) ** 2)) if inside.any() else np.inf
 
     best, step = first.time[0] - second.time[0] + lag / first.rate, 2 / first.rate
-    return float(minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)
+    return float(scipy.optimize.minimize_scalar(distance, bounds=(best - step, best + step), method="bounded").x)

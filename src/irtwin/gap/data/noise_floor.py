@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
-from scipy.signal import welch
 
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.thresholds import Data
@@ -16,6 +14,7 @@ from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.filter import kernel, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 REPEATS, OUT_OF_BAND = "repeats", "out_of_band"
 _LEAST = 1e-9  # N m or W: of a channel that repeats itself to the last bit
@@ -117,7 +116,7 @@ def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, lim
     share = _share(motion)
     if signal is None or motion.cutoff is None or share > _MOST_BAND:
         return None
-    even = np.asarray(make_interp_spline(time, signal, k=1)(motion.time))
+    even = interpolated(time, signal, motion.time)
     above = even - low_pass(even, motion.rate, motion.cutoff)
     over_time = np.median(above**2, axis=0) / 0.4549 / (1 - share)
     window = np.hanning(len(even)).reshape(-1, *(1,) * (even.ndim - 1))
@@ -136,7 +135,7 @@ def _share(motion: Motion) -> float:
 
 def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Data) -> np.ndarray:
     """Return whether the spectrum of a signal, from `stop` (Hz) on, falls up to its very end: white noise would not."""
-    frequency, density = welch(signal, rate, nperseg=min(_WELCH, len(signal)), axis=0)
+    frequency, density = _density(signal, rate)
     low, high = max(stop, rate / 8), rate / 2
     middle = np.sqrt(low * high)
     lower, upper = (frequency >= low) & (frequency < middle), (frequency >= middle) & (frequency < high)
@@ -144,6 +143,15 @@ def _smoothed(signal: np.ndarray, rate: float, stop: float, limits: Data) -> np.
         return np.zeros(signal.shape[1:], dtype=bool)
     first, last = np.median(density[lower], axis=0), np.median(density[upper], axis=0)
     return np.asarray(first > last * np.sqrt(high / low) ** limits.smoothed)
+
+
+def _density(signal: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return Welch's estimate of a signal's spectrum (F, ...), up to a factor, and its frequencies (F,), Hz."""
+    length = min(_WELCH, len(signal))
+    pieces = np.lib.stride_tricks.sliding_window_view(signal, length, axis=0)[:: length - length // 2]
+    window = np.hanning(length + 1)[:-1]
+    powers = np.abs(np.fft.rfft(window * (pieces - pieces.mean(axis=-1, keepdims=True)))) ** 2
+    return np.fft.rfftfreq(length, 1 / rate), np.moveaxis(powers.mean(axis=0), -1, 0)
 
 
 def shaken(

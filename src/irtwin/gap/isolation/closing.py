@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+import scipy
 
 from irtwin.gap.regression.held_out import HeldOut
 from irtwin.gap.thresholds import Matters
@@ -75,5 +75,5 @@ def share(part: np.ndarray, whole: np.ndarray) -> tuple[float, tuple[float, floa
     value, half = min(float(part.sum()) / total, 1.0), 0.0
     if groups > 1:
         error = float(np.sqrt(np.sum((part - value * whole) ** 2) * groups / (groups - 1))) / total
-        half = float(student_t.ppf(0.975, groups - 1)) * error
+        half = float(scipy.special.stdtrit(groups - 1, 0.975)) * error
     return value, (value - half, min(value + half, 1.0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
@@ -333,6 +333,6 @@ def estimate_of(system: System, chosen: Sequence[int]) -> Estimate:
             ]
             factors.append(np.column_stack([*parts, factor[:, -1]]))
         blocks.append(replace(block, factors=tuple(factors)))
-    rows = None if system.prior_rows is None else block_diag(system.prior_rows, np.eye(len(chosen)))
+    rows = None if system.prior_rows is None else scipy.linalg.block_diag(system.prior_rows, np.eye(len(chosen)))
     signals = [*[0] * (len(pattern) - 1), 1] if system.beside_power else None
     return estimate(blocks, pattern, terms, rows, signals)

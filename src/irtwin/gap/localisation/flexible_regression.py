@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import lfilter
+import scipy
 
 from irtwin.document.document import Closeable
 from irtwin.effects.friction import sharp_sign
 from irtwin.gap.localisation.channel_residuals import ChannelResidual
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.progress import tell_step
-from irtwin.signals.filter import decimation
+from irtwin.signals.filter import decimation, lagged
 from irtwin.signals.motion import Motion
 
 _ROWS = 5_000  # that the regression sees
@@ -122,7 +121,7 @@ def _since(motion: Motion) -> np.ndarray:
 
 def _remembered(values: np.ndarray, rate: float, seconds: float) -> np.ndarray:
     keep = np.exp(-1 / (rate * seconds))
-    return np.asarray(lfilter([1 - keep], [1.0, -keep], values, axis=0))
+    return lagged(values, keep)
 
 
 def _features(variables: np.ndarray, signs: np.ndarray, generator: np.random.Generator) -> np.ndarray:
@@ -158,7 +157,7 @@ def _regressed(features: np.ndarray, residuals: np.ndarray, group: np.ndarray) -
     for inside, own, part in zip(folds, normals, rights, strict=True):
         for place, ridge in enumerate(_RIDGES, start=1):
             damped = normal - own + ridge * np.diag(np.diag(normal - own) + 1.0)
-            fitted = features[inside] @ cho_solve(cho_factor(damped), right - part)
+            fitted = features[inside] @ scipy.linalg.cho_solve(scipy.linalg.cho_factor(damped), right - part)
             left[place] += ((residuals[inside] - fitted) ** 2).sum(axis=0)
     start, best = left[0] / len(group), left.min(axis=0) / len(group)
     return np.array([start[0], best[0], start[1], best[1]])

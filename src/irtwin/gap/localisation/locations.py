@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import false_discovery_control, t
+import scipy
 
 from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, Location
 from irtwin.gap.localisation.excess_map import FEWEST, LOADED, Map
@@ -110,7 +110,7 @@ def _p_values(seen: Map, level: np.ndarray, reference: Map | None) -> np.ndarray
         parts = variance**2 / np.maximum(freedom, 1) + other**2 / np.maximum(of_other, 1)
         variance = variance + other
         freedom = np.where(freedom > 0, variance**2 / np.maximum(parts, np.finfo(float).tiny), 0)
-    p = t.sf(mean / np.sqrt(np.maximum(variance, np.finfo(float).tiny)), np.maximum(freedom, 1))
+    p = scipy.special.stdtr(np.maximum(freedom, 1), -mean / np.sqrt(np.maximum(variance, np.finfo(float).tiny)))
     return np.asarray(np.where(freedom > 0, p, np.nan))
 
 
@@ -130,5 +130,13 @@ def _false_discovery(p: np.ndarray) -> np.ndarray:
     known = np.isfinite(p)
     q = np.ones(p.shape)
     if known.any():
-        q[known] = false_discovery_control(p[known])
+        q[known] = _adjusted(p[known])
+    return q
+
+
+def _adjusted(p: np.ndarray) -> np.ndarray:
+    """Return p-values (M,) adjusted after Benjamini and Hochberg."""
+    order = np.argsort(p)[::-1]
+    q = np.empty(len(p))
+    q[order] = np.minimum.accumulate(np.minimum(p[order] * len(p) / np.arange(len(p), 0, -1), 1.0))
     return q

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+import scipy
 
 
 def factored(products: np.ndarray, prior: np.ndarray | None = None) -> np.ndarray:
@@ -14,12 +14,12 @@ def factored(products: np.ndarray, prior: np.ndarray | None = None) -> np.ndarra
     """
     prior = np.eye(len(products)) if prior is None else prior
     try:
-        return np.asarray(cho_factor(products + prior)[0])
-    except LinAlgError:
+        return np.asarray(scipy.linalg.cho_factor(products + prior)[0])
+    except scipy.linalg.LinAlgError:
         rounding = 10 * len(products) * np.finfo(float).eps * float(np.abs(products).max())
-        return np.asarray(cho_factor(products + prior + rounding * np.eye(len(products)))[0])
+        return np.asarray(scipy.linalg.cho_factor(products + prior + rounding * np.eye(len(products)))[0])
 
 
 def solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the solution of the factored equations, of the shape of the right-hand side (k, ...)."""
-    return np.asarray(cho_solve((factor, False), right))
+    return np.asarray(scipy.linalg.cho_solve((factor, False), right))

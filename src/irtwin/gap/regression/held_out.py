@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+import scipy
 
 from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
@@ -71,7 +71,7 @@ def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]], seed: int) -> t
     picks = [[generator.integers(count, size=count) for count in counts] for _ in range(_RESAMPLED)]
     drawn = fractions([np.array(own) for own in zip(*picks, strict=True)])
     deviation = drawn[np.isfinite(drawn)].std(ddof=1) * np.sqrt(groups / (groups - 1))
-    half = float(student_t.ppf(0.975, groups - 1) * deviation)
+    half = float(scipy.special.stdtrit(groups - 1, 0.975) * deviation)
     return value, [value - half, min(value + half, 1.0)]
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from irtwin.effects.effect import Quantity, force_unit, quantity
 from irtwin.gap.data.case import Case
@@ -21,6 +20,7 @@ from irtwin.gap.thresholds import Matters
 from irtwin.signals.filter import low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 LINE, BAND, SWITCHING, OFFSET, DRIFT = "line", "band", "switching", "offset", "drift"
 
@@ -135,7 +135,7 @@ def _torque(case: Case, run: Run, motion: Motion) -> np.ndarray:
     if values is None and signals.current is not None and None not in constants:
         values = signals.current * np.array(constants, dtype=float)
     assert values is not None
-    return np.asarray(make_interp_spline(signals.time, values, k=1)(motion.time))
+    return interpolated(signals.time, values, motion.time)
 
 
 def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> Series:
@@ -176,7 +176,7 @@ def _watched(pair: Pair, runs: Mapping[str, Series]) -> Watched:
 def _of_run(run: Run, motion: Motion, by_torque: bool) -> Series:
     """Return a run's power as logged, at its motion's times, beside what that may take, and its torque if it counts."""
     assert run.signals.power is not None
-    values = np.asarray(make_interp_spline(run.signals.time, run.signals.power, k=1)(motion.time))
+    values = interpolated(run.signals.time, run.signals.power, motion.time)
     beside = [np.ones(len(motion.time)), *np.abs(motion.dq).T, *(motion.dq**2).T]
     if by_torque and motion.torque is not None:
         beside += [*(motion.torque * motion.dq).T, *(motion.torque**2).T]

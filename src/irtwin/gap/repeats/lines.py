@@ -11,10 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar
-from scipy.signal import czt
-from scipy.stats import gamma
+import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.repeats.series import Series, waves
@@ -65,7 +62,7 @@ def lines(series: Sequence[Series], tests: int) -> tuple[list[Line], list[Series
         noise = np.array([_noise(each, grid) for each in power])
         stands = (power / noise).sum(axis=0)
         best = int(np.argmax(stands))
-        p = float(min(1.0, gamma.sf(stands[best], len(series)) * len(grid) / _FINE * tests))
+        p = float(min(1.0, scipy.special.gammaincc(len(series), stands[best]) * len(grid) / _FINE * tests))
         if not p * sum(len(one.values) for one in series) <= len(series):
             break
         near = np.abs(np.arange(len(grid)) - best) <= _FINE * _NEAR
@@ -94,7 +91,7 @@ def _power(one: Series, grid: np.ndarray) -> np.ndarray:
     ratio, start = np.exp(-turn * (grid[1] - grid[0])), np.exp(turn * grid[0])
 
     def transform(columns: np.ndarray) -> np.ndarray:
-        sums = czt(columns, len(grid), ratio, start, axis=0)
+        sums = scipy.signal.czt(columns, len(grid), ratio, start, axis=0)
         return np.asarray(np.abs(sums) ** 2)
 
     taken = transform(one.basis()).sum(axis=1) / len(window)
@@ -110,7 +107,7 @@ def _noise(power: np.ndarray, grid: np.ndarray) -> np.ndarray:
     """
     logs = np.log(np.maximum(power, 1e-12 * max(float(power.max(initial=0.0)), 1e-300)))
     width, apart = _FINE * _AROUND, _FINE * (_NEAR + _AROUND // 2)
-    padded = np.pad(median_filter(logs, size=width, mode="reflect"), apart, mode="reflect")
+    padded = np.pad(scipy.ndimage.median_filter(logs, size=width, mode="reflect"), apart, mode="reflect")
     below, above = padded[: len(logs)], padded[2 * apart :]
     falling = 2 * np.log1p(apart * (grid[1] - grid[0]) / grid)
     return np.asarray(np.exp(np.maximum(below, above + falling) - _MEDIAN))
@@ -129,7 +126,8 @@ def _line(
 
     step = grid[1] - grid[0]
     ends = (grid[best] - step, grid[best] + step)
-    frequency = float(minimize_scalar(missed, bounds=ends, method="bounded", options={"xatol": 1e-3 * step}).x)
+    least = scipy.optimize.minimize_scalar(missed, bounds=ends, method="bounded", options={"xatol": 1e-3 * step})
+    frequency = float(least.x)
     more = beside(frequency)
     heights = np.array([float(np.linalg.norm(one.coefficients()[-2:])) for one in more])
     amplitude = float(np.sqrt(np.mean(heights**2) / 2))  # of one run: a difference has two, of any phases

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import t as student_t
+import scipy
 
 from irtwin.gap.repeats.series import Series, correlation_samples
 
@@ -29,7 +29,7 @@ def slow(series: Series) -> np.ndarray:
     variance = float(left @ left) / len(left) * memory * (1 + beside.shape[1] / free)
     deviations = np.sqrt(np.sum(inverse[:_SLOW] ** 2, axis=1) * variance) / scale[:_SLOW]
     values = values[:_SLOW]
-    p = 2 * student_t.sf(np.abs(values) / np.maximum(deviations, 1e-300), free)
+    p = 2 * scipy.special.stdtr(free, -np.abs(values) / np.maximum(deviations, 1e-300))
     return np.column_stack([values, deviations, p, values**2 / 2 * [1.0, np.var(beside[:, 1])]])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from irtwin.effects.effect import Effect
 from irtwin.effects.transmission import SLOW_ORDERS, TorqueRipple
@@ -63,6 +62,6 @@ def _clearest(angle: np.ndarray, residual: np.ndarray) -> float | None:
     length = _TURN * _FINE * max(1, -(-len(sums) // _TURN))
     orders = np.fft.rfftfreq(length, 1 / _TURN)
     height = np.abs(np.fft.rfft(sums, length))
-    lines, _ = find_peaks(height)
+    lines = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:]))
     fast = [k for k in lines if max(SLOW_ORDERS) < orders[k] <= TorqueRipple.ranges["N"][1]]
     return float(orders[max(fast, key=lambda k: height[k])]) if fast else None
