@@ -112,10 +112,8 @@ class Workspace:
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
         size = engine.check(self.engine)
-        tables = {*Base.metadata.tables, VERSION_TABLE}
-        engine.check_schema(self.engine, tables, is_current=False)
+        engine.check_schema(self.engine, {*Base.metadata.tables, VERSION_TABLE})
         self._make_tables()
-        engine.check_schema(self.engine, tables, is_current=True)
         if size <= _MOST_OF_ROWS:  # whoever wrote them: the folder may come from elsewhere
             with self.engine.connect() as connection:
                 check_rows(connection, engine.shown(self.engine.url))
