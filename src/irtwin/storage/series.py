@@ -22,9 +22,9 @@ from irtwin.storage import files
 from irtwin.storage.files import inside
 from irtwin.storage.object_storage import ObjectStorage, StorageFault
 from irtwin.storage.series_place import choose, elsewhere
-from irtwin.storage.summary import ROW_GROUP, with_summary
 
 FOLDER = "series"
+ROW_GROUP = 122_880  # rows; DuckDB's own size, of which it reads those that a window needs
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def write_series(workspace: Path, table: pa.Table) -> SeriesFile:
     storage = elsewhere(workspace)
     folder = workspace / FOLDER if storage is None else Path(tempfile.gettempdir())
     with files.temporary_beside(folder) as temporary:
-        pq.write_table(with_summary(table), temporary, compression="zstd", row_group_size=ROW_GROUP)
+        pq.write_table(table, temporary, compression="zstd", row_group_size=ROW_GROUP)
         series_id = checksum(temporary)
         path = f"{FOLDER}/{series_id}.parquet"
         if storage is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -17,7 +18,6 @@ from irtwin.packing import extremes
 from irtwin.storage.files import inside
 from irtwin.storage.object_storage import ObjectStorage
 from irtwin.storage.series import storage_of
-from irtwin.storage.summary import Channel, Floats, Summary, read_summary
 
 if TYPE_CHECKING:
     import duckdb  # a tenth of a second to import, for those who ask for samples
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 MOST_SAMPLES = 10_000
 MOST_DRAWN = 2_000  # of a curve: more than a screen is wide
 Extreme = Literal["min", "max"]
+Floats = npt.NDArray[np.float64]
 
 
 class SeriesWindows:
@@ -42,48 +43,42 @@ class SeriesWindows:
             if content is None:
                 raise InputError(f"{self._file}: the series is missing; ingest the data set again")
             try:
-                schema = pq.read_schema(content)
-                self._summary = read_summary(schema)
-            except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
+                told = pq.read_metadata(content)
+                names = told.schema.to_arrow_schema().names
+                time, count = names.index("time"), told.num_row_groups
+                groups = [told.row_group(number).column(time).statistics for number in range(count)]
+                self._groups = [(float(group.min), float(group.max)) for group in groups]  # s, of the row groups
+            except (pa.ArrowException, OSError, ValueError, AttributeError) as error:
                 raise InputError(_damaged(self._file)) from error
-        self.channels = tuple(name for name in schema.names if name != "time")
+        self.channels = tuple(name for name in names if name != "time")
 
     @cached_property
     def begin(self) -> float:
         """Time of the first sample, s."""
-        if self._summary is not None:
-            return float(self._summary.begins[0])
-        first = self._fetch(lambda: self._run("SELECT min(time) FROM read_parquet(?)").fetchall())
-        return float(first[0][0])
+        (first,) = self._fetch(lambda: self._run("SELECT min(time) FROM read_parquet(?)").fetchone())
+        return float(first)
 
     def mean(self, channel: str, start: float, end: float) -> float | None:
         """Return the mean of the samples in a window."""
-        count, total, _, _ = self._totals(channel, start, end)
-        return total / count if count else None
+        return self._number("fsum(value) / nullif(count(value), 0)", channel, start, end)
 
     def extreme(self, which: Extreme, channel: str, start: float, end: float) -> float | None:
         """Return the least or the greatest sample in a window."""
-        count, _, least, greatest = self._totals(channel, start, end)
-        return (least if which == "min" else greatest) if count else None
+        return self._number(f"{which}(value)", channel, start, end)
 
     def integral(self, channel: str, start: float, end: float) -> float | None:
         """Return the integral over time by the trapezoidal rule, channel's unit times s, over what of it was recorded.
 
         Between samples the channel is a straight line, also where the window begins and ends: integrals add up.
         """
-        known = self._known(channel)
-        if known is not None:
-            summary, groups = known
-            first, last = summary.begins[0], summary.ends[-1]
-            return _between(first, last, start, end, lambda at: self._until(at, channel, groups))
-        time, values = self._samples(channel, -np.inf, np.inf)
+        time, values = self._samples(channel, self._before(channel, start), self._after(channel, end))
         if len(time) == 0:
             return None
-        return _between(time[0], time[-1], start, end, lambda at: _until(time, values, at))
+        start, end = max(start, time[0]), min(end, time[-1])
+        return None if start > end else _until(time, values, end) - _until(time, values, start)
 
     def samples(self, channel: str, start: float, end: float) -> list[tuple[float, float]]:
         """Return time and value of the samples in a window. Raises InputError for more than `MOST_SAMPLES`."""
-        self._check(channel)
         time, values = self._samples(channel, start, end, MOST_SAMPLES + 1)
         if len(time) > MOST_SAMPLES:
             raise InputError(
@@ -96,53 +91,29 @@ class SeriesWindows:
 
         Of more, it is the least and the greatest of each of as many equal parts as fit; values have seven digits.
         """
-        self._check(channel)
         time, values = self._samples(channel, start, end)
         kept = extremes([values], MOST_DRAWN) if len(time) else slice(0)
         return [
             (at, float(f"{value:.7g}")) for at, value in zip(time[kept].tolist(), values[kept].tolist(), strict=True)
         ]
 
-    def _totals(self, channel: str, start: float, end: float) -> tuple[int, float, float, float]:
-        """Return count, sum, least and greatest of a window's samples."""
-        ranges, whole = [(start, end)], slice(0)
-        known = self._known(channel)
-        if known is not None:
-            summary, groups = known
-            first, stop = np.searchsorted(summary.begins, start), np.searchsorted(summary.ends, end, side="right")
-            whole = slice(int(first), int(stop))
-            if whole.start < whole.stop:  # read what lies before and after the groups that are inside
-                ranges = [(start, np.nextafter(summary.begins[whole.start], -np.inf))]
-                ranges += [(np.nextafter(summary.ends[whole.stop - 1], np.inf), end)]
-        count, total, least, greatest = self._read_totals(channel, ranges)
-        if known is None or whole.start >= whole.stop:
-            return count, total, least, greatest
-        return (
-            count + int(summary.rows[whole].sum()),
-            total + float(groups.sum[whole].sum()),
-            min(least, float(groups.min[whole].min())),
-            max(greatest, float(groups.max[whole].max())),
-        )
+    def _before(self, channel: str, at: float) -> float:
+        """Return the time of the last sample up to a moment, that moment where there is none."""
+        near = max((begin for begin, _ in self._groups if begin <= at), default=at)  # else all groups would be read
+        found = self._number("max(time)", channel, near, at) or self._number("max(time)", channel, -np.inf, at)
+        return at if found is None else found
 
-    def _read_totals(self, channel: str, ranges: list[tuple[float, float]]) -> tuple[int, float, float, float]:
-        one = self._samples_of(channel)
-        extremes = "coalesce(min(value)::DOUBLE, 'inf'), coalesce(max(value)::DOUBLE, '-inf')"
-        edges = " UNION ALL ".join([one] * len(ranges))
-        text = f"SELECT count(value), coalesce(fsum(value), 0), {extremes} FROM ({edges})"
-        values = [value for edge in ranges for value in (self._file, *map(float, edge))]
-        count, total, least, greatest = self._fetch(lambda: _connection().execute(text, values).fetchall())[0]
-        return int(count), float(total), float(least), float(greatest)
+    def _after(self, channel: str, at: float) -> float:
+        """Return the time of the first sample from a moment on, likewise."""
+        near = min((end for _, end in self._groups if end >= at), default=at)
+        found = self._number("min(time)", channel, at, near) or self._number("min(time)", channel, at, np.inf)
+        return at if found is None else found
 
-    def _until(self, at: float, channel: str, groups: Channel) -> float:
-        """Return the integral from the first sample to a moment that was recorded."""
-        assert self._summary is not None
-        begins, ends = self._summary.begins, self._summary.ends
-        group = int(np.searchsorted(begins, at, side="right")) - 1
-        bridges = (begins[1:] - ends[:-1]) * (groups.first[1:] + groups.last[:-1]) / 2  # from group to group
-        before = float(groups.integral[:group].sum() + bridges[:group].sum())
-        time, values = self._samples(channel, begins[group], ends[group])
-        following = slice(group + 1, group + 2)
-        return before + _until(np.append(time, begins[following]), np.append(values, groups.first[following]), at)
+    def _number(self, what: str, channel: str, start: float, end: float) -> float | None:
+        """Return a number of a window's samples, None where it holds none."""
+        text = f"SELECT {what} FROM ({self._samples_of(channel)})"
+        (found,) = self._fetch(lambda: self._run(text, float(start), float(end)).fetchone())
+        return None if found is None else float(found)
 
     def _samples(self, channel: str, start: float, end: float, most: int | None = None) -> tuple[Floats, Floats]:
         limit = "" if most is None else f" LIMIT {most}"
@@ -151,19 +122,11 @@ class SeriesWindows:
         return found["time"], found["value"].astype(np.float64, copy=False)
 
     def _samples_of(self, channel: str) -> str:
-        """Return the query of a window's samples; those of a channel with a summary are all finite."""
-        value = '"' + channel.replace('"', '""') + '"::DOUBLE'  # of yes and no, 1 and 0
-        finite = "" if self._known(channel) else f" AND isfinite({value})"
-        return f"SELECT time, {value} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ?{finite}"
-
-    def _known(self, channel: str) -> tuple[Summary, Channel] | None:
-        self._check(channel)
-        groups = None if self._summary is None else self._summary.channels.get(channel)
-        return None if self._summary is None or groups is None else (self._summary, groups)
-
-    def _check(self, channel: str) -> None:
+        """Return the query of a window's samples. InputError where there is no such channel."""
         if channel not in self.channels:
             raise InputError(f"there is no channel {channel!r}; there are {', '.join(self.channels)}")
+        value = '"' + channel.replace('"', '""') + '"::DOUBLE'  # of yes and no, 1 and 0
+        return f"SELECT time, {value} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ? AND isfinite({value})"
 
     def _fetch(self, ask: Callable[[], Any]) -> Any:
         """Return what a query finds. Raises InputError where the file is damaged."""
@@ -220,11 +183,6 @@ def _let_read(storage: ObjectStorage) -> None:
 
 def _connection() -> duckdb.DuckDBPyConnection:
     return _database().cursor()  # one for each thread
-
-
-def _between(first: float, last: float, start: float, end: float, until: Any) -> float | None:
-    start, end = max(start, first), min(end, last)
-    return None if start > end else float(until(end) - until(start))
 
 
 def _until(time: Floats, values: Floats, at: float) -> float:
