@@ -25,7 +25,6 @@ from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.schema import LIVE, SIMULATED, Base, Robot, Run, Twin
-from irtwin.storage.series_place import elsewhere
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
 
@@ -61,9 +60,6 @@ def status(location: Location) -> Status:
     with Workspace.existing(location) as place:
         found.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
         found.parts["tables"] = _tables()
-        storage = elsewhere(place.folder)
-        if storage is not None:
-            found.parts["series"] = [storage.url]
         found.parts["robots"] = _robots(place) or ["none"]
         with found.noting():
             _look_at_graph(found, place)

@@ -1,7 +1,7 @@
 """What the files of a workspace may do, by the user's word: `irtwin workspace trust WORKSPACE`.
 
 A workspace may come from elsewhere, and its files may ask for something: rules and templates to run, hosts to send to,
-variables of the environment, object storage to write to. Each is asked for by a name that says what. The user's word is
+variables of the environment. Each is asked for by a name that says what. The user's word is
 kept in the user's own folder, by that name and the workspace's place; a folder made anew at a place has none.
 """
 

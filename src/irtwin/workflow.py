@@ -51,7 +51,6 @@ from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_gap
 from irtwin.signals.log import DataSet
 from irtwin.simulator.playing import Playing
-from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
 from irtwin.storage.files import check_place
@@ -69,20 +68,18 @@ def run(
     *,
     repair: bool = False,
     base: str | None = None,
-    series_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Take a data set to a twin, a knowledge graph and a report; return the report's path.
 
-    `base` is what the IRIs of individuals begin with, in a workspace without robots; `series_url` is object storage
-    (`s3://bucket/prefix`) that is to hold the series, in a workspace without any: it is remembered; `announce` is told
-    each step as it ends.
+    `base` is what the IRIs of individuals begin with, in a workspace without robots; `announce` is told each step as it
+    ends.
     Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce)
-    with Workspace.at(Location.of(workspace), base, series_url) as place:
+    with Workspace.at(Location.of(workspace), base) as place:
         with rewriting(place, announce) as graph:
             robot_id = take_in(place, data_set, announce)
             renew(place, graph, announce)
@@ -235,11 +232,10 @@ def renew(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
 
 
 def check_before(place: Workspace) -> None:
-    """Raise InputError for a fault in what extends a workspace or its tariff, or where its series cannot be kept."""
+    """Raise InputError for a fault in what extends a workspace, or in its tariff."""
     read_tariff(place.folder)
     check_extensions(place.resources)
     check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
 
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:

@@ -56,13 +56,12 @@ _USUAL = Record("", BEGUN)  # whose fields have their types
 class Sets:
     """What a batch is for, `run` or `diagnose`, and its data sets.
 
-    `base`: what the IRIs of its workspace begin with; `series`: where in object storage its series go; if said.
+    `base`: what the IRIs of its workspace begin with, if said.
     """
 
     kind: str
     data_sets: list[str]
     base: str | None = None
-    series: str | None = None
 
 
 @dataclass(frozen=True)
@@ -72,11 +71,9 @@ class Batch:
     folder: Path
 
     @classmethod
-    def create(
-        cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None, series: str | None = None
-    ) -> Batch:
-        """Write down which data sets a new batch has, what its IRIs begin with, and where its series go."""
-        write(folder / _SETS, json.dumps(asdict(Sets(kind, list(places), base, series)), indent=1).encode())
+    def create(cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None) -> Batch:
+        """Write down which data sets a new batch has, and what its IRIs begin with."""
+        write(folder / _SETS, json.dumps(asdict(Sets(kind, list(places), base)), indent=1).encode())
         return cls(folder)
 
     @cached_property
@@ -163,8 +160,7 @@ class Batch:
             if self.sets.kind == RUN:
                 from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
 
-                said = self.sets
-                workflow.run(data_set, self._inside("workspace"), base=said.base, series_url=said.series)
+                workflow.run(data_set, self._inside("workspace"), base=self.sets.base)
             else:
                 from irtwin import diagnosing
 

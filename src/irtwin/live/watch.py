@@ -21,7 +21,6 @@ from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.location import Location
 from irtwin.providers.records import find_robot, find_run, load_robot
-from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
@@ -49,8 +48,7 @@ def watch(
     With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     With `performs`: the first run of that robot carries out the plan of this name.
 
-    Raises InputError for a fault in what extends the workspace, or where its series cannot be kept, before a sample is
-    read.
+    Raises InputError for a fault in what extends the workspace, before a sample is read.
     """
     sys.setswitchinterval(SWITCH)
     refusals = Refusals(announce)
@@ -94,10 +92,9 @@ def _alone(place: Workspace) -> AbstractContextManager[None]:
 
 
 def _checked(place: Workspace) -> Workspace:
-    """Look through what extends the workspace, and for its series' place: a fault is said now, not when a run ends."""
+    """Look through what extends the workspace: a fault is said now, not when a run ends."""
     check(place.resources)
     check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
     return place
 
 

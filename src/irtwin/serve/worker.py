@@ -26,7 +26,7 @@ from irtwin.limits import limit_memory, limit_processor_time
 from irtwin.location import Location
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import needs_network, reading
+from irtwin.serve.source import reading
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
@@ -82,7 +82,7 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
     """Answer queries until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
     location = Location.told(json.loads(sys.stdin.buffer.readline()))
-    if not needs_network(location):
+    if location.graph_url is None:
         leave_network()
     with reading(location) as current:
         limit_memory(memory)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +15,6 @@ import pyarrow.parquet as pq
 from irtwin.errors import InputError
 from irtwin.packing import extremes
 from irtwin.storage.files import inside
-from irtwin.storage.object_storage import ObjectStorage
-from irtwin.storage.series import storage_of
 
 if TYPE_CHECKING:
     import duckdb  # a tenth of a second to import, for those who ask for samples
@@ -35,21 +32,19 @@ class SeriesWindows:
     not have, and answers None where the window holds no sample.
     """
 
-    def __init__(self, file: Path | str, storage: ObjectStorage | None = None) -> None:
-        """Read a file's metadata, or an object's by its path. InputError where there is none, or it is damaged."""
-        self._file = str(file) if storage is None else storage.address(str(file))
-        self._storage = storage
-        with _opened(file, storage) as content:
-            if content is None:
-                raise InputError(f"{self._file}: the series is missing; ingest the data set again")
-            try:
-                told = pq.read_metadata(content)
-                names = told.schema.to_arrow_schema().names
-                time, count = names.index("time"), told.num_row_groups
-                groups = [told.row_group(number).column(time).statistics for number in range(count)]
-                self._groups = [(float(group.min), float(group.max)) for group in groups]  # s, of the row groups
-            except (pa.ArrowException, OSError, ValueError, AttributeError) as error:
-                raise InputError(_damaged(self._file)) from error
+    def __init__(self, file: Path) -> None:
+        """Read a file's metadata. InputError where there is no such file, or it is damaged."""
+        self._file = str(file)
+        if not file.is_file():
+            raise InputError(f"{file}: the series is missing; ingest the data set again")
+        try:
+            told = pq.read_metadata(file)
+            names = told.schema.to_arrow_schema().names
+            time, count = names.index("time"), told.num_row_groups
+            groups = [told.row_group(number).column(time).statistics for number in range(count)]
+            self._groups = [(float(group.min), float(group.max)) for group in groups]  # s, of the row groups
+        except (pa.ArrowException, OSError, ValueError, AttributeError) as error:
+            raise InputError(_damaged(self._file)) from error
         self.channels = tuple(name for name in names if name != "time")
 
     @cached_property
@@ -135,8 +130,6 @@ class SeriesWindows:
         try:
             return ask()
         except duckdb.Error as error:
-            if self._storage is not None:
-                self._storage.owner()  # says so where the storage cannot be reached
             raise InputError(_damaged(self._file)) from error
 
     def _run(self, text: str, *values: float) -> duckdb.DuckDBPyConnection:
@@ -150,22 +143,7 @@ def _damaged(file: str) -> str:
 @lru_cache(maxsize=256)
 def open_series(workspace: Path, path: str) -> SeriesWindows:
     """Return a series by its path in a workspace, which says its content: it never becomes another."""
-    file, storage = inside(workspace, path), storage_of(workspace, path)
-    if storage is None:
-        return SeriesWindows(file)
-    _let_read(storage)
-    return SeriesWindows(path, storage)
-
-
-@contextmanager
-def _opened(file: Path | str, storage: ObjectStorage | None) -> Iterator[Path | IO[bytes] | None]:
-    """Give what pyarrow reads a series from; None where there is none."""
-    if storage is None:
-        there = Path(file)
-        yield there if there.is_file() else None
-    else:
-        with storage.opened(str(file)) as stream:
-            yield stream
+    return SeriesWindows(inside(workspace, path))
 
 
 @lru_cache(maxsize=1)
@@ -173,12 +151,6 @@ def _database() -> duckdb.DuckDBPyConnection:
     import duckdb
 
     return duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False})
-
-
-def _let_read(storage: ObjectStorage) -> None:
-    """Let DuckDB read objects, only the parts that it needs."""
-    if "s3" not in _database().list_filesystems():
-        _database().register_filesystem(storage.files)
 
 
 def _connection() -> duckdb.DuckDBPyConnection:
