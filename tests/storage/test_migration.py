@@ -24,6 +24,7 @@ from irtwin.errors import InputError
 from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
+from irtwin.storage.revisions.versions import r0021_tables_of_0_2 as first
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -173,7 +174,10 @@ def said(place: Workspace) -> list[tuple[object, ...]]:
         return [tuple(row) for row in connection.execute(text("SELECT * FROM run ORDER BY run_id"))]
 
 
-@pytest.mark.parametrize("said", ["UPDATE alembic_version SET version_num = '0020'", "DROP TABLE alembic_version"])
+OLDER = f"UPDATE alembic_version SET version_num = '{int(first.revision) - 1:04}'"
+
+
+@pytest.mark.parametrize("said", [OLDER, "DROP TABLE alembic_version"])
 def test_a_workspace_before_0_2_is_refused(tmp_path: Path, said: str) -> None:
     with Workspace(tmp_path) as place, place.engine.begin() as connection:
         connection.execute(text(said))
