@@ -25,7 +25,7 @@ _FOLDER, _TOLD = "alarms", "told.json"  # in the workspace
 _MOST_BYTES = 100_000_000
 
 
-class Told:
+class ToldAlarms:
     """What was told of alarms until now, kept in a file. Of alarms that were over before the first look nothing is."""
 
     def __init__(self, file: Path) -> None:
@@ -61,7 +61,7 @@ class Told:
 
 def follow(
     look: Look,
-    told: Told,
+    told: ToldAlarms,
     write: Callable[[bytes], None],
     deliveries: Sequence[Delivery],
     done: threading.Event,
@@ -90,7 +90,7 @@ def follow(
 
 
 @contextmanager
-def told_in(workspace: Path) -> Iterator[Told]:
+def told_in(workspace: Path) -> Iterator[ToldAlarms]:
     """Give what was told of a workspace's alarms. Raises InputError where another process tells them already."""
     folder = files.inside(workspace, _FOLDER)
     with files.told_when_full(workspace):
@@ -104,6 +104,6 @@ def told_in(workspace: Path) -> Iterator[Told]:
                 f"{workspace}: another `irtwin alarms --follow` tells its alarms; stop that first"
             ) from None
         try:
-            yield Told(folder / _TOLD)
+            yield ToldAlarms(folder / _TOLD)
         finally:
             os.close(handle)

@@ -19,7 +19,7 @@ from irtwin.check.torque import torque_findings, unsigned_findings
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Signals, columns_of, from_columns
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 
 
@@ -28,7 +28,7 @@ class Checked:
     """A data set, mended where that leaves no doubt, and what was found in the one that was given."""
 
     data_set: DataSet
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
 
     @property
     def sound(self) -> bool:
@@ -43,7 +43,7 @@ def check(data_set: DataSet) -> Checked:
     return Checked(_mended(data_set, found), tuple(found))
 
 
-def _findings(data_set: DataSet) -> list[Finding]:
+def _findings(data_set: DataSet) -> list[LogFinding]:
     """Return all findings; what would follow from one that stops is not looked for."""
     found = _by_column(data_set)
     if not data_set.robot.joints:  # a meter's log
@@ -58,7 +58,7 @@ def _findings(data_set: DataSet) -> list[Finding]:
     return found
 
 
-def _by_bodies(robot: Robot, seen: Moving) -> list[Finding]:
+def _by_bodies(robot: Robot, seen: Moving) -> list[LogFinding]:
     """Return what bodies and friction say of the torques and positions."""
     arranged = arrangement_findings(robot, seen)
     if any(finding.stops for finding in arranged):
@@ -85,9 +85,9 @@ def checked(data_set: DataSet) -> Checked:
     return result
 
 
-def _by_column(data_set: DataSet) -> list[Finding]:
+def _by_column(data_set: DataSet) -> list[LogFinding]:
     """Return what reading found: one finding a column, of all runs that have it."""
-    found: dict[tuple[str, str], Finding] = {}
+    found: dict[tuple[str, str], LogFinding] = {}
     for finding in data_set.findings:
         of_all = finding.channel == CHANNELS["q"].prefix
         for name in CHANNELS["q"].columns(data_set.robot.joint_names) if of_all else (finding.channel,):
@@ -97,7 +97,7 @@ def _by_column(data_set: DataSet) -> list[Finding]:
     return list(found.values())
 
 
-def _mended(data_set: DataSet, findings: Sequence[Finding]) -> DataSet:
+def _mended(data_set: DataSet, findings: Sequence[LogFinding]) -> DataSet:
     reversed_torques = {finding.channel for finding in findings if finding.fault == "sign" and finding.mended}
     at_reading = {(finding.fault, finding.channel) for finding in _by_column(data_set)}  # and mended there
     held = {

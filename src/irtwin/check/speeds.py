@@ -11,7 +11,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import differentiate
 from irtwin.signals.filter import low_pass
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
@@ -26,7 +26,7 @@ _BEYOND = 2.0  # standard deviations by which it exceeds a filter's
 _SLOW = 0.25  # of the cutoff, which is ten times the motion's band: above, derivatives are noise, which hides a delay
 
 
-def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the speed channels that contradict the positions, or `time` where its unit alone explains it."""
     pairs = [_speeds(run, motion) for run, motion in zip(moving.runs, moving.motions, strict=True)]
     pairs = [pair for pair in pairs if pair is not None]
@@ -55,8 +55,8 @@ def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
     return found
 
 
-def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], said: str) -> Finding:
-    return Finding(
+def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], said: str) -> LogFinding:
+    return LogFinding(
         fault, channel, moving.names, certain=True, mended=True, evidence=evidence,
         say=f"{channel} {said}; the speeds of the positions are used instead",
     )  # fmt: skip
@@ -93,17 +93,17 @@ def _is(gain: float, factor: float) -> bool:
     return bool(abs(gain / factor - 1) < _NEAR)
 
 
-def _time_unit(gains: list[float], moving: Moving) -> Finding | None:
+def _time_unit(gains: list[float], moving: Moving) -> LogFinding | None:
     """Times in another unit make the positions' speeds smaller by its factor, those of all joints alike."""
     for unit, factor in _TIMES.items():
         if gains and all(_is(gain, factor) for gain in gains):
             evidence = {"factor": float(np.median(gains))}
             said = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
-            return Finding("unit", "time", moving.names, True, False, evidence, f"time {said}")
+            return LogFinding("unit", "time", moving.names, True, False, evidence, f"time {said}")
     return None
 
 
-def _scaled(name: str, gain: float, moving: Moving) -> list[Finding]:
+def _scaled(name: str, gain: float, moving: Moving) -> list[LogFinding]:
     evidence = {"gain": round(gain, 4)}
     for unit, factor in _UNITS.items():
         if _is(gain, factor):
@@ -115,7 +115,7 @@ def _scaled(name: str, gain: float, moving: Moving) -> list[Finding]:
     return []
 
 
-def _delayed(name: str, joint: int, moving: Moving) -> list[Finding]:
+def _delayed(name: str, joint: int, moving: Moving) -> list[LogFinding]:
     """Return the finding where a logged speed comes late or early.
 
     For short delays d, the speed v(t - d) is v - d dv/dt.

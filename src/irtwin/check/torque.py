@@ -11,11 +11,11 @@ import numpy as np
 
 from irtwin.check.arrangement import says_position
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import Rows, friction, rows_of
-from irtwin.check.robust_fit import Fit, fit
+from irtwin.check.rigid_body import RigidBodyRows, friction, rows_of
+from irtwin.check.robust_fit import RobustFit, fit
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 
 _ROWS = 1500  # over all runs
 _SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
@@ -28,7 +28,7 @@ _OTHERS = 3  # gains that tell the usual one
 _EXPLAINED = 0.4  # of a torque's variance by its own joint's motion, without which a sign means nothing
 
 
-def torque_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the torque channels that are reversed, or no torque of their joint."""
     rows = rows_of(robot, moving, _ROWS)
     if rows is None or len(rows.q) < _FEWEST:
@@ -38,7 +38,7 @@ def torque_findings(robot: Robot, moving: Moving) -> list[Finding]:
     return [finding for finding in found if finding is not None]
 
 
-def unsigned_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return that torque has no sign, where no joint of several has any below zero though all move both ways."""
     torques = [run.signals.torque for run in moving.runs if run.signals.torque is not None]
     if len(torques) < len(moving.runs) or moving.joints.sum() < _SEVERAL:
@@ -54,16 +54,16 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[Finding]:
         "or leave it out: commands (cmd_JOINT) can be held against a simulator's model without it"
     )
     name = CHANNELS["torque"].column(robot.joints[int(np.flatnonzero(moving.joints)[0])].name)
-    return [Finding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
+    return [LogFinding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
 
 
-def scale_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
     rows = rows_of(robot, moving, _ROWS)
     return [] if rows is None or len(rows.q) < _FEWEST else _scales(robot, moving, rows, rows.nominal())
 
 
-def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, joint: int) -> Finding | None:
+def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray, joint: int) -> LogFinding | None:
     """Return what is wrong with the direction of a joint's torque."""
     torque, speed = rows.torque[:, joint], rows.dq[:, joint]
     if np.ptp(torque) == 0:
@@ -83,7 +83,7 @@ def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, jo
     if not drives and ((lost < -_SURE and body < _LIKELY) or (body < -_SURE and lost < _LIKELY)):
         return _wrong_sign(robot, moving, joint, evidence, _reversed(body, lost))
     if drives:
-        return Finding(
+        return LogFinding(
             "not_joint_torque", name, moving.names, certain=False, mended=False, evidence=evidence,
             say=f"{name} is not the torque of its joint alone: gravity and inertia have the right direction in it, but "
             "friction would drive the joint; log the torque on the joint side, or leave the column out",
@@ -91,7 +91,7 @@ def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, jo
     return None
 
 
-def _drives(found: Fit, dry: float, viscous: float) -> bool:
+def _drives(found: RobustFit, dry: float, viscous: float) -> bool:
     """Return whether friction takes energy by one of its parts and gives more by the other, as no friction does."""
     parts = np.array([[0.0, 0.0, dry, 0.0, 0.0], [0.0, 0.0, 0.0, viscous, 0.0]])
     t_dry, t_viscous = (found.t(part) for part in parts)
@@ -99,19 +99,19 @@ def _drives(found: Fit, dry: float, viscous: float) -> bool:
     return min(abs(t_dry), abs(t_viscous)) > _SURE and t_dry * t_viscous < 0 and bool(power[1] > power[0])
 
 
-def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, float], why: str) -> Finding:
+def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, float], why: str) -> LogFinding:
     """Return the finding, of the position where that explains the torques of the other joints as well."""
     names = {field: CHANNELS[field].column(robot.joints[joint].name) for field in ("torque", "q")}
     position = says_position(robot, moving, joint)
     evidence = {**evidence, "position_t": round(position, 1)}
     if position > _SURE:
-        return Finding(
+        return LogFinding(
             "sign", names["q"], moving.names, certain=True, mended=False, evidence=evidence,
             say=f"{names['q']} has the wrong sign: {why}, and the torques of other joints fit the motion reversed; "
             "change it, and that of the speed",
         )  # fmt: skip
     other = f" (or {names['q']}: the torques cannot tell which)" if position > -_LIKELY else ""
-    return Finding(
+    return LogFinding(
         "sign", names["torque"], moving.names, certain=True, mended=True, evidence=evidence,
         say=f"{names['torque']} has the wrong sign{other}: {why}; its sign is changed here, change it in the log",
     )  # fmt: skip
@@ -125,7 +125,7 @@ def _reversed(body: float, lost: float) -> str:
     return " and ".join(reason for reason, holds in reasons if holds)
 
 
-def _scales(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray) -> list[Finding]:
+def _scales(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray) -> list[LogFinding]:
     gains = {}
     for joint in np.flatnonzero(moving.joints).tolist():
         columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]
@@ -140,7 +140,7 @@ def _scales(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray) -> li
     ]
 
 
-def _scale(name: str, ratio: float, moving: Moving) -> Finding:
+def _scale(name: str, ratio: float, moving: Moving) -> LogFinding:
     say = f"{name} is {ratio:.2g} times as large, by the URDF's bodies, as the torques of other joints; check its gain"
     evidence = {"ratio": round(ratio, 2)}
-    return Finding("scale", name, moving.names, certain=False, mended=False, evidence=evidence, say=say)
+    return LogFinding("scale", name, moving.names, certain=False, mended=False, evidence=evidence, say=say)

@@ -31,7 +31,7 @@ from irtwin.cli.options import (
 from irtwin.location import Location
 
 if TYPE_CHECKING:
-    from irtwin.signals.finding import Finding
+    from irtwin.signals.finding import LogFinding
 
 
 @click.command()
@@ -255,6 +255,6 @@ def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) 
             click.echo(line)
 
 
-def _state(finding: Finding) -> str:
+def _state(finding: LogFinding) -> str:
     state = "mended" if finding.mended else "cure first" if finding.stops else "doubtful"
     return f"{finding.fault.replace('_', ' ')} ({state})"

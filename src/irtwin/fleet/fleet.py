@@ -23,7 +23,7 @@ _EVERY = 5.0  # s between two lines of how far a fleet is
 
 
 @dataclass(frozen=True)
-class Status:
+class FleetStatus:
     """How many data sets are in each state (`left` where none is final), and the records of those set aside."""
 
     counts: Counter[str]
@@ -40,7 +40,7 @@ def work(
     scheduler: str | None = None,
     base: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
-) -> Status:
+) -> FleetStatus:
     """Take every data set of a source through `run` or `diagnose`, results below `folder`.
 
     What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace;
@@ -115,7 +115,7 @@ def batches_of(folder: Path) -> list[Batch]:
     return [Batch(inside(folder, file.parent.name)) for file in sorted(folder.glob("*/sets.json"))]
 
 
-def status_of(batches: Sequence[Batch]) -> Status:
+def status_of(batches: Sequence[Batch]) -> FleetStatus:
     """Count what became of the data sets of some batches."""
     counts: Counter[str] = Counter()
     aside = []
@@ -124,7 +124,7 @@ def status_of(batches: Sequence[Batch]) -> Status:
         counts[state] += 1
         if record is not None and state in (REFUSED, FAILED):
             aside.append(record)
-    return Status(counts, tuple(aside))
+    return FleetStatus(counts, tuple(aside))
 
 
 def _records(batches: Sequence[Batch]) -> Iterator[Record | None]:

@@ -16,7 +16,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
-from irtwin.live.refusals import Refusals
+from irtwin.live.refusals import RefusedLines
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.location import Location
@@ -51,7 +51,7 @@ def watch(
     Raises InputError for a fault in what extends the workspace, before a sample is read.
     """
     sys.setswitchinterval(SWITCH)
-    refusals = Refusals(announce)
+    refusals = RefusedLines(announce)
     done = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: done.set())

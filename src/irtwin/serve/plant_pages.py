@@ -16,7 +16,7 @@ from irtwin.errors import InputError
 from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.questions import Answers, Question
+from irtwin.report.questions import Answers, PageQuestion
 from irtwin.serve.asking import Asking, Bindings
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
@@ -107,7 +107,7 @@ class PlantPages:
         return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, asked)))
 
     @staticmethod
-    def _chosen(request: Request) -> tuple[choice.Choice, str]:
+    def _chosen(request: Request) -> tuple[choice.Selection, str]:
         """Return what a form asks of the plant, and what is wrong with it: all of it is shown then."""
         try:
             return choice.choice(request.query_params), ""
@@ -171,7 +171,7 @@ class PlantPages:
         return await self._known(request, asked, {"robot": iri}, "robot")
 
     async def _known(
-        self, request: Request, asked: Mapping[str, Question], bindings: dict[str, str], about: str
+        self, request: Request, asked: Mapping[str, PageQuestion], bindings: dict[str, str], about: str
     ) -> Answers:
         """Answer questions about an individual; Refusal where the first of them knows nothing of it."""
         answers = await self._asking.answers(request, asked, bindings)

@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.filter import FEWEST_PERIODS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.holes import HOLE
 from irtwin.signals.samples import FEWEST
 
@@ -27,7 +27,7 @@ def interval(time: np.ndarray) -> float:
     return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
 
 
-def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Finding]]:
+def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[LogFinding]]:
     """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
 
     Held positions: one sample of each update stays. A piece of fewer than 20 samples is left out. A run that has
@@ -50,7 +50,7 @@ def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Findin
     taken = "one run" if len(long) == 1 else f"{len(long)} runs"
     found = f"{path}: no samples {first}{others}; taken as {taken}{dropped}"
     evidence = {"holes": float(len(pieces) - 1), "left_out": float(left_out)}
-    return long, [*said, Finding("hole", "time", (path.stem,), True, True, evidence, found)]
+    return long, [*said, LogFinding("hole", "time", (path.stem,), True, True, evidence, found)]
 
 
 def holes(time: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def _cut(signals: Signals) -> list[Signals]:
     return done
 
 
-def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[Finding]]:
+def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[LogFinding]]:
     step = _hold(signals.q)
     if step is None:
         return signals, []
@@ -82,7 +82,7 @@ def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[Finding]]
     logged, true = 1 / interval(signals.time), 1 / interval(signals.time[rows])
     said = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
     evidence = {"logged_hz": logged, "true_hz": true}
-    return signals.rows(rows), [Finding("held_samples", "q", (path.stem,), True, True, evidence, said)]
+    return signals.rows(rows), [LogFinding("held_samples", "q", (path.stem,), True, True, evidence, said)]
 
 
 def _hold(q: np.ndarray) -> int | None:

@@ -15,9 +15,9 @@ from pyoxigraph import BlankNode, Literal, NamedNode, RdfFormat, parse
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.document import (
     RR,
-    Document,
     Join,
     LogicalTable,
+    MappingDocument,
     Node,
     PredicateObjectMap,
     TermMap,
@@ -37,7 +37,7 @@ _SQL_VERSIONS = {
 _Parsed = TypeVar("_Parsed")
 
 
-def read_document(path: Path) -> Document:
+def read_document(path: Path) -> MappingDocument:
     """Read and check a mapping document in Turtle."""
     file_iri = path.resolve().as_uri()
     content = read_rdf(path, RdfFormat.TURTLE)
@@ -47,7 +47,7 @@ def read_document(path: Path) -> Document:
     except (SyntaxError, MemoryError) as error:
         refuse(path, error)
     declared = None if parser.base_iri == file_iri else parser.base_iri
-    return Document(declared, _Reader(path, graph).triples_maps())
+    return MappingDocument(declared, _Reader(path, graph).triples_maps())
 
 
 class _Graph:

@@ -31,14 +31,14 @@ _RELATIVE = re.compile("[^:/?#]+/")  # no scheme can come any more
 
 
 @dataclass(frozen=True)
-class Column:
+class RowColumn:
     """Where a row holds a column, and how its values read."""
 
     index: int
     natural: Natural
 
 
-Columns = Mapping[Identifier, Column]
+Columns = Mapping[Identifier, RowColumn]
 
 
 def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:

@@ -14,7 +14,7 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number, Rule
+from irtwin.knowledge.owl_rl.rules import DatalogRule, Fact, Facts, Number
 from irtwin.knowledge.owl_rl.terms import Node, Terms
 from irtwin.knowledge.vocabulary import ID, OWL, RDFS, XSD, shorten
 
@@ -147,7 +147,7 @@ class Closure:
             return Derivation(rule.name, tuple(map(self._shown, premises)))
         return None
 
-    def _derivations(self, conclusion: Fact) -> Iterator[tuple[Rule, list[Fact]]]:
+    def _derivations(self, conclusion: Fact) -> Iterator[tuple[DatalogRule, list[Fact]]]:
         """Yield the rules that draw a conclusion from what was known before it, each with its premises."""
         found = self._round[conclusion]
         for rule, join, arguments in self._program.concluding(conclusion):
@@ -264,7 +264,7 @@ class Closure:
             self._refuse(rule, list(dict.fromkeys(join(self._facts, self._facts))))
         self._refuse_other_datatypes(self._facts)
 
-    def _refuse(self, rule: Rule, found: list[tuple[Number, ...]]) -> None:
+    def _refuse(self, rule: DatalogRule, found: list[tuple[Number, ...]]) -> None:
         if found:
             clashes = chain(*(self._program.clashes(rule, culprits, self._facts) for culprits in found))
             given = self._grounds(chain(*clashes))

@@ -25,7 +25,7 @@ _RULE = re.compile(
 
 
 @dataclass(frozen=True)
-class Rule:
+class DatalogRule:
     """A rule by its name. One that `head` is empty for finds a contradiction, shown by `culprits`."""
 
     name: str
@@ -40,14 +40,14 @@ class Rule:
         return tuple(dict.fromkeys(term for pattern in self.body for term in pattern if term.startswith("?")))
 
 
-def read_rules(file: Path) -> tuple[Rule, ...]:
+def read_rules(file: Path) -> tuple[DatalogRule, ...]:
     """Return the rules of a file, in its order."""
     return tuple(_rule(found) for found in _RULE.finditer(file.read_text(encoding="utf-8")))
 
 
-def _rule(found: re.Match[str]) -> Rule:
+def _rule(found: re.Match[str]) -> DatalogRule:
     name, _, head, culprits, body, condition = found.groups()
-    return Rule(
+    return DatalogRule(
         name=name,
         head=_patterns(head or ""),
         culprits=tuple((culprits or "").split()),
@@ -109,7 +109,7 @@ class Facts:
 
 
 def compile_join(
-    rule: Rule,
+    rule: DatalogRule,
     number_of: Callable[[Term], Number],
     results: Sequence[Sequence[Term]],
     *,
@@ -132,7 +132,7 @@ def compile_join(
 class _Writer:
     """Writes a rule's body as nested loops, the pattern with the fewest open variables next."""
 
-    def __init__(self, rule: Rule, number_of: Callable[[Term], Number], new: int | None, given: Sequence[Term]):
+    def __init__(self, rule: DatalogRule, number_of: Callable[[Term], Number], new: int | None, given: Sequence[Term]):
         self._rule = rule
         self._number_of = number_of
         self._new = new

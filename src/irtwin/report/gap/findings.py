@@ -14,7 +14,7 @@ Alternative = tuple[str, float]  # what an effect is called, and its confidence
 
 
 @dataclass(frozen=True)
-class Finding:
+class ToldFinding:
     """A finding as it is told: `members`, for each of its causes, the cause and what the data cannot tell from it.
 
     against: what it is held against: "twin", "reference" or "simulated" runs, or "both" of these. share, interval: of
@@ -99,7 +99,7 @@ NOT_REPEATING = {
 
 def sentence(
     verdict: str,
-    findings: Sequence[Finding],
+    findings: Sequence[ToldFinding],
     where: str,
     closes: str | None,
     because: str | None = None,
@@ -145,7 +145,7 @@ def sentence(
     return f"{said[:1].upper()}{said[1:]}.{unsure}{closes}{differing}{beside}"
 
 
-def _told(findings: Sequence[Finding]) -> list[Finding]:
+def _told(findings: Sequence[ToldFinding]) -> list[ToldFinding]:
     """Return the findings that are named, in their order: of those that matter the likely ones, then guesses."""
     those = sorted((one for one in findings if one.matters), key=lambda one: not one.likely)[:_NAMED]
     return [one for one in findings if one in those]
@@ -160,7 +160,7 @@ def _left(because: str | None, where: str, differ: str) -> str:
     return f"There is a gap{where}, and no effect in the catalogue closes it."
 
 
-def _closes(one: Finding, count: int) -> str:
+def _closes(one: ToldFinding, count: int) -> str:
     """Say what the first of so many findings closes by itself."""
     what = "That" if count == 1 else "The first of these"
     of = "gap in" if one.of.startswith("the gap") else "mean square of"
@@ -180,7 +180,7 @@ def folded(count: int, channel: str, share: float) -> str:
     return f"{found} {closed} of the gap in {channel}"
 
 
-def counted(findings: Sequence[Finding]) -> str:
+def counted(findings: Sequence[ToldFinding]) -> str:
     """Count findings, by channel, with what they close together; empty where there are none."""
     of_channel: dict[str, list[float]] = {}
     for one in findings:

@@ -9,7 +9,7 @@ from irtwin.document.curves import FrictionCurve
 from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE
 from irtwin.report.energy.figures import Figure, plain
-from irtwin.report.energy.tables import Cell, Line, is_unsure
+from irtwin.report.energy.tables import ParameterCell, ParameterLine, is_unsure
 from irtwin.report.gap.figures import band
 
 _BANDED = "33"  # how opaque a band is, in hexadecimal
@@ -21,13 +21,13 @@ def figures(curves: Sequence[FrictionCurve]) -> dict[str, Figure]:
     return {joint: _figure([one for one in curves if one.joint == joint]) for joint in reversed(joints)}
 
 
-def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[Line, ...]:
+def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[ParameterLine, ...]:
     """Return a line for each number of friction and side, with a cell a joint; `names`: of effects, by their ids."""
-    cells: dict[tuple[str, str, str, str], dict[str, Cell]] = {}
+    cells: dict[tuple[str, str, str, str], dict[str, ParameterCell]] = {}
     for curve in curves:
         for one in curve.numbers:
             value, interval = wording.interval(one.value, one.lower, one.upper)
-            cell = Cell(value, interval, is_unsure(one.value, one.lower, one.upper))
+            cell = ParameterCell(value, interval, is_unsure(one.value, one.lower, one.upper))
             cells.setdefault((one.effect, one.name, one.unit, curve.role), {})[curve.joint] = cell
     effects = list(dict.fromkeys(effect for effect, *_ in cells))
     several = len({curve.role for curve in curves}) > 1
@@ -35,7 +35,7 @@ def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[Li
     for key in sorted(cells, key=lambda key: (effects.index(key[0]), key[1])):
         effect, name, unit, role = key
         label = names.get(effect, effect.replace("_", " "))
-        found.append(Line(f"{label}, {role}" if several else label, name, unit, cells[key]))
+        found.append(ParameterLine(f"{label}, {role}" if several else label, name, unit, cells[key]))
     return tuple(found)
 
 

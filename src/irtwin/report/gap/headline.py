@@ -29,9 +29,9 @@ def line(diagnosis: Document, against: str | None) -> str:
     return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _told(one: Finding, against: str | None) -> findings.Finding:
+def _told(one: Finding, against: str | None) -> findings.ToldFinding:
     members = [[member for member in one.members if member.cause == cause] for cause in one.causes]
-    return findings.Finding(
+    return findings.ToldFinding(
         family=one.family,
         joints=one.joints,
         against="twin" if one.scope == "missing" else against or "reference",

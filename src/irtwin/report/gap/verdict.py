@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from irtwin.report import wording
 from irtwin.report.gap import findings
-from irtwin.report.gap.findings import Finding
+from irtwin.report.gap.findings import ToldFinding
 from irtwin.report.questions import Answers, Row
 
 _MOSTLY = 0.5  # share of a gap
@@ -33,7 +33,7 @@ def sentence(answers: Answers) -> str:
     )  # fmt: skip
 
 
-def told(answers: Answers) -> list[Finding]:
+def told(answers: Answers) -> list[ToldFinding]:
     """Return the findings, the largest first."""
     return [_finding(row, answers) for row in answers["findings"].rows]
 
@@ -44,13 +44,13 @@ def matters(cause: str, answers: Answers) -> bool:
     return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
 
 
-def _finding(row: Row, answers: Answers) -> Finding:
+def _finding(row: Row, answers: Answers) -> ToldFinding:
     name = row["finding"]
     members: dict[str, list[tuple[str, float]]] = {}
     for one in answers["finding_members"].rows:
         if one["finding"] == name:
             members.setdefault(one["cause"], []).append((effect_name(one), one["confidence"]))
-    return Finding(
+    return ToldFinding(
         family=row["family_label"] or wording.local_name(row["family"]),
         joints=tuple(one["joint"] for one in answers["finding_joints"].rows if one["finding"] == name),
         against="twin" if row["scope"] == "missing" else _against(answers["diagnosis"].rows[0]),

@@ -16,7 +16,7 @@ _HOUR = timedelta(hours=1)
 
 
 @dataclass(frozen=True)
-class Cell:
+class HourOfWeek:
     """The hours of one weekday and time of day: their mean energy (J), None where none was logged; `height` 0 to 1."""
 
     weekday: str
@@ -38,11 +38,11 @@ class Shift:
 class Load:
     """When energy was taken: `week` a row a weekday, 24 cells each; the shifts in which something was logged."""
 
-    week: tuple[tuple[Cell, ...], ...]
+    week: tuple[tuple[HourOfWeek, ...], ...]
     shifts: tuple[Shift, ...]
 
     @property
-    def greatest(self) -> Cell:
+    def greatest(self) -> HourOfWeek:
         """The weekday and hour with the greatest mean energy."""
         return max((cell for row in self.week for cell in row), key=lambda cell: cell.energy_j or 0.0)
 
@@ -69,9 +69,9 @@ def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
     return Load(week, tuple(shifts))
 
 
-def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> Cell:
+def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> HourOfWeek:
     height = max(energy or 0.0, 0.0) / greatest if greatest > 0 else 0.0
-    return Cell(WEEKDAYS[weekday], hour, energy, height)
+    return HourOfWeek(WEEKDAYS[weekday], hour, energy, height)
 
 
 def _shift(weekday: int, hour: int) -> str:

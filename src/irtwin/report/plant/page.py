@@ -12,14 +12,14 @@ from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import choice, links, paging
 from irtwin.report.plant.energies import kwh
-from irtwin.report.questions import Answers, Question, read_questions
+from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
 FOLDER = resources.folder("reports") / "plant"
 
 
 @cache
-def questions(page: str = "") -> Mapping[str, Question]:
+def questions(page: str = "") -> Mapping[str, PageQuestion]:
     """Return the questions of a page, of the plant's own without a name."""
     return read_questions((FOLDER / page).glob("*.rq"))
 
