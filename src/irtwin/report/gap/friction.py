@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from irtwin.document.curves import FrictionCurve
 from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE
-from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.energy.tables import ParameterCell, ParameterLine, is_unsure
-from irtwin.report.gap.figures import band
+from irtwin.report.traces import Figure, band, plain, trace
 
 _BANDED = "33"  # how opaque a band is, in hexadecimal
 
@@ -54,28 +52,21 @@ def _figure(sides: Sequence[FrictionCurve]) -> Figure:
     return {"data": data, "layout": layout}
 
 
-def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[dict[str, Any]]:
+def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[Figure]:
     """Return the traces of one side: the band, the curve in it, and what was measured."""
-    x = list(curve.speed)
     at = f"%{{y:.3~g}} {curve.unit} at %{{x:.3~g}} {curve.speed_unit}<extra></extra>"
-    traces: list[dict[str, Any]] = [
-        *band(x, curve.low, curve.high, colour + _BANDED),
-        {
-            "type": "scatter", "mode": "lines", "name": curve.role, "x": x, "y": list(curve.torque),
-            "line": {"color": colour, "width": 2}, "hovertemplate": f"twin {at}",
-        },
-    ]  # fmt: skip
+    line = trace(curve.role, curve.speed, curve.torque, "", line={"color": colour, "width": 2})
+    traces = [
+        *band(curve.speed, curve.low, curve.high, colour + _BANDED),
+        {**line, "hovertemplate": f"twin {at}"},
+    ]
     if (points := curve.measured) is not None:
         spread = {
             "type": "data", "symmetric": False, "thickness": 1, "width": 0,
             "array": [max(high - mean, 0.0) for high, mean in zip(points.high, points.torque, strict=True)],
             "arrayminus": [max(mean - low, 0.0) for low, mean in zip(points.low, points.torque, strict=True)],
         }  # fmt: skip
-        traces.append(
-            {
-                "type": "scatter", "mode": "markers", "x": list(points.speed), "y": list(points.torque),
-                "error_y": spread, "marker": {"color": of_points, "size": 5, "opacity": 0.8}, "showlegend": False,
-                "hovertemplate": f"measured {at}",
-            }
-        )  # fmt: skip
+        marker = {"color": of_points, "size": 5, "opacity": 0.8}
+        seen = trace("measured", points.speed, points.torque, "", "markers", marker=marker, error_y=spread)
+        traces.append({**seen, "showlegend": False, "hovertemplate": f"measured {at}"})
     return traces
