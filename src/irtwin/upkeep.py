@@ -85,9 +85,9 @@ def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
         place.mapped_rows.unlink(missing_ok=True)  # the graph may show what no row ever said
         run_id = journal.stem
     else:
-        found = find_run(place, robot_id, name)
-        _check_that_it_may_go(place, found)
-        run_id = found.run_id
+        run = find_run(place, robot_id, name)
+        _check_that_it_may_go(place, run)
+        run_id = run.run_id
     place.drop_run(run_id, run_iri(run_id))
     if journal is not None:
         files.remove(journal)
@@ -174,12 +174,12 @@ def lost_files(place: Workspace) -> list[str]:
     """Return, in words, which files that the database names are missing or altered."""
     with place.reading() as session:
         named = named_files(session.connection())
-    found = []
+    lost = []
     for file in named:
         try:
             if is_whole(place.folder, file.path, file.sha256):
                 continue
         except InputError:  # a path that leads outside
             pass
-        found.append(f"{file.path} of {file.robot_id} is missing or altered")
-    return found
+        lost.append(f"{file.path} of {file.robot_id} is missing or altered")
+    return lost

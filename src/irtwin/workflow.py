@@ -106,18 +106,18 @@ def as_asserted(location: Location, data_set: DataSet) -> DataSet:
         return followed(data_set, place.facts_about(identifier(data_set.robot.name)))
 
 
-def keep_diagnosis(location: Location, data_set: DataSet, found: Diagnosis | Playing, announce: Announce) -> None:
+def keep_diagnosis(location: Location, data_set: DataSet, diagnosis: Diagnosis | Playing, announce: Announce) -> None:
     """Keep a diagnosis with its data set in a workspace, in the graph too, and write its report there."""
     announce("Storing the diagnosis")
     robot_id = identifier(data_set.robot.name)
-    closed = None if found.twin is None else to_json(found.twin)
-    motion = motion_text(found) if isinstance(found, Diagnosis) else None
+    closed = None if diagnosis.twin is None else to_json(diagnosis.twin)
+    motion = motion_text(diagnosis) if isinstance(diagnosis, Diagnosis) else None
     with Workspace.at(location) as place:
         with rewriting(place, announce) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set, facts=place.facts_about(robot_id))
-                record(apart, robot_id, found.document, found.curves, closed, motion)
+                record(apart, robot_id, diagnosis.document, diagnosis.curves, closed, motion)
             renew(place, graph, announce)
         with open_graph(place.location) as graph:
             out = place.gap_report_path(robot_id)

@@ -39,9 +39,9 @@ class ToldAlarms:
                 raise InputError(f"{file}: cannot be understood ({error}); delete it, and all is told anew") from None
             self._known = {alarm.key: alarm for alarm in alarms}
 
-    def news(self, found: Sequence[Alarm]) -> list[tuple[Event, Alarm]]:
+    def news(self, alarms: Sequence[Alarm]) -> list[tuple[Event, Alarm]]:
         """Return what was not told of the alarms that there are now. One that is there no more is over."""
-        now = {alarm.key: alarm for alarm in found}
+        now = {alarm.key: alarm for alarm in alarms}
         before = self._known
         if before is None:
             before = {key: alarm for key, alarm in now.items() if alarm.state != ACTIVE}
@@ -55,7 +55,7 @@ class ToldAlarms:
         news += [("cleared", alarm) for alarm in gone]
         if news or self._known is None:
             self._known = now
-            files.write(self._file, json.dumps([alarm.as_dict() for alarm in found], indent=1).encode())
+            files.write(self._file, json.dumps([alarm.as_dict() for alarm in alarms], indent=1).encode())
         return news
 
 
@@ -72,9 +72,9 @@ def follow(
 
     A graph that cannot be read is announced, and asked again; the first look raises InputError.
     """
-    found, fault = look(), ""
+    alarms, fault = look(), ""
     while True:
-        for event, alarm in told.news(found):
+        for event, alarm in told.news(alarms):
             line = message(event, alarm, datetime.now(UTC), sparql.get(alarm.rule))
             for delivery in deliveries:
                 delivery.put(line)
@@ -82,7 +82,7 @@ def follow(
         if done.wait(EVERY):
             return
         try:
-            found, fault = look(), ""
+            alarms, fault = look(), ""
         except InputError as error:
             if str(error) != fault:
                 announce(f"alarms are not known now: {error}")

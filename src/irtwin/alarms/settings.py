@@ -66,7 +66,7 @@ def _asked(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
     """Return each receiver of a file: the name by which it is asked for, and what makes it of which table."""
     document = read_toml(file)
     _check(file, "", document, tuple(_KEYS))
-    found: list[tuple[str, _Maker, TomlTable]] = []
+    asked: list[tuple[str, _Maker, TomlTable]] = []
     makers: dict[str, _Maker] = {"webhook": _webhook, "mqtt": _mqtt}
     for kind, make in makers.items():
         tables = document.get(kind, [])
@@ -75,10 +75,10 @@ def _asked(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
         for number, values in enumerate(tables, start=1):
             table = TomlTable(file, f"{kind} {number}:", values)
             _check(file, table.name, values, _KEYS[kind])
-            found.append((f"{NAME}: {_where(kind, table)}", make, table))
-    if not found:
+            asked.append((f"{NAME}: {_where(kind, table)}", make, table))
+    if not asked:
         raise InputError(f"{file}: names nobody; write [[webhook]] with url, or [[mqtt]] with host and topic")
-    return found
+    return asked
 
 
 def _where(kind: str, table: TomlTable) -> str:

@@ -166,13 +166,13 @@ def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: 
     ratio, named = float(np.exp(gain)), fault.columns(robot)
     prefix = CHANNELS[fault.field].prefix
     mended = fault.fault == "sign" and fault.field == "torque"
-    said = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
+    what = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
     cure = _CURE.get((fault.fault, prefix), "name them by their joints")
     other = f" (or {rivals[0].columns(robot)}: the torques cannot tell which)" if rivals else ""
     return LogFinding(
         fault.fault, named, moving.names, certain=True, mended=mended,
         evidence={"residual_ratio": ratio, "t": round(t, 1)},
-        say=f"{named} {said}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
+        say=f"{named} {what}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
         f"{cure}",
     )  # fmt: skip
 

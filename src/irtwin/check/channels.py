@@ -22,7 +22,7 @@ _FEWEST = 200  # samples, for all of these
 
 def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the columns that are dead, held, cut off or coarse, and times that jump about."""
-    found = [finding for finding in (_jitter(moving),) if finding is not None]
+    findings = [finding for finding in (_jitter(moving),) if finding is not None]
     known = {
         column: [columns_of(run.signals, robot.joint_names)[column] for run in moving.runs]
         for column in _columns(robot, moving)
@@ -32,9 +32,9 @@ def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
         for check in (_held,) if speeds else (_dead, _held, _cut_off, _coarse):
             finding = check(column, values, moving)
             if finding is not None:
-                found.append(finding)
+                findings.append(finding)
                 break
-    return found
+    return findings
 
 
 def _columns(robot: Robot, moving: Moving) -> Iterator[str]:

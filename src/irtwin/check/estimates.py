@@ -59,7 +59,7 @@ def _delays(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -
     joints = np.flatnonzero(moving.joints).tolist()
     late = {joint: _lateness(fitted, rates, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
-    found = []
+    delays = []
     for joint in joints:
         others = [late[other].friction for other in joints if other != joint]
         number, deviation = late[joint].beside(others)
@@ -72,8 +72,8 @@ def _delays(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -
             if not 0 < number < _LATEST:
                 break
         if _LATE < number < _LATEST and _beyond(number, deviation, _LATE):
-            found.append(_delay(names[joint], number, deviation, moving))
-    return found
+            delays.append(_delay(names[joint], number, deviation, moving))
+    return delays
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def _rescaled(fitted: Fitted, joint: int, scale: float) -> Fitted:
 def _zeros(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -> list[LogFinding]:
     """Return the position whose zero is off; what a tilted base or a spring at the joint does is no such thing."""
     tilts = _tilts(rows, fitted)
-    found = []
+    zeros = []
     for joint in np.flatnonzero(moving.joints).tolist():
         if robot.joints[joint].kind == "prismatic":
             continue
@@ -187,10 +187,10 @@ def _zeros(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) ->
             more, deviation = _zero(turned, again, _tilts(turned, again), joint)
             off += more
         if deviation < _SHOWN and _beyond(abs(off), deviation, _ZERO):
-            found.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
-    if not found:
+            zeros.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
+    if not zeros:
         return []
-    _, joint, off, deviation = min(found)  # of one that is off, others seem to be off as well
+    _, joint, off, deviation = min(zeros)  # of one that is off, others seem to be off as well
     own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
     if own.t(cured) < _SURE:
         return []

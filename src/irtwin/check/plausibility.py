@@ -26,14 +26,14 @@ _MECHANICAL = 1.0  # W: less is friction's and noise's
 
 def plausibility_findings(data_set: DataSet, moving: Moving) -> list[LogFinding]:
     """Return what cannot be, by the robot's own sizes and limits."""
-    found = [
+    findings = [
         urdf_finding(data_set.robot),
         *(_payload(data_set)),
         *(_position(moving, index, joint) for index, joint in enumerate(data_set.robot.joints)),
         _time(data_set.robot, moving),
         _power(data_set.robot, moving),
     ]
-    return [finding for finding in found if finding is not None]
+    return [finding for finding in findings if finding is not None]
 
 
 def urdf_finding(robot: Robot) -> LogFinding | None:

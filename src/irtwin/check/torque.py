@@ -34,8 +34,8 @@ def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     if rows is None or len(rows.q) < _FEWEST:
         return []
     nominal = rows.nominal()
-    found = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
-    return [finding for finding in found if finding is not None]
+    findings = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
+    return [finding for finding in findings if finding is not None]
 
 
 def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
@@ -70,16 +70,16 @@ def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.nd
         return None
     losses = friction(speed)
     columns = np.column_stack([nominal[:, joint], rows.ddq[:, joint], losses])
-    found = fit(columns, torque)
-    residual = torque - columns @ found.coefficients
+    friction_fit = fit(columns, torque)
+    residual = torque - columns @ friction_fit.coefficients
     if np.var(residual) > (1 - _EXPLAINED) * np.var(torque):
         return None
-    body = found.t(np.eye(5)[0])
+    body = friction_fit.t(np.eye(5)[0])
     dry, viscous = (losses[:, :2] * speed[:, None]).mean(axis=0)  # what they take from the motion
-    lost = found.t(np.array([0.0, 0.0, dry, viscous, 0.0]))
+    lost = friction_fit.t(np.array([0.0, 0.0, dry, viscous, 0.0]))
     evidence = {"gravity_t": round(body, 1), "friction_t": round(lost, 1)}
     name = CHANNELS["torque"].column(robot.joints[joint].name)
-    drives = _drives(found, dry, viscous) or (lost < -_SURE and body > _SURE)
+    drives = _drives(friction_fit, dry, viscous) or (lost < -_SURE and body > _SURE)
     if not drives and ((lost < -_SURE and body < _LIKELY) or (body < -_SURE and lost < _LIKELY)):
         return _wrong_sign(robot, moving, joint, evidence, _reversed(body, lost))
     if drives:
@@ -91,11 +91,11 @@ def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.nd
     return None
 
 
-def _drives(found: RobustFit, dry: float, viscous: float) -> bool:
+def _drives(friction_fit: RobustFit, dry: float, viscous: float) -> bool:
     """Return whether friction takes energy by one of its parts and gives more by the other, as no friction does."""
     parts = np.array([[0.0, 0.0, dry, 0.0, 0.0], [0.0, 0.0, 0.0, viscous, 0.0]])
-    t_dry, t_viscous = (found.t(part) for part in parts)
-    power = np.abs(parts @ found.coefficients)
+    t_dry, t_viscous = (friction_fit.t(part) for part in parts)
+    power = np.abs(parts @ friction_fit.coefficients)
     return min(abs(t_dry), abs(t_viscous)) > _SURE and t_dry * t_viscous < 0 and bool(power[1] > power[0])
 
 
@@ -129,9 +129,9 @@ def _scales(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarr
     gains = {}
     for joint in np.flatnonzero(moving.joints).tolist():
         columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]
-        found = fit(np.column_stack(columns), rows.torque[:, joint])
-        if found.t(np.eye(5)[0]) > _SURE_SCALE:
-            gains[joint] = float(found.coefficients[0])
+        scale_fit = fit(np.column_stack(columns), rows.torque[:, joint])
+        if scale_fit.t(np.eye(5)[0]) > _SURE_SCALE:
+            gains[joint] = float(scale_fit.coefficients[0])
     usual = float(np.median(list(gains.values()))) if len(gains) >= _OTHERS else 0.0
     return [
         _scale(CHANNELS["torque"].column(robot.joints[joint].name), gain / usual, moving)

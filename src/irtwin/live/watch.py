@@ -150,12 +150,12 @@ def _refusing(take: Callable[[State], None], refuse: Callable[[InputError], None
 
 def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:
     """Return what takes states, the first of which says the plan that its run carries out."""
-    said = False
+    told = False
 
     def take_with_plan(state: State) -> None:
-        nonlocal said
-        take(state if said else replace(state, performs=plan))
-        said = True
+        nonlocal told
+        take(state if told else replace(state, performs=plan))
+        told = True
 
     return take_with_plan
 

@@ -38,14 +38,14 @@ class Asking:
         texts = {name: bound(question.text, bindings) for name, question in questions.items()}
         bodies = await self._told(request, [(text, _JSON) for text in texts.values()])
         rows = await asyncio.to_thread(lambda: [_rows(body) for _, body in bodies])
-        return {name: Answer(questions[name], found) for name, found in zip(texts, rows, strict=True)}
+        return {name: Answer(questions[name], answered) for name, answered in zip(texts, rows, strict=True)}
 
     async def holds(self, request: Request, pattern: str, bindings: Bindings) -> bool:
         """Whether the graph has what a pattern asks for."""
         ((_, body),) = await self._told(request, [(bound(f"ASK {{ {pattern} }}", bindings), _JSON)])
-        found = parse_query_results(body, QueryResultsFormat.JSON)
-        assert isinstance(found, QueryBoolean)
-        return bool(found)
+        answer = parse_query_results(body, QueryResultsFormat.JSON)
+        assert isinstance(answer, QueryBoolean)
+        return bool(answer)
 
     async def written(self, request: Request, text: str, accept: str) -> tuple[str, bytes]:
         """Return an answer as it is sent, and its media type."""
@@ -94,7 +94,7 @@ class Asking:
 
 
 def _rows(body: bytes) -> tuple[Row, ...]:
-    found = parse_query_results(body, QueryResultsFormat.JSON)
-    assert not isinstance(found, QueryBoolean)
-    names = [variable.value for variable in found.variables]
-    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in found)
+    solutions = parse_query_results(body, QueryResultsFormat.JSON)
+    assert not isinstance(solutions, QueryBoolean)
+    names = [variable.value for variable in solutions.variables]
+    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in solutions)

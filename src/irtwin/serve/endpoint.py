@@ -115,8 +115,8 @@ class Endpoint:
         return description.response(accept, _address(request), named, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
-        said = request.headers
-        await self._updates.do(operation, _address(request), said.get("authorization", ""), said.get("from", ""))
+        headers = request.headers
+        await self._updates.do(operation, _address(request), headers.get("authorization", ""), headers.get("from", ""))
         return Response(status_code=204)
 
     async def _query(self, operation: Operation, request: Request, send: Send) -> None:

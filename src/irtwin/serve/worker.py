@@ -117,18 +117,18 @@ def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) ->
 
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
-    found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
-    offered = negotiation.SOLUTIONS if isinstance(found, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
+    answer = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
+    offered = negotiation.SOLUTIONS if isinstance(answer, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
     media_type = negotiation.best(request["accept"], offered)
     if media_type is None:
         raise Refusal(406, f"this answer comes as {', '.join(offered)}; none of them is in Accept")
     sink.media_type = media_type
     name = offered[media_type]
     file = cast(IO[bytes], sink)
-    if isinstance(found, QuerySolutions | QueryBoolean):
-        found.serialize(file, format=_RESULTS[name])
+    if isinstance(answer, QuerySolutions | QueryBoolean):
+        answer.serialize(file, format=_RESULTS[name])
     else:
-        serialize(found, file, format=_RDF[name], prefixes=graph.prefixes)
+        serialize(answer, file, format=_RDF[name], prefixes=graph.prefixes)
     sink.end()
 
 

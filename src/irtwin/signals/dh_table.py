@@ -45,8 +45,8 @@ def robot_of_table(name: str, robot: TomlTable) -> Robot:
     table.check_keys(DH_KEYS)
     convention = table.text("convention")
     if convention not in CONVENTIONS:
-        said = "is missing" if convention is None else f'= "{convention}"'
-        raise InputError(f"{robot.file}: [robot.dh] convention {said}; use {' or '.join(CONVENTIONS)} (Craig's)")
+        given = "is missing" if convention is None else f'= "{convention}"'
+        raise InputError(f"{robot.file}: [robot.dh] convention {given}; use {' or '.join(CONVENTIONS)} (Craig's)")
     rows = values.get("row")
     if not isinstance(rows, list) or not rows:
         raise InputError(f"{robot.file}: [[robot.dh.row]] is missing; give one for each joint, base to flange")

@@ -137,10 +137,10 @@ def _repeating(time: Samples, power: Samples, spent: Samples) -> Cycles | None:
     size = 1 << (2 * count - 1).bit_length()
     centred = np.interp(even, time, power)
     centred -= centred.mean()
-    found = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2)[: count // _FEWEST + 1]
-    if found[0] <= 0:
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2)[: count // _FEWEST + 1]
+    if correlation[0] <= 0:
         return None
-    same = found / found[0] * count / (count - np.arange(len(found)))
+    same = correlation / correlation[0] * count / (count - np.arange(len(correlation)))
     below = np.flatnonzero(same < 0)
     if len(below) == 0:
         return None

@@ -300,9 +300,9 @@ def _robot(folder: Path, table: TomlTable) -> Robot:
 
 def _metered(name: str, table: TomlTable) -> Robot:
     """Return a robot of which a meter's power is all that was logged. Raises InputError where joints are said too."""
-    said = [key for key in ("urdf", "dh", "joint") if key in table.values]
-    if table.values["joints"] != [] or said:
-        wrong = f"and {said[0]}" if said else f"= {shown(table.values['joints'])}"
+    given = [key for key in ("urdf", "dh", "joint") if key in table.values]
+    if table.values["joints"] != [] or given:
+        wrong = f"and {given[0]}" if given else f"= {shown(table.values['joints'])}"
         raise InputError(
             f"{table.file}: [robot] joints {wrong}: joints = [] alone says that no joint was logged, of a meter; "
             "else describe the robot by urdf or dh"
@@ -375,9 +375,9 @@ def _made(table: TomlTable, role: str) -> dict[str, Any]:
                 f"{table.file}: {table.name} {key} should be a whole number of 1 or more, not {shown(count)}"
             )
         made[key] = count
-    said = [key for key, value in made.items() if value is not None]
-    if said and role == PLANNED:
-        raise InputError(f"{table.file}: {table.name} is planned; {said[0]} is of a run that was carried out")
+    given = [key for key, value in made.items() if value is not None]
+    if given and role == PLANNED:
+        raise InputError(f"{table.file}: {table.name} is planned; {given[0]} is of a run that was carried out")
     return made
 
 
@@ -407,8 +407,8 @@ def _optional(file: Path, document: Mapping[str, Any], name: str, keys: Sequence
 
 def _cutoff(table: TomlTable, runs: Sequence[Run]) -> float | None:
     cutoff = table.number("cutoff")
-    said = f"{table.file}: {table.name} cutoff"
-    return None if cutoff is None else checked_cutoff(cutoff, [run.signals for run in runs], said)
+    where = f"{table.file}: {table.name} cutoff"
+    return None if cutoff is None else checked_cutoff(cutoff, [run.signals for run in runs], where)
 
 
 def _piece(run: Run, number: int, signals: Signals) -> Run:

@@ -288,12 +288,12 @@ class Workspace:
     def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
         """Read a run's samples, or some columns of them. Raises InputError where there are none."""
         with self.reading() as session:
-            found = session.execute(
+            row = session.execute(
                 select(Series.path, Series.series_id).where(Series.run_id == run_id, Series.kind == kind)
             ).first()
-        if found is None:
+        if row is None:
             raise InputError(f"{self.folder}: run {run_id} has no {kind} series; ingest its data set first")
-        return read_series(self.folder, found.path, found.series_id, columns)
+        return read_series(self.folder, row.path, row.series_id, columns)
 
     def read_file(self, path: str, checksum: str) -> pa.Table:
         """Read a series by the path and checksum that the graph says of it. Raises InputError as `read_series`."""
@@ -352,8 +352,10 @@ class Workspace:
         runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_not(None)))
         stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
         for table in part_tables():
-            found = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
-            stored |= {(table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in found}
+            rows_kept = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
+            stored |= {
+                (table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in rows_kept
+            }
         measured = select(Series.path, Series.series_id).join(Run)
         measured = measured.where(Run.robot_id == robot_id, Series.kind != MODELLED)
         named = [(row.path, row.series_id) for row in session.execute(measured)]

@@ -193,9 +193,9 @@ def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> float:
         ).scalar_one()
         if size > most_bytes:
             return float(size)
-        found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
-    if found != "ok":
-        raise WorkspaceFault(_damaged(engine.url, " ".join(str(found).split())))
+        answer = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+    if answer != "ok":
+        raise WorkspaceFault(_damaged(engine.url, " ".join(str(answer).split())))
     return float(size)
 
 
@@ -238,7 +238,9 @@ def _tell_of_server(url: URL, context: ExceptionContext) -> None:
     """Raise WorkspaceFault for what those who run a PostgreSQL server can mend."""
     error = context.original_exception
     state = str(getattr(error, "sqlstate", None) or "")
-    what = next((f"{said}; nothing was changed" for code, said in _OF_SERVER.items() if state.startswith(code)), None)
+    what = next(
+        (f"{meaning}; nothing was changed" for code, meaning in _OF_SERVER.items() if state.startswith(code)), None
+    )
     if context.is_disconnect and context.connection is not None:
         what = "the connection to the database was lost; do it again"
     if what is not None:

@@ -26,15 +26,15 @@ def newest() -> str:
 
 def known() -> set[str]:
     """Return all revisions that this irtwin knows."""
-    return {found[1] for file in (REVISIONS / "versions").iterdir() if (found := _FILE.fullmatch(file.name))}
+    return {match[1] for file in (REVISIONS / "versions").iterdir() if (match := _FILE.fullmatch(file.name))}
 
 
 def revision(connection: Connection) -> str | None:
     """Return the revision that a database says, None where it says none."""
     if not inspect(connection).has_table(VERSION_TABLE):
         return None
-    said = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar()
-    return None if said is None else str(said)
+    number = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar()
+    return None if number is None else str(number)
 
 
 def stamp(connection: Connection) -> None:

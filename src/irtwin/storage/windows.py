@@ -95,26 +95,26 @@ class SeriesWindows:
     def _before(self, channel: str, at: float) -> float:
         """Return the time of the last sample up to a moment, that moment where there is none."""
         near = max((begin for begin, _ in self._groups if begin <= at), default=at)  # else all groups would be read
-        found = self._number("max(time)", channel, near, at) or self._number("max(time)", channel, -np.inf, at)
-        return at if found is None else found
+        time = self._number("max(time)", channel, near, at) or self._number("max(time)", channel, -np.inf, at)
+        return at if time is None else time
 
     def _after(self, channel: str, at: float) -> float:
         """Return the time of the first sample from a moment on, likewise."""
         near = min((end for _, end in self._groups if end >= at), default=at)
-        found = self._number("min(time)", channel, at, near) or self._number("min(time)", channel, at, np.inf)
-        return at if found is None else found
+        time = self._number("min(time)", channel, at, near) or self._number("min(time)", channel, at, np.inf)
+        return at if time is None else time
 
     def _number(self, what: str, channel: str, start: float, end: float) -> float | None:
         """Return a number of a window's samples, None where it holds none."""
         text = f"SELECT {what} FROM ({self._samples_of(channel)})"
-        (found,) = self._fetch(lambda: self._run(text, float(start), float(end)).fetchone())
-        return None if found is None else float(found)
+        (number,) = self._fetch(lambda: self._run(text, float(start), float(end)).fetchone())
+        return None if number is None else float(number)
 
     def _samples(self, channel: str, start: float, end: float, most: int | None = None) -> tuple[Floats, Floats]:
         limit = "" if most is None else f" LIMIT {most}"
         text = f"{self._samples_of(channel)}{limit}"  # in the order of the file, which is that of time
-        found: dict[str, Any] = self._fetch(lambda: self._run(text, float(start), float(end)).fetchnumpy())
-        return found["time"], found["value"].astype(np.float64, copy=False)
+        columns: dict[str, Any] = self._fetch(lambda: self._run(text, float(start), float(end)).fetchnumpy())
+        return columns["time"], columns["value"].astype(np.float64, copy=False)
 
     def _samples_of(self, channel: str) -> str:
         """Return the query of a window's samples. InputError where there is no such channel."""

@@ -33,10 +33,10 @@ class Verdict:
 
 def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
-    found = dict.fromkeys(
+    files = dict.fromkeys(
         (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
     )
-    return [_verdict(workspace, folder, file, known) for folder, file, known in found]
+    return [_verdict(workspace, folder, file, known) for folder, file, known in files]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:

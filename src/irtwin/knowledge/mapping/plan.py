@@ -63,13 +63,13 @@ class Statement:
         if subject is None:
             return []
         own = self.graphs(row)
-        found = []
+        templates = []
         for item in self.properties:
             graphs = own if item.graphs is None else item.graphs(row)
             predicates = [make(row) for make in item.predicates]
             objects = [make(row) for make in item.objects]
             # Document checks leave only an IRI or blank node as subject, and an IRI as predicate.
-            found += [
+            templates += [
                 Quad(subject, predicate, value, graph)  # type: ignore[arg-type]
                 for predicate in predicates
                 if predicate is not None
@@ -77,7 +77,7 @@ class Statement:
                 if value is not None
                 for graph in graphs
             ]
-        return found
+        return templates
 
 
 def plan(connection: Connection, document: MappingDocument, base_iri: str) -> Iterator[Statement]:
@@ -184,8 +184,8 @@ def _joined(
 ) -> Statement:
     """The statement of one join: the parent's subjects as objects."""
     select.join(join)
-    found = _property(select, triples_map, item, (select.maker(parent, "parent"),))
-    return _statement(select, triples_map, [found], item.predicates)
+    planned = _property(select, triples_map, item, (select.maker(parent, "parent"),))
+    return _statement(select, triples_map, [planned], item.predicates)
 
 
 def _property(
@@ -199,7 +199,7 @@ def _statement(
     select: _Select, triples_map: TriplesMap, properties: Sequence[PlannedProperty], predicates: Iterable[TermMap]
 ) -> Statement:
     subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
-    said = {term_map.constant for term_map in predicates}
+    constants = {term_map.constant for term_map in predicates}
     return Statement(
         where=triples_map.where,
         sql=select.sql,
@@ -208,7 +208,9 @@ def _statement(
         subject=subject,
         graphs=graphs,
         properties=tuple(properties),
-        predicates=frozenset(name for name in said if isinstance(name, NamedNode)) if None not in said else None,
+        predicates=frozenset(name for name in constants if isinstance(name, NamedNode))
+        if None not in constants
+        else None,
         begins=_beginning(triples_map.subject, select.base_iri),
     )
 

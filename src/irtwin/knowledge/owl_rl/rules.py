@@ -42,11 +42,11 @@ class DatalogRule:
 
 def read_rules(file: Path) -> tuple[DatalogRule, ...]:
     """Return the rules of a file, in its order."""
-    return tuple(_rule(found) for found in _RULE.finditer(file.read_text(encoding="utf-8")))
+    return tuple(_rule(match) for match in _RULE.finditer(file.read_text(encoding="utf-8")))
 
 
-def _rule(found: re.Match[str]) -> DatalogRule:
-    name, _, head, culprits, body, condition = found.groups()
+def _rule(match: re.Match[str]) -> DatalogRule:
+    name, _, head, culprits, body, condition = match.groups()
     return DatalogRule(
         name=name,
         head=_patterns(head or ""),
@@ -84,17 +84,17 @@ class Facts:
 
     def __iter__(self) -> Iterator[Fact]:
         for predicate, objects in self.objects.items():
-            for subject, found in objects.items():
-                for object in found:
+            for subject, values in objects.items():
+                for object in values:
                     yield (subject, predicate, object)
 
     def add(self, fact: Fact) -> bool:
         """Add a triple; tell whether it is new."""
         subject, predicate, object = fact
-        found = self.objects.setdefault(predicate, {}).setdefault(subject, set())
-        if object in found:
+        values = self.objects.setdefault(predicate, {}).setdefault(subject, set())
+        if object in values:
             return False
-        found.add(object)
+        values.add(object)
         self.subjects.setdefault(predicate, {}).setdefault(object, set()).add(subject)
         return True
 
@@ -102,9 +102,9 @@ class Facts:
         """Return the same triples, to be added to apart with some predicates alone; with any where None is one."""
         other = Facts()
         for mine, its in ((self.objects, other.objects), (self.subjects, other.subjects)):
-            for predicate, found in mine.items():
+            for predicate, values in mine.items():
                 changes = None in changing or predicate in changing
-                its[predicate] = {key: set(some) for key, some in found.items()} if changes else found
+                its[predicate] = {key: set(some) for key, some in values.items()} if changes else values
         return other
 
 

@@ -68,7 +68,7 @@ class Schema:
         for rule in self._program.rules:
             if not any(predicate == "owl:sameAs" for _, predicate, _ in rule.body):
                 self._take(rule)
-        keys = [*self.table, *(key for found in self.conjunctions for key in found.keys)]
+        keys = [*self.table, *(key for conjunction in self.conjunctions for key in conjunction.keys)]
         self.by_object = {key[0] for key in keys if isinstance(key, tuple)} | {self._program.type}
 
     def known(self, key: Key) -> AbstractSet[Any]:
@@ -78,7 +78,7 @@ class Schema:
             return facts.subjects.get(key[0], {}).get(key[1], _NOTHING)
         if key not in self._pairs:
             objects = facts.objects.get(key, {})
-            self._pairs[key] = frozenset((subject, one) for subject, found in objects.items() for one in found)
+            self._pairs[key] = frozenset((subject, one) for subject, values in objects.items() for one in values)
         return self._pairs[key]
 
     def _equalities(self) -> Iterator[str]:
@@ -96,9 +96,9 @@ class Schema:
             return
         patterns = [rule.body[index] for index in of_facts]
         if rule.head and len(of_facts) == 1:
-            found = [self._conclusions(rule, patterns[0], bound) for bound in bindings]
-            if None not in found:
-                for key, conclusions in filter(None, found):
+            concluded = [self._conclusions(rule, patterns[0], bound) for bound in bindings]
+            if None not in concluded:
+                for key, conclusions in filter(None, concluded):
                     self.table.setdefault(key, []).extend(conclusions)
                 return
         values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
@@ -145,8 +145,8 @@ class Schema:
             self.reads_values |= not all(self._is_datatype(self._value(head[2], bound)) for head in rule.head)
         values = {term: self._value(term, bound) for head in rule.head for term in head}
         numbers = {term: ends[value] if isinstance(value, str) else value for term, value in values.items()}
-        found = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
-        return (predicate if isinstance(object, str) else (predicate, object)), found
+        facts = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
+        return (predicate if isinstance(object, str) else (predicate, object)), facts
 
     def _conjunction(
         self, rule: DatalogRule, patterns: list[tuple[Number | Term, ...]], bound: dict[Term, Number]

@@ -232,11 +232,11 @@ def experiment(curve: PlannedMotion) -> Figure:
 def _numbered(names: Sequence[str]) -> list[str]:
     """Return names with a number where one stands more than once: the stretches of a run."""
     total, count = Counter(names), Counter[str]()
-    found = []
+    numbered = []
     for name in names:
         count[name] += 1
-        found.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
-    return found
+        numbered.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
+    return numbered
 
 
 def _cell(value: float | None) -> str:

@@ -29,12 +29,12 @@ def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[Pa
             cells.setdefault((one.effect, one.name, one.unit, curve.role), {})[curve.joint] = cell
     effects = list(dict.fromkeys(effect for effect, *_ in cells))
     several = len({curve.role for curve in curves}) > 1
-    found = []
+    lines = []
     for key in sorted(cells, key=lambda key: (effects.index(key[0]), key[1])):
         effect, name, unit, role = key
         label = names.get(effect, effect.replace("_", " "))
-        found.append(ParameterLine(f"{label}, {role}" if several else label, name, unit, cells[key]))
-    return tuple(found)
+        lines.append(ParameterLine(f"{label}, {role}" if several else label, name, unit, cells[key]))
+    return tuple(lines)
 
 
 def _figure(sides: Sequence[FrictionCurve]) -> Figure:

@@ -83,8 +83,8 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
         return ""
     kind, channel, joint = unexplained[0]
     more = len(unexplained) - 1
-    said = f"{findings.NOT_REPEATING[kind]}{where(channel, joint)}"
-    return said if not more else f"{said}, and by {more} thing{'s' if more > 1 else ''} more"
+    words = f"{findings.NOT_REPEATING[kind]}{where(channel, joint)}"
+    return words if not more else f"{words}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
 def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:

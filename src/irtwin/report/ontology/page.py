@@ -126,8 +126,8 @@ def _module_iri(file: Resource) -> str:
     name = _stem(file)
     if not file.is_extension or file.replaces:
         return ONTOLOGY if name == "irtwin" else f"{ONTOLOGY}/{name}"
-    said = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
-    return next((it.value for it in said if isinstance(it, NamedNode)), f"urn:module:{name}")
+    ontologies = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
+    return next((it.value for it in ontologies if isinstance(it, NamedNode)), f"urn:module:{name}")
 
 
 def _stem(file: Resource) -> str:
@@ -160,7 +160,7 @@ def short(iri: str) -> str:
 
 
 def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[str, list[DocumentedTerm]]]:
-    found: dict[str, dict[str, list[DocumentedTerm]]] = {}
+    terms: dict[str, dict[str, list[DocumentedTerm]]] = {}
     known: dict[str, DocumentedTerm] = {}
     for row in _ask(store, "terms"):
         kind, extension = row["kind"].removeprefix(OWL), extensions.get(row["module"])
@@ -169,12 +169,12 @@ def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[s
             row["symbol"], row["beside"], None if extension is None else _stem(extension),
         )  # fmt: skip
         known[term.iri] = term
-        found.setdefault(row["module"], {}).setdefault(kind, []).append(term)
+        terms.setdefault(row["module"], {}).setdefault(kind, []).append(term)
     _add_links(known, _ask(store, "links"))
     for row in _ask(store, "values"):
         if row["term"] in known:
             known[row["term"]].values[row["property"]].append(row["value"])
-    return found
+    return terms
 
 
 def _add_links(known: Mapping[str, DocumentedTerm], rows: Iterable[Mapping[str, Any]]) -> None:

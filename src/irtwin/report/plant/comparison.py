@@ -97,11 +97,11 @@ def comparison(before: Answers, after: Answers) -> Comparison:
     )
 
 
-def to_sheet(found: Comparison) -> Sheet:
+def to_sheet(compared: Comparison) -> Sheet:
     """Return a comparison as a table."""
-    rows = [("", pair) for pair in found.pairs]
-    rows += [(of.name, pair) for of, pairs in found.kinds for pair in pairs]
-    rows += [("by the twin", pair) for pair in found.joints]
+    rows = [("", pair) for pair in compared.pairs]
+    rows += [(of.name, pair) for of, pairs in compared.kinds for pair in pairs]
+    rows += [("by the twin", pair) for pair in compared.joints]
     columns = ("known_from", "quantity", "unit", "before", "after", "difference", "difference_percent")
     return Sheet(
         columns, [(of, one.name, one.unit, one.before, one.after, one.difference, one.percent) for of, one in rows]

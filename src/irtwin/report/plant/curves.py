@@ -98,13 +98,13 @@ def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Itera
             continue
         for joint in joints if channel.per_joint else ("",):
             column = channel.column(joint)
-            said = joint or run.name if not alone else joint or MEASURED
+            label = joint or run.name if not alone else joint or MEASURED
             kind = next((kind for kind in (MEASURED, *has) if column in has[kind]), None)
             if kind is not None:
-                yield CurveLine(number, kind, column, joint, said, name == "command"), name, channel
+                yield CurveLine(number, kind, column, joint, label, name == "command"), name, channel
             if alone and f"{column}{_MODEL}" in has[MODELLED]:
-                said = f"{joint}, by the twin" if joint else "by the twin"
-                yield CurveLine(number, MODELLED, f"{column}{_MODEL}", joint, said, True), name, channel
+                label = f"{joint}, by the twin" if joint else "by the twin"
+                yield CurveLine(number, MODELLED, f"{column}{_MODEL}", joint, label, True), name, channel
 
 
 def _columns(row: Row) -> list[str]:

@@ -80,11 +80,11 @@ def days(energies: Mapping[str, float], most: int) -> Days | None:
 
 def by_day(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, float]]:
     """Gather the answers to `days.rq`: robot and kind to the energy (J) of each day."""
-    found: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
+    daily: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
     for row in rows:
         if row["energy_j"] is not None:
-            found[row["robot"], row["energy_from"]][row["day"]] = row["energy_j"]
-    return found
+            daily[row["robot"], row["energy_from"]][row["day"]] = row["energy_j"]
+    return daily
 
 
 def added_up(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:

@@ -65,20 +65,20 @@ class ShownIndividual:
 
 def individual(iri: str, answers: Answers, base: str = ID) -> ShownIndividual:
     """Make what a page shows of the answers to `reports/plant/individual/*.rq`."""
-    said = _said(answers["said"].rows, base)
+    properties = _said(answers["said"].rows, base)
     named = answers["name"].first
     return ShownIndividual(
         iri=iri,
         name=str(named["name"]) if named else wording.local_name(iri),
-        types=[one for one in said if one.iri == TYPE],
-        said=[one for one in said if one.iri != TYPE],
+        types=[one for one in properties if one.iri == TYPE],
+        said=[one for one in properties if one.iri != TYPE],
         incoming=_incoming(answers["incoming"].rows, base),
         whole=len(answers["said"].rows) < MOST[0] and len(answers["incoming"].rows) < MOST[1],
     )
 
 
 def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
-    found: dict[str, ShownProperty] = {}
+    properties: dict[str, ShownProperty] = {}
     graphs: dict[tuple[str, str, bool], set[str]] = defaultdict(set)
     kept: dict[tuple[str, str, bool], Row] = {}
     for row in rows:
@@ -86,7 +86,7 @@ def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
         graphs[key].add(row["graph"])
         kept.setdefault(key, row)
     for key, row in sorted(kept.items(), key=lambda pair: pair[0]):
-        of = found.setdefault(
+        of = properties.setdefault(
             row["property"], ShownProperty(row["property"], row["property_label"] or shorten(row["property"]))
         )
         of.values.append(
@@ -96,15 +96,15 @@ def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
                 tuple(_by(graph, base) for graph in sorted(graphs[key])),
             )
         )
-    return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
+    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
 def _incoming(rows: Iterable[Row], base: str) -> list[ShownProperty]:
-    found: dict[str, ShownProperty] = {}
+    properties: dict[str, ShownProperty] = {}
     for subject, row in sorted({(row["property"], row["subject"]): row for row in rows}.items()):
-        of = found.setdefault(subject[0], ShownProperty(subject[0], row["property_label"] or shorten(subject[0])))
+        of = properties.setdefault(subject[0], ShownProperty(subject[0], row["property_label"] or shorten(subject[0])))
         of.values.append(Value(str(row["subject_label"] or shorten(subject[1], base)), subject[1], ()))
-    return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
+    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
 def _text(row: Row, base: str) -> str:

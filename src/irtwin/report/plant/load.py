@@ -49,14 +49,14 @@ class Load:
 
 def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
     """Add up the hours that `load.rq` answers; None where it answers none."""
-    found: dict[tuple[int, int], list[float]] = defaultdict(list)
+    powers: dict[tuple[int, int], list[float]] = defaultdict(list)
     for row in rows:
         for number, joules in enumerate(map(float, row["by_hour"].split(","))):
             moment = (row["first_hour"] + number * _HOUR).astimezone(zone)
-            found[moment.weekday(), moment.hour].append(joules)
-    if not found:
+            powers[moment.weekday(), moment.hour].append(joules)
+    if not powers:
         return None
-    means = {at: sum(energies) / len(energies) for at, energies in found.items()}
+    means = {at: sum(energies) / len(energies) for at, energies in powers.items()}
     greatest = max(means.values())
     week = tuple(
         tuple(_cell(weekday, hour, means.get((weekday, hour)), greatest) for hour in range(24)) for weekday in range(7)
@@ -64,7 +64,7 @@ def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
     shifts = (
         Shift(name, sum(map(len, hours)), sum(map(sum, hours)))
         for name in (EARLY, LATE, NIGHT, WEEKEND)
-        if (hours := [energies for at, energies in found.items() if _shift(*at) == name])
+        if (hours := [energies for at, energies in powers.items() if _shift(*at) == name])
     )
     return Load(week, tuple(shifts))
 

@@ -122,9 +122,9 @@ def states(answers: Answers) -> dict[str, RobotState]:
     return {row["robot"]: _watched(row) for row in answers["live"].rows}
 
 
-def sheet(found: Overview) -> Sheet:
+def sheet(plant: Overview) -> Sheet:
     """Return the table of robots, a row for each kind of energy of each."""
-    tariff = found.tariff
+    tariff = plant.tariff
     columns = [
         "robot", "iri", "state", "energy_from", "measured_at", "runs", "run_time_s", "energy_kWh",
         *([f"cost_{tariff['currency']}"] if tariff["price"] is not None else []),
@@ -143,7 +143,7 @@ def sheet(found: Overview) -> Sheet:
             line.gap["closed"] if line.gap else None,
             *(_saving(line) if tariff["hours"] is not None else []),
         )
-        for group in found.groups for line in group.lines
+        for group in plant.groups for line in group.lines
     ]  # fmt: skip
     return Sheet(tuple(columns), rows)
 
