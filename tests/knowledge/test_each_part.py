@@ -65,7 +65,7 @@ def workers(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     monkeypatch.setattr(each_part, "LEAST_FOR_WORKERS", 0)
     monkeypatch.setattr(each_part, "MOST_TOGETHER", 1)
     monkeypatch.setattr(each_part, "_processors", lambda: 2)
-    monkeypatch.setattr(each_part, "Worker", counted)
+    monkeypatch.setattr(each_part, "PartWorker", counted)
     return begun
 
 

@@ -66,7 +66,11 @@ def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[Figure]:
             "array": [max(high - mean, 0.0) for high, mean in zip(points.high, points.torque, strict=True)],
             "arrayminus": [max(mean - low, 0.0) for low, mean in zip(points.low, points.torque, strict=True)],
         }  # fmt: skip
-        marker = {"color": of_points, "size": 5, "opacity": 0.8}
-        seen = trace("measured", points.speed, points.torque, "", "markers", marker=marker, error_y=spread)
-        traces.append({**seen, "showlegend": False, "hovertemplate": f"measured {at}"})
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers", "x": list(points.speed), "y": list(points.torque),
+                "error_y": spread, "marker": {"color": of_points, "size": 5, "opacity": 0.8}, "showlegend": False,
+                "hovertemplate": f"measured {at}",
+            }
+        )  # fmt: skip
     return traces
