@@ -1,4 +1,4 @@
-"""How long windows of a long series take by SPARQL, beside DuckDB without the summary of row groups.
+"""How long windows of a long series take by SPARQL, beside plain DuckDB.
 
 python bench/series.py [SAMPLES]      10^7 if not given
 """

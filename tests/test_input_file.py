@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.alarms.follow import Told
+from irtwin.alarms.follow import ToldAlarms
 from irtwin.errors import InputError
 from irtwin.fleet.data_sets import find_data_sets
 from irtwin.input_file import read_text
@@ -44,7 +44,7 @@ READERS: dict[str, Reader] = {
     "twin.json": load,
     "sets.txt": lambda file: find_data_sets(str(file)),
     "token": read_token,
-    "told.json": Told,
+    "told.json": ToldAlarms,
     "package.xml": lambda file: write_package(arm(1), file.parent),
     "mine.rq": read_question,
     "reports/energy/mine.rq": of_workspace,

@@ -103,9 +103,9 @@ def in_words(standing: str, workspace: Path) -> str:
 
 
 def _warn(graph: KnowledgeGraph, workspace: Path) -> None:
-    found = standing(graph, workspace)
-    if found is not None:
-        warnings.warn(GraphBehind(in_words(found, workspace)), stacklevel=5)  # whoever asks a question
+    standing_now = standing(graph, workspace)
+    if standing_now is not None:
+        warnings.warn(GraphBehind(in_words(standing_now, workspace)), stacklevel=5)  # whoever asks a question
 
 
 def contradictions(location: Location) -> list[str]:

@@ -53,9 +53,9 @@ def take_edited(
         edit = edit_of(graph, owl)
         if not agrees(edit):
             return None
-        said = keep(place, graph, edit.removed, edit.added, author)
-        follow(place, graph, said, announce)
-        return said
+        assertion = keep(place, graph, edit.removed, edit.added, author)
+        follow(place, graph, assertion, announce)
+        return assertion
 
 
 def keep(
@@ -66,20 +66,22 @@ def keep(
     from irtwin.knowledge.asserted.trial import check
 
     with place.reading() as session:
-        said = read(graph, session, removed, added, author)
+        assertion = read(graph, session, removed, added, author)
         session.expunge_all()
-    check(graph, said.removed, said.added)
-    place.keep_facts(said.facts, said.withdrawn)
-    return said
+    check(graph, assertion.removed, assertion.added)
+    place.keep_facts(assertion.facts, assertion.withdrawn)
+    return assertion
 
 
-def follow(place: Workspace, graph: KnowledgeGraph, said: Assertion, announce: Announce = lambda line: None) -> None:
+def follow(
+    place: Workspace, graph: KnowledgeGraph, assertion: Assertion, announce: Announce = lambda line: None
+) -> None:
     """Bring the graph up to date with what is kept now."""
     from irtwin.workflow import conclude, map_rows
 
-    if said.facts or said.withdrawn:
+    if assertion.facts or assertion.withdrawn:
         map_rows(place, graph)
-        graph.change(said.removed, ())  # of a user's own graph that nothing is left of
+        graph.change(assertion.removed, ())  # of a user's own graph that nothing is left of
         conclude(graph, announce)
 
 
@@ -102,13 +104,13 @@ def main(memory: int) -> None:
             if place is None:
                 graph.update(*dataset)
                 return _answer({})
-            said = keep(place, graph, *graph.difference(*dataset), request["author"])
+            assertion = keep(place, graph, *graph.difference(*dataset), request["author"])
         except ServerFault as error:
             return _answer(_of_server(error))
         except InputError as error:
             return _answer({"status": 400, "message": str(error), "headers": {}})
         _answer({})
-        follow(place, graph, said)
+        follow(place, graph, assertion)
 
 
 @contextmanager

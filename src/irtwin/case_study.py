@@ -47,13 +47,11 @@ def case_study(
     location: Location,
     *,
     base: str | None = None,
-    series_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Carry the case study out in a new workspace; return the page's path. `announce` is told each step.
 
-    `base`, `series_url`: as of `workflow.run`. Raises InputError where the folder is not empty, or the extra `plan` is
-    not installed.
+    `base`: as of `workflow.run`. Raises InputError where the folder is not empty, or the extra `plan` is not installed.
     """
     folder = location.folder
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -62,7 +60,7 @@ def case_study(
         raise InputError('the case study plans a motion; install what that takes with pip install "irtwin[plan]"')
     announce(f"1. The twin: identified from {len(_RUNS)} runs, two of them held out")
     data_set = unpack(folder)
-    identify(data_set, location, base, series_url)
+    identify(data_set, location, base)
     announce("2. The process: planned from the initial to the final configuration, priced and kept")
     plan, kept = plan_process(location)
     announce(f"   {plan.seconds:.2f} s; {kept.price}")
@@ -91,9 +89,9 @@ def unpack(workspace: Path) -> Path:
     return data_set
 
 
-def identify(data_set: Path, location: Location, base: str | None = None, series_url: str | None = None) -> None:
+def identify(data_set: Path, location: Location, base: str | None = None) -> None:
     """Take a data set in, with the twin that is identified from it; nothing is concluded before the plan is there."""
-    with Workspace.at(location, base, series_url) as place, workflow.rewriting(place) as graph:
+    with Workspace.at(location, base) as place, workflow.rewriting(place) as graph:
         workflow.take_in(place, read_data_set(data_set))
         graph.load_ontology()
 

@@ -102,8 +102,8 @@ def _folder(path: Path, shown: str) -> FileKind:
             "make a data set: `irtwin import --robot ROBOT.urdf --out FOLDER`"
         )
     command = f"irtwin import {shown}/*{logs[0].suffix} --robot ROBOT.urdf --out FOLDER"
-    said = f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}"
-    return _kind(said, (command, "makes a data set of them, a run a file"))
+    words = f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}"
+    return _kind(words, (command, "makes a data set of them, a run a file"))
 
 
 def _data_set(document: dict[str, Any]) -> str:

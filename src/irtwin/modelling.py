@@ -119,10 +119,10 @@ def sound(data_set: DataSet, announce: Announce) -> DataSet:
     """Return a data set, mended where that leaves no doubt; say what was. Raises InputError on what must be cured."""
     for line in data_set.repairs:
         announce(f"  {line}")
-    found = checked(data_set)
-    for line in dict.fromkeys(finding.say for finding in found.findings):
+    check_result = checked(data_set)
+    for line in dict.fromkeys(finding.say for finding in check_result.findings):
         announce(f"  {line}")
-    return found.data_set
+    return check_result.data_set
 
 
 def clocked(announce: Announce) -> Announce:
@@ -189,9 +189,9 @@ def write_model(twin: Twin, form: str, out: Path) -> list[str]:
     write(out, text_of(twin, form).encode())
     held = [f"{effect} ({place})" for effect, place in places(twin, form) if place]
     lacking = [effect for effect, place in places(twin, form) if not place]
-    said = [twin.doubt_of_bodies, f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
-    said += [f"{form.upper()} has no place for {', '.join(lacking)}"] if lacking else []
-    return [line for line in said if line]
+    words = [twin.doubt_of_bodies, f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
+    words += [f"{form.upper()} has no place for {', '.join(lacking)}"] if lacking else []
+    return [line for line in words if line]
 
 
 def read_twin(source: Path) -> Twin:
@@ -208,10 +208,10 @@ def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, r
     """
     if out is not None:
         check_plan_file(Path(out))
-    found = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
+    planned = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
     if out is not None:
-        write_motion(found.motion, found.joint_names, Path(out))
-    return found
+        write_motion(planned.motion, planned.joint_names, Path(out))
+    return planned
 
 
 def check_plan_file(out: Path) -> None:

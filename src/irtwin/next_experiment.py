@@ -85,18 +85,18 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
     """Write the motion of the diagnosis' programme; return how to play it. Nothing where no diagnosis designed any."""
     with place.reading() as session:
         of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
-        found = session.scalars(of_robot).one_or_none()
-    if found is None:
+        row = session.scalars(of_robot).one_or_none()
+    if row is None:
         return []
-    said = parse_json(place.read_document(found.file, found.sha256))
-    proposed = form.from_json(_Proposed, said, "diagnosis").next_experiment
+    document = parse_json(place.read_document(row.file, row.sha256))
+    proposed = form.from_json(_Proposed, document, "diagnosis").next_experiment
     if proposed is None:
         return []
-    if proposed.programme is None or found.motion_file is None or found.motion_sha256 is None:
+    if proposed.programme is None or row.motion_file is None or row.motion_sha256 is None:
         remove(out)
         return [f"No motion is written: {by_hand(proposed)}."]
     twin = load_twin(place, robot_id)[1]
-    write(out, place.read_document(found.motion_file, found.motion_sha256))
+    write(out, place.read_document(row.motion_file, row.motion_sha256))
     try:
         for mass in sorted(set(proposed.programme.payload_mass)):
             com = proposed.programme.payload_com or (0.0, 0.0, 0.0)

@@ -18,15 +18,15 @@ from irtwin.signals.motion import Motion
 from irtwin.storage.files import write
 
 
-def save_motion(found: Diagnosis, out: Path) -> str:
+def save_motion(diagnosis: Diagnosis, out: Path) -> str:
     """Write the motion of a diagnosis' next experiment as CSV; say what to do with it, or why there is none.
 
     Raises InputError where the file cannot be written.
     """
-    proposed, motion = found.experiment, found.planned
+    proposed, motion = diagnosis.experiment, diagnosis.planned
     if proposed is None or proposed.programme is None or motion is None:
         return f"{out} was not written: {by_hand(proposed)}"
-    twin = found.twin or nominal_twin(found.description)
+    twin = diagnosis.twin or nominal_twin(diagnosis.description)
     collisions = CollisionModel(twin.robot)
     try:
         for mass in sorted(set(proposed.programme.payload_mass)):
@@ -38,9 +38,9 @@ def save_motion(found: Diagnosis, out: Path) -> str:
     return " ".join(how_to_play(proposed.programme, out, collisions.checks_itself))
 
 
-def motion_text(found: Diagnosis) -> str | None:
+def motion_text(diagnosis: Diagnosis) -> str | None:
     """Return the motion of a diagnosis' next experiment as CSV, None where there is none."""
-    return None if found.planned is None else _csv(found.planned, found.description)
+    return None if diagnosis.planned is None else _csv(diagnosis.planned, diagnosis.description)
 
 
 def _csv(motion: Motion, robot: Robot) -> str:
@@ -70,16 +70,16 @@ def how_to_play(programme: Programme, motion: Path, checks_itself: bool) -> list
 
 def _of_run(programme: Programme, number: int) -> str:
     """Say what is different in one of a programme's runs; nothing where nothing is."""
-    said = []
+    commands = []
     if any(programme.payload_mass):
         mass, com = programme.payload_mass[number], programme.payload_com or (0.0, 0.0, 0.0)
         at = " ".join(f"{value:g}" for value in com)
         load = f"with {mass:g} kg at the flange, as the controller is told (--payload-mass {mass:g} --payload-com {at})"
-        said.append(load if mass else "without load")
+        commands.append(load if mass else "without load")
     if programme.temperatures:
         state = "cold" if number == 0 else f"warm, after {programme.set_up_seconds / 60:g} minutes of work"
-        said.append(f"{state}, joints at some {programme.temperatures[number]:g} degC, their temperatures logged")
-    return ", ".join(said)
+        commands.append(f"{state}, joints at some {programme.temperatures[number]:g} degC, their temperatures logged")
+    return ", ".join(commands)
 
 
 def play(motion: Path, seconds: str, checks_itself: bool) -> str:

@@ -172,9 +172,9 @@ def _installed() -> Resources:
     return known
 
 
-def _joined(known: Resources, found: Iterable[Resource]) -> Resources:
+def _joined(known: Resources, added: Iterable[Resource]) -> Resources:
     files = {(file.kind, file.name): file for file in known.files}
-    for file in found:
+    for file in added:
         key = (file.kind, file.name)
         files[key] = Resource(
             file.kind, file.name, file.path, file.origin, replaces=key in files, checksum=file.checksum

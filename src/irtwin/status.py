@@ -25,7 +25,6 @@ from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.schema import LIVE, SIMULATED, Base, Robot, Run, Twin
-from irtwin.storage.series_place import elsewhere
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
 
@@ -42,8 +41,8 @@ class Status:
     def lines(self) -> Iterator[str]:
         """Yield all of it, the heading before its first line."""
         width = max(map(len, (*self.parts, "damage"))) + 2
-        for heading, said in {**self.parts, "damage": self.faults or ["none"]}.items():
-            for place, line in enumerate(said):
+        for heading, parts in {**self.parts, "damage": self.faults or ["none"]}.items():
+            for place, line in enumerate(parts):
                 yield f"{heading if place == 0 else '':{width}}{line}"
 
     @contextmanager
@@ -57,34 +56,31 @@ class Status:
 
 def status(location: Location) -> Status:
     """Look a workspace through. Raises InputError where there is none, or its database cannot be read."""
-    found = Status()
+    status_now = Status()
     with Workspace.existing(location) as place:
-        found.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
-        found.parts["tables"] = _tables()
-        storage = elsewhere(place.folder)
-        if storage is not None:
-            found.parts["series"] = [storage.url]
-        found.parts["robots"] = _robots(place) or ["none"]
-        with found.noting():
-            _look_at_graph(found, place)
+        status_now.parts["workspace"] = [f"{place.folder}, database {shown(place.engine.url)}"]
+        status_now.parts["tables"] = _tables()
+        status_now.parts["robots"] = _robots(place) or ["none"]
+        with status_now.noting():
+            _look_at_graph(status_now, place)
         extensions = place.resources.extensions
-        found.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
-        with found.noting():
+        status_now.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
+        with status_now.noting():
             may = trusted(place.folder)
             aside = [name for name in asked(place.folder) if name not in may]
             if aside:
-                found.parts["left aside"] = [*aside, f"not trusted yet; {how(place.folder)}"]
-        with found.noting():
+                status_now.parts["left aside"] = [*aside, f"not trusted yet; {how(place.folder)}"]
+        with status_now.noting():
             check(place.resources)
             check_mappings(place.resources, place.engine)
-        found.faults.extend(
+        status_now.faults.extend(
             f"{journal.stem} is in the graph as it was when `irtwin live` was killed; the next `irtwin live` takes in "
             "its samples, which are on the disk"
             for journal in left_behind(place.folder / LIVE)
         )
-        with found.noting():
-            found.faults.extend(lost_files(place))
-    return found
+        with status_now.noting():
+            status_now.faults.extend(lost_files(place))
+    return status_now
 
 
 def _tables() -> list[str]:
@@ -113,21 +109,23 @@ def _robots(place: Workspace) -> list[str]:
     return lines
 
 
-def _look_at_graph(found: Status, place: Workspace) -> None:
+def _look_at_graph(status_now: Status, place: Workspace) -> None:
     with ExitStack() as held:
         if place.location.graph_url is not None:
             graph = held.enter_context(KnowledgeGraph.of_workspace(place))
         else:
             place.check_graph()
             if not (place.graph_folder / "CURRENT").is_file():
-                found.parts["graph"] = ["none yet"]
+                status_now.parts["graph"] = ["none yet"]
                 return
             graph = held.enter_context(Snapshot(place.graph_folder)).graph
-        found.parts["graph"] = [_size(graph)]
+        status_now.parts["graph"] = [_size(graph)]
         stands = standing(graph, place.folder)
         if stands is not None:
-            (found.faults if stands == BEHIND else found.parts["graph"]).append(in_words(stands, place.folder))
-        found.faults.extend(contradictions_of(graph) if place.knows_robots() else ())
+            (status_now.faults if stands == BEHIND else status_now.parts["graph"]).append(
+                in_words(stands, place.folder)
+            )
+        status_now.faults.extend(contradictions_of(graph) if place.knows_robots() else ())
 
 
 def _size(graph: KnowledgeGraph) -> str:

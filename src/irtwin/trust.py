@@ -1,7 +1,7 @@
 """What the files of a workspace may do, by the user's word: `irtwin workspace trust WORKSPACE`.
 
 A workspace may come from elsewhere, and its files may ask for something: rules and templates to run, hosts to send to,
-variables of the environment, object storage to write to. Each is asked for by a name that says what. The user's word is
+variables of the environment. Each is asked for by a name that says what. The user's word is
 kept in the user's own folder, by that name and the workspace's place; a folder made anew at a place has none.
 """
 
@@ -24,8 +24,8 @@ _Given = dict[str, dict[str, object]]  # of each place: the folder's number ther
 
 def trusted(workspace: Path) -> frozenset[str]:
     """Return what a workspace's files may do, by name. Raises InputError where the user's file cannot be read."""
-    said = _read().get(_place(workspace))
-    names = said["names"] if said is not None and said.get("folder") == _number(workspace) else ()
+    given = _read().get(_place(workspace))
+    names = given["names"] if given is not None and given.get("folder") == _number(workspace) else ()
     return frozenset(names if isinstance(names, list) else ())
 
 
@@ -38,7 +38,7 @@ def trust(workspace: Path, names: Iterable[str]) -> None:
 
 def withdraw(workspace: Path) -> None:
     """Let the files of a workspace, or of what will be one at that place, do nothing any more."""
-    _change(lambda given: {place: said for place, said in given.items() if place != _place(workspace)})
+    _change(lambda given: {place: value for place, value in given.items() if place != _place(workspace)})
 
 
 def how(workspace: Path) -> str:
@@ -63,7 +63,7 @@ def _read() -> _Given:
     file = _file()
     try:
         given = parse_json(read_text(file, _MOST_BYTES)) if file.exists() else {}
-        if isinstance(given, dict) and all(isinstance(said, dict) and "names" in said for said in given.values()):
+        if isinstance(given, dict) and all(isinstance(value, dict) and "names" in value for value in given.values()):
             return given
     except (InputError, OSError, ValueError):
         pass

@@ -22,26 +22,23 @@ from irtwin.resources import resources_of
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
-from irtwin.storage.object_storage import StorageFault
 from irtwin.storage.rows import named_files
 from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
 from irtwin.storage.series import is_whole
-from irtwin.storage.series_place import asks as series_asks
-from irtwin.storage.series_place import check as check_series
 from irtwin.workflow import check_before, fill, renew, rewriting, write_report
 
 _DAMAGED = "graph.damaged"
 
 
 def asked(workspace: Path) -> list[str]:
-    """Return what the files of a workspace ask for, by name: to hold, to be told of alarms, to have its series.
+    """Return what the files of a workspace ask for, by name: to hold, or to be told of alarms.
 
     Raises InputError where one of them cannot be read.
     """
     resources = resources_of(workspace)
     own = [file.asked for file in (*resources.files, *resources.left_aside) if file.is_of_workspace]
     settings = files.inside(workspace, NAME)
-    return [*sorted(own), *(alarm_asks(settings) if settings.exists() else []), *series_asks(workspace)]
+    return [*sorted(own), *(alarm_asks(settings) if settings.exists() else [])]
 
 
 def drop(robot: str, location: Location, announce: Announce = lambda line: None) -> None:
@@ -88,9 +85,9 @@ def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
         place.mapped_rows.unlink(missing_ok=True)  # the graph may show what no row ever said
         run_id = journal.stem
     else:
-        found = find_run(place, robot_id, name)
-        _check_that_it_may_go(place, found)
-        run_id = found.run_id
+        run = find_run(place, robot_id, name)
+        _check_that_it_may_go(place, run)
+        run_id = run.run_id
     place.drop_run(run_id, run_iri(run_id))
     if journal is not None:
         files.remove(journal)
@@ -174,21 +171,15 @@ def _swap(place: Workspace, new: Path) -> None:
 
 
 def lost_files(place: Workspace) -> list[str]:
-    """Return, in words, which files that the database names are missing or altered.
-
-    Raises InputError where series are in object storage that cannot be read.
-    """
-    check_series(place.folder)
+    """Return, in words, which files that the database names are missing or altered."""
     with place.reading() as session:
         named = named_files(session.connection())
-    found = []
+    lost = []
     for file in named:
         try:
             if is_whole(place.folder, file.path, file.sha256):
                 continue
-        except StorageFault:
-            raise
         except InputError:  # a path that leads outside
             pass
-        found.append(f"{file.path} of {file.robot_id} is missing or altered")
-    return found
+        lost.append(f"{file.path} of {file.robot_id} is missing or altered")
+    return lost

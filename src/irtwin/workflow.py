@@ -51,7 +51,6 @@ from irtwin.report.extensions import check as check_extensions
 from irtwin.report.gap.page import render_gap
 from irtwin.signals.log import DataSet
 from irtwin.simulator.playing import Playing
-from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
 from irtwin.storage.files import check_place
@@ -69,20 +68,18 @@ def run(
     *,
     repair: bool = False,
     base: str | None = None,
-    series_url: str | None = None,
     announce: Announce = lambda line: None,
 ) -> Path:
     """Take a data set to a twin, a knowledge graph and a report; return the report's path.
 
-    `base` is what the IRIs of individuals begin with, in a workspace without robots; `series_url` is object storage
-    (`s3://bucket/prefix`) that is to hold the series, in a workspace without any: it is remembered; `announce` is told
-    each step as it ends.
+    `base` is what the IRIs of individuals begin with, in a workspace without robots; `announce` is told each step as it
+    ends.
     Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce)
-    with Workspace.at(Location.of(workspace), base, series_url) as place:
+    with Workspace.at(Location.of(workspace), base) as place:
         with rewriting(place, announce) as graph:
             robot_id = take_in(place, data_set, announce)
             renew(place, graph, announce)
@@ -109,18 +106,18 @@ def as_asserted(location: Location, data_set: DataSet) -> DataSet:
         return followed(data_set, place.facts_about(identifier(data_set.robot.name)))
 
 
-def keep_diagnosis(location: Location, data_set: DataSet, found: Diagnosis | Playing, announce: Announce) -> None:
+def keep_diagnosis(location: Location, data_set: DataSet, diagnosis: Diagnosis | Playing, announce: Announce) -> None:
     """Keep a diagnosis with its data set in a workspace, in the graph too, and write its report there."""
     announce("Storing the diagnosis")
     robot_id = identifier(data_set.robot.name)
-    closed = None if found.twin is None else to_json(found.twin)
-    motion = motion_text(found) if isinstance(found, Diagnosis) else None
+    closed = None if diagnosis.twin is None else to_json(diagnosis.twin)
+    motion = motion_text(diagnosis) if isinstance(diagnosis, Diagnosis) else None
     with Workspace.at(location) as place:
         with rewriting(place, announce) as graph:
             check_name(place, data_set.robot.name)
             with staged(place, robot_id) as apart:
                 ingest(apart, data_set, facts=place.facts_about(robot_id))
-                record(apart, robot_id, found.document, found.curves, closed, motion)
+                record(apart, robot_id, diagnosis.document, diagnosis.curves, closed, motion)
             renew(place, graph, announce)
         with open_graph(place.location) as graph:
             out = place.gap_report_path(robot_id)
@@ -235,11 +232,10 @@ def renew(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
 
 
 def check_before(place: Workspace) -> None:
-    """Raise InputError for a fault in what extends a workspace or its tariff, or where its series cannot be kept."""
+    """Raise InputError for a fault in what extends a workspace, or in its tariff."""
     read_tariff(place.folder)
     check_extensions(place.resources)
     check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
 
 
 def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from irtwin.alarms import follow as following
 from irtwin.alarms.alarm import Alarm, sparql_of_rules
-from irtwin.alarms.follow import Told, follow, told_in
+from irtwin.alarms.follow import ToldAlarms, follow, told_in
 from irtwin.errors import InputError
 from irtwin.resources import shipped
 
@@ -27,7 +27,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def told(file: Path, *looks: Sequence[Alarm]) -> list[list[tuple[str, Alarm]]]:
-    told = Told(file)
+    told = ToldAlarms(file)
     return [list(told.news(found)) for found in looks]
 
 
@@ -64,7 +64,7 @@ def test_a_spoiled_file_is_said(file: Path) -> None:
     for spoiled in ("{", "[1]", '[{"robot": "arm"}]'):
         file.write_text(spoiled)
         with pytest.raises(InputError, match=r"told\.json: cannot be understood .*; delete it"):
-            Told(file)
+            ToldAlarms(file)
 
 
 def test_two_tellers_of_one_workspace_would_tell_by_halves(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_a_line_says_what_why_and_by_which_query(file: Path, monkeypatch: pytest
 
     looks: list[int] = []
     sparql = sparql_of_rules(shipped())
-    follow(look, Told(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql)
+    follow(look, ToldAlarms(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql)
     raised, cleared = lines
     assert (raised["event"], raised["robot"], raised["joint"], raised["reason"]) == (
         "raised",

@@ -16,7 +16,7 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.bring.robot_library import robot_of
 from irtwin.check import arrangement
 from irtwin.check.check import check, checked
-from irtwin.check.rigid_body import Rows
+from irtwin.check.rigid_body import RigidBodyRows
 from irtwin.errors import InputError
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
@@ -110,7 +110,7 @@ def test_a_reversed_position_is_no_reversed_torque(joint):
 
 def test_no_arrangement_is_tried_of_a_robot_of_many_axes(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(arrangement, "_MOST_JOINTS", 3)
-    monkeypatch.setattr(Rows, "unexplained", lambda *_: pytest.fail("a fit a joint and fault"))
+    monkeypatch.setattr(RigidBodyRows, "unexplained", lambda *_: pytest.fail("a fit a joint and fault"))
     assert check(healthy()).findings == ()
 
 

@@ -15,7 +15,7 @@ from irtwin.check.check import check
 from irtwin.check.estimates import Lateness, estimate_findings
 from irtwin.check.moving import Moving, moving
 from irtwin.signals.channels import Signals
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 
 ROBOT = arm(4)
@@ -25,7 +25,7 @@ def late(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[:2], values[:-2]])  # 20 ms
 
 
-def said(data_set: DataSet) -> list[Finding]:
+def said(data_set: DataSet) -> list[LogFinding]:
     return estimate_findings(ROBOT, moving(data_set))
 
 

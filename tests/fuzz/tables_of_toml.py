@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from tests.fuzz.values import odd, some
 
-FILES = ("plant.toml", "series.toml", "alarms.toml")
+FILES = ("plant.toml", "alarms.toml")
 _KEYS = {
     "plant.toml": ("price_per_kwh", "currency", "co2_kg_per_kwh", "base_iri", "x", "price"),
-    "series.toml": ("url", "workspace", "x"),
     "alarms.toml": ("webhook", "mqtt", "url", "url_env", "token_env", "timeout_s", "host", "port", "topic", "tls"),
 }
 _VALUES = (
@@ -38,8 +37,6 @@ def toml(name: str, rng: np.random.Generator) -> bytes:
     lines = [f"{some(rng, _KEYS[name])} = {some(rng, _VALUES)}" for _ in range(rng.integers(1, 4))]
     if name == "alarms.toml":
         lines = [f"[[{some(rng, ['webhook', 'mqtt', 'x'])}]]", *lines] if rng.integers(4) else lines
-    if name == "series.toml" and rng.integers(2):
-        lines = ['workspace = "x"', f'url = "s3://b/{rng.integers(9)}"']
     if rng.integers(10) == 0:
         lines.append(f"[{str(odd(rng))[:50]!r}]")
     return "\n".join(lines).encode("utf-8", "surrogatepass")

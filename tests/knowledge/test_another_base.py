@@ -24,7 +24,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_REASONED, GRAPH_SOURCE, ID
 from irtwin.serve import individuals
 from irtwin.serve.asking import Asking
-from irtwin.serve.pool import Head
+from irtwin.serve.pool import AnswerHead
 from irtwin.serve.protocol import Refusal
 from irtwin.storage.database import Workspace
 
@@ -116,14 +116,14 @@ class Asked(Asking):
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.base, self._graph = graph.base, graph
 
-    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
+    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
         return [self._written(text, accept) for text, accept in asked]
 
-    def _written(self, text: str, accept: str) -> tuple[Head, bytes]:
+    def _written(self, text: str, accept: str) -> tuple[AnswerHead, bytes]:
         found = self._graph.answer(text)
         if isinstance(found, QueryTriples):
-            return Head("text/turtle", None, None), serialize(found, format=RdfFormat.TURTLE) or b""
-        return Head(accept, None, None), found.serialize(format=QueryResultsFormat.JSON) or b""
+            return AnswerHead("text/turtle", None, None), serialize(found, format=RdfFormat.TURTLE) or b""
+        return AnswerHead(accept, None, None), found.serialize(format=QueryResultsFormat.JSON) or b""
 
 
 def test_individuals_answer_at_their_iris(two: tuple[Filled, Filled]) -> None:

@@ -14,7 +14,6 @@ import pytest
 from pyoxigraph import NamedNode, Triple
 from sqlalchemy import func, select
 from tests import rows
-from tests.memory_s3 import memory_s3
 
 from irtwin import resources
 from irtwin.errors import InputError
@@ -98,38 +97,6 @@ def test_what_is_restored_is_what_was_kept(filled: Workspace, archive: Path, tmp
     assert not [path for path in tmp_path.rglob(".*")]
 
 
-def test_into_object_storage_and_back(
-    filled: Workspace, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with memory_s3(monkeypatch) as objects:
-        restore(archive, tmp_path / "after", series_url="s3://plant/after")
-        assert not (tmp_path / "after" / "series").exists()
-        assert len(objects.find("plant/after/series")) == 2
-        with Workspace.existing(tmp_path / "after") as place, KnowledgeGraph(place.graph_folder) as graph:
-            assert place.ingest(*rows.data_set()) == "unchanged"
-            backup(place, graph, tmp_path / "again.zip")
-        with pytest.raises(InputError, match="holds the series of another workspace"):
-            restore(archive, tmp_path / "third", series_url="s3://plant/after")
-        assert not (tmp_path / "third").exists()
-    restore(tmp_path / "again.zip", tmp_path / "back")
-    with Workspace.existing(tmp_path / "back") as place:
-        assert state(place) == state(filled)
-
-
-def test_what_cannot_be_restored_leaves_no_objects(
-    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def crash(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    with memory_s3(monkeypatch) as objects:
-        monkeypatch.setattr(KnowledgeGraph, "replace", crash)
-        with pytest.raises(KeyboardInterrupt):
-            restore(archive, tmp_path / "after", series_url="s3://plant/after")
-        assert not objects.store
-    assert not (tmp_path / "after").exists()
-
-
 @pytest.mark.system
 def test_into_postgresql_and_back(
     filled: Workspace, archive: Path, tmp_path: Path, new_postgresql_database: Callable[[], str]
@@ -152,7 +119,6 @@ import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from tests import rows
-from tests.memory_s3 import memory_s3
 from irtwin.storage import database
 from irtwin.storage.database import Workspace
 with Workspace(Path(sys.argv[1])) as place:

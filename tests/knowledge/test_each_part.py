@@ -14,7 +14,7 @@ from tests.trusting import trust_all
 from irtwin import workflow
 from irtwin.errors import InputError
 from irtwin.knowledge import each_part
-from irtwin.knowledge.part_worker import Told, Worker
+from irtwin.knowledge.part_worker import PartTask, PartWorker
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import Inferences, reason
 from irtwin.knowledge.shacl.validation import Violation, validate
@@ -58,14 +58,14 @@ def workers(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Let two processes be worth it for anything; tell how many begin."""
     begun = list[int]()
 
-    def counted(told: Told) -> Worker:
+    def counted(told: PartTask) -> PartWorker:
         begun.append(1)
-        return Worker(told)
+        return PartWorker(told)
 
     monkeypatch.setattr(each_part, "LEAST_FOR_WORKERS", 0)
     monkeypatch.setattr(each_part, "MOST_TOGETHER", 1)
     monkeypatch.setattr(each_part, "_processors", lambda: 2)
-    monkeypatch.setattr(each_part, "Worker", counted)
+    monkeypatch.setattr(each_part, "PartWorker", counted)
     return begun
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from irtwin.errors import InputError
-from irtwin.live.refusals import _MOST_REASONS, Refusals
+from irtwin.live.refusals import _MOST_REASONS, RefusedLines
 from irtwin.live.stream_clock import WrongTime
 
 
 def test_a_reason_is_told_once() -> None:
     lines: list[str] = []
-    refusals = Refusals(lines.append)
+    refusals = RefusedLines(lines.append)
     for error in (
         InputError("no JSON"),
         WrongTime("arm: late", 0.02),
@@ -23,7 +23,7 @@ def test_a_reason_is_told_once() -> None:
 
 def test_reasons_without_end_are_counted_alone() -> None:
     lines: list[str] = []
-    refusals = Refusals(lines.append)
+    refusals = RefusedLines(lines.append)
     for number in range(3 * _MOST_REASONS):
         refusals.refuse(InputError(f"no robot {number}"))
     assert (len(lines), refusals.count) == (_MOST_REASONS, 3 * _MOST_REASONS)

@@ -9,7 +9,7 @@ import pytest
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.plant import overview, page
-from irtwin.report.plant.choice import ALL, Choice, choice
+from irtwin.report.plant.choice import ALL, Selection, choice
 from irtwin.report.questions import Answers, ask
 
 
@@ -20,7 +20,7 @@ def answers(plant: KnowledgeGraph) -> Answers:
 
 def test_a_form_is_read() -> None:
     said = {"from": "2026-03-02", "to": "", "find": " Arm ", "group": "cell", "sort": "saving", "page": "2"}
-    assert choice(said) == Choice("2026-03-02", "", "Arm", "cell", "saving")
+    assert choice(said) == Selection("2026-03-02", "", "Arm", "cell", "saving")
     assert choice(said).query == "from=2026-03-02&find=Arm&group=cell&sort=saving"
     assert choice({"group": "moon", "sort": "?"}) == ALL and ALL.query == ""
     with pytest.raises(InputError, match="'yesterday' is not a day: write it as 2026-03-02"):
@@ -28,7 +28,7 @@ def test_a_form_is_read() -> None:
 
 
 def test_days_narrow_energies(plant: KnowledgeGraph) -> None:
-    asked = Choice(first="2026-03-03", last="2026-03-04")
+    asked = Selection(first="2026-03-03", last="2026-03-04")
     found = overview.overview(ask(plant, asked.of_days(page.questions()), {}), asked)
     energies = {line.name: line.energy_j for group in found.groups for line in group.lines if group.kind}
     assert energies == {"Arm_A": 1600.0, "Arm_B": 800.0, "Arm_C": 400.0}
@@ -39,13 +39,13 @@ def test_robots_are_found_grouped_and_sorted(answers: Answers) -> None:
     rows = [{**row, "cell": "7" if row["name"] == "Arm_B" else None} for row in answers["robots"].rows]
     said = {**answers, "robots": replace(answers["robots"], rows=tuple(rows))}
 
-    def names(asked: Choice) -> list[str]:
+    def names(asked: Selection) -> list[str]:
         return [line.name for line in overview.overview(said, asked).groups[0].lines]
 
-    assert names(Choice(find="arm_b")) == names(Choice(find="7")) == ["Arm_B"]
-    assert names(Choice(group="cell")) == ["Arm_B", "Arm_A"]
-    assert names(Choice(sort="alarms")) == ["Arm_B", "Arm_A"]
-    parts = overview.overview(said, Choice(group="cell")).groups[0].parts
+    assert names(Selection(find="arm_b")) == names(Selection(find="7")) == ["Arm_B"]
+    assert names(Selection(group="cell")) == ["Arm_B", "Arm_A"]
+    assert names(Selection(sort="alarms")) == ["Arm_B", "Arm_A"]
+    parts = overview.overview(said, Selection(group="cell")).groups[0].parts
     assert [(name, part.total("energy_j")) for name, part in parts] == [("7", 1300.0), ("not said", 4600.0)]
     assert overview.overview(said).groups[0].parts == ()
 

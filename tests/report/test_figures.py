@@ -4,7 +4,8 @@ import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.report.energy.figures import figures, plain
+from irtwin.report.energy.figures import figures
+from irtwin.report.traces import plain
 
 
 def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from irtwin.report.gap.findings import Finding, counted, sentence
+from irtwin.report.gap.findings import ToldFinding, counted, sentence
 
 
-def finding(family: str = "friction", **changes: Any) -> Finding:
+def finding(family: str = "friction", **changes: Any) -> ToldFinding:
     """A finding of joint_5 that its data do not tell apart."""
     known: dict[str, Any] = {
         "joints": ("joint_5",),
@@ -22,10 +22,10 @@ def finding(family: str = "friction", **changes: Any) -> Finding:
         "matters": True,
         "members": ((("load-dependent friction", 0.55), ("position-dependent friction", 0.3)),),
     }
-    return Finding(family=family, **(known | changes))
+    return ToldFinding(family=family, **(known | changes))
 
 
-def said(verdict: str, *findings: Finding, where: str = "", closes: str | None = "", **more: str) -> str:
+def said(verdict: str, *findings: ToldFinding, where: str = "", closes: str | None = "", **more: str) -> str:
     return sentence(verdict, findings, where, closes, **more).replace("\N{NO-BREAK SPACE}", " ")
 
 

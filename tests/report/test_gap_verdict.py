@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from irtwin.report.gap.verdict import sentence
-from irtwin.report.questions import Answer, Question
+from irtwin.report.questions import Answer, PageQuestion
 
 
 def answers(scope, simulated=False, referenced=True):
@@ -26,7 +26,7 @@ def answers(scope, simulated=False, referenced=True):
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
     }
     names = ("diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances")
-    return {name: Answer(Question(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
+    return {name: Answer(PageQuestion(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
 
 
 @pytest.mark.parametrize(

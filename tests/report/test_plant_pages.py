@@ -206,7 +206,7 @@ def test_a_joint_that_slides_has_units_of_its_own(graph: KnowledgeGraph, joint: 
     assert limits <= {text.replace("\N{NO-BREAK SPACE}", " ") for text in said}
 
 
-def individual_of(graph: KnowledgeGraph, iri: str) -> individual.Individual:
+def individual_of(graph: KnowledgeGraph, iri: str) -> individual.ShownIndividual:
     return individual.individual(iri, ask(graph, page.questions("individual"), {"individual": iri}))
 
 

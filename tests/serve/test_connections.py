@@ -16,7 +16,7 @@ import uvicorn
 from tests.endpoint import Server
 
 from irtwin.serve import connections
-from irtwin.serve.answer import IN_MEMORY, Answer, Answers
+from irtwin.serve.answer import IN_MEMORY, Replies, Reply
 
 pytestmark = pytest.mark.slow
 
@@ -73,7 +73,7 @@ async def _serve(requests: Callable[[int], None]) -> None:
             await send({"type": "http.response.body", "body": bytes(1 << 20), "more_body": True})
 
     listening = socket.create_server(("127.0.0.1", 0))
-    config = uvicorn.Config(application, http=connections.Connection, lifespan="off", log_level="critical")
+    config = uvicorn.Config(application, http=connections.TimedConnection, lifespan="off", log_level="critical")
     server = uvicorn.Server(config)
     running = asyncio.create_task(server.serve(sockets=[listening]))
     await asyncio.to_thread(requests, listening.getsockname()[1])
@@ -103,7 +103,7 @@ def test_who_does_not_get_on_is_left(monkeypatch: pytest.MonkeyPatch, sent: byte
 
 def test_an_answer_waits_in_memory_and_then_in_a_file() -> None:
     async def scenario() -> None:
-        answers = Answers(room=100 << 20)
+        answers = Replies(room=100 << 20)
         with answers.new() as answer:
             parts = [bytes([number]) * (1 << 20) for number in range(8)]
             for part in parts[:7]:
@@ -121,7 +121,7 @@ def test_an_answer_waits_in_memory_and_then_in_a_file() -> None:
 
 def test_a_client_that_keeps_up_needs_no_room() -> None:
     async def scenario() -> None:
-        answer, taken = Answer(), 0
+        answer, taken = Reply(), 0
 
         async def take() -> int:
             return sum([len(piece) async for piece in answer.pieces()])
@@ -141,7 +141,7 @@ def test_a_client_that_keeps_up_needs_no_room() -> None:
 
 
 def test_the_answer_that_takes_most_room_is_given_up() -> None:
-    answers = Answers(room=100)
+    answers = Replies(room=100)
     with answers.new() as small, answers.new() as large:
         small.write(bytes(40))
         large.write(bytes(60))

@@ -33,13 +33,6 @@ def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_place_of_series_that_is_damaged(new_graph: Callable[[], Path]) -> None:
-    workspace = new_graph().parent
-    (workspace / "series.toml").write_text('url = "s3://plant/robots"\n')
-    assert "series.toml: damaged: it has to say url and workspace" in refused("--workspace", workspace, "--port", 0)
-
-
-@pytest.mark.slow
 def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Windows of a series: what DuckDB and the summary of row groups say agrees with numpy on all samples."""
+"""Windows of a series: what DuckDB says agrees with numpy on all samples."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from irtwin.errors import InputError
-from irtwin.storage import summary, windows
+from irtwin.storage import windows
 from irtwin.storage.series import write_series
 from irtwin.storage.windows import SeriesWindows
 
@@ -27,17 +26,13 @@ POWER = 300.0 + 50.0 * RNG.normal(size=1000)
 MOMENT = st.floats(90.0, 1200.0)
 
 
-@pytest.fixture(scope="module", params=["summary", "plain", "gaps"])
+@pytest.fixture(scope="module", params=["whole", "gaps"])
 def series(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Known:
-    """The same samples in ten row groups with their summary, in a file of others, and with some missing."""
+    """The same samples in ten row groups, whole and with some missing."""
     folder = tmp_path_factory.mktemp("series")
     power = np.where(RNG.random(1000) < 0.1, np.nan, POWER) if request.param == "gaps" else POWER
     table = pa.table({"time": TIME, "power": power, 'odd "name': np.arange(1000)})
-    if request.param == "plain":
-        pq.write_table(table, folder / "other.parquet")
-        return SeriesWindows(folder / "other.parquet"), power
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(summary, "ROW_GROUP", 100)
         patch.setattr("irtwin.storage.series.ROW_GROUP", 100)
         return SeriesWindows(folder / write_series(folder, table).path), power
 
@@ -129,9 +124,3 @@ def test_too_many_samples_are_refused(series: Known, monkeypatch: pytest.MonkeyP
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.parquet: the series is missing"):
         SeriesWindows(tmp_path / "none.parquet")
-
-
-@pytest.mark.parametrize("time", [[], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
-def test_a_series_without_rising_time_has_no_summary(time: list[float]) -> None:
-    table = pa.table({"time": pa.array(time, pa.float64()), "power": pa.array([1.0] * len(time), pa.float64())})
-    assert summary.read_summary(summary.with_summary(table).schema) is None

@@ -66,18 +66,18 @@ def _contradictions(graph: KnowledgeGraph, robot: str | None) -> Iterator[Alarm]
             yield Alarm(row["robot"], None, CONTRADICTION, None, None, None, None, ACTIVE, row["reason"])
 
 
-def active(found: list[Alarm]) -> Table:
+def active(alarms: list[Alarm]) -> Table:
     """Return the alarms that are active, for people."""
     columns = ("since", "robot", "run", "reason", "rule")
-    rows = ({name: one.as_dict()[name] for name in columns} for one in found if one.state == ACTIVE)
+    rows = ({name: one.as_dict()[name] for name in columns} for one in alarms if one.state == ACTIVE)
     return Table(columns, tuple(rows))
 
 
 def message(event: Event, alarm: Alarm, at: datetime, sparql: str | None) -> bytes:
     """Return one line of JSON: what happened and when it was seen, the alarm, and the rule's SPARQL."""
-    said = {name: value for name, value in alarm.as_dict().items() if name != "state"}
+    values = {name: value for name, value in alarm.as_dict().items() if name != "state"}
     return json.dumps(
-        {"event": event, "at": at.astimezone(UTC).isoformat(timespec="seconds"), **said, "sparql": sparql},
+        {"event": event, "at": at.astimezone(UTC).isoformat(timespec="seconds"), **values, "sparql": sparql},
         ensure_ascii=False,
     ).encode()
 

@@ -25,7 +25,7 @@ _FOLDER, _TOLD = "alarms", "told.json"  # in the workspace
 _MOST_BYTES = 100_000_000
 
 
-class Told:
+class ToldAlarms:
     """What was told of alarms until now, kept in a file. Of alarms that were over before the first look nothing is."""
 
     def __init__(self, file: Path) -> None:
@@ -39,9 +39,9 @@ class Told:
                 raise InputError(f"{file}: cannot be understood ({error}); delete it, and all is told anew") from None
             self._known = {alarm.key: alarm for alarm in alarms}
 
-    def news(self, found: Sequence[Alarm]) -> list[tuple[Event, Alarm]]:
+    def news(self, alarms: Sequence[Alarm]) -> list[tuple[Event, Alarm]]:
         """Return what was not told of the alarms that there are now. One that is there no more is over."""
-        now = {alarm.key: alarm for alarm in found}
+        now = {alarm.key: alarm for alarm in alarms}
         before = self._known
         if before is None:
             before = {key: alarm for key, alarm in now.items() if alarm.state != ACTIVE}
@@ -55,13 +55,13 @@ class Told:
         news += [("cleared", alarm) for alarm in gone]
         if news or self._known is None:
             self._known = now
-            files.write(self._file, json.dumps([alarm.as_dict() for alarm in found], indent=1).encode())
+            files.write(self._file, json.dumps([alarm.as_dict() for alarm in alarms], indent=1).encode())
         return news
 
 
 def follow(
     look: Look,
-    told: Told,
+    told: ToldAlarms,
     write: Callable[[bytes], None],
     deliveries: Sequence[Delivery],
     done: threading.Event,
@@ -72,9 +72,9 @@ def follow(
 
     A graph that cannot be read is announced, and asked again; the first look raises InputError.
     """
-    found, fault = look(), ""
+    alarms, fault = look(), ""
     while True:
-        for event, alarm in told.news(found):
+        for event, alarm in told.news(alarms):
             line = message(event, alarm, datetime.now(UTC), sparql.get(alarm.rule))
             for delivery in deliveries:
                 delivery.put(line)
@@ -82,7 +82,7 @@ def follow(
         if done.wait(EVERY):
             return
         try:
-            found, fault = look(), ""
+            alarms, fault = look(), ""
         except InputError as error:
             if str(error) != fault:
                 announce(f"alarms are not known now: {error}")
@@ -90,7 +90,7 @@ def follow(
 
 
 @contextmanager
-def told_in(workspace: Path) -> Iterator[Told]:
+def told_in(workspace: Path) -> Iterator[ToldAlarms]:
     """Give what was told of a workspace's alarms. Raises InputError where another process tells them already."""
     folder = files.inside(workspace, _FOLDER)
     with files.told_when_full(workspace):
@@ -104,6 +104,6 @@ def told_in(workspace: Path) -> Iterator[Told]:
                 f"{workspace}: another `irtwin alarms --follow` tells its alarms; stop that first"
             ) from None
         try:
-            yield Told(folder / _TOLD)
+            yield ToldAlarms(folder / _TOLD)
         finally:
             os.close(handle)

@@ -30,7 +30,7 @@ from urllib.parse import urlsplit
 
 from irtwin.alarms.delivery import Receiver
 from irtwin.errors import InputError
-from irtwin.signals.toml_file import Table, shown
+from irtwin.signals.toml_file import TomlTable, shown
 from irtwin.toml_text import read_toml
 
 NAME = "alarms.toml"
@@ -59,29 +59,29 @@ def asks(file: Path) -> list[str]:
     return [asked for asked, _, _ in _asked(file)]
 
 
-_Maker = Callable[[Table, Mapping[str, str]], Receiver]
+_Maker = Callable[[TomlTable, Mapping[str, str]], Receiver]
 
 
-def _asked(file: Path) -> list[tuple[str, _Maker, Table]]:
+def _asked(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
     """Return each receiver of a file: the name by which it is asked for, and what makes it of which table."""
     document = read_toml(file)
     _check(file, "", document, tuple(_KEYS))
-    found: list[tuple[str, _Maker, Table]] = []
+    asked: list[tuple[str, _Maker, TomlTable]] = []
     makers: dict[str, _Maker] = {"webhook": _webhook, "mqtt": _mqtt}
     for kind, make in makers.items():
         tables = document.get(kind, [])
         if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
             raise InputError(f"{file}: {kind} should be tables; write [[{kind}]] above its keys")
         for number, values in enumerate(tables, start=1):
-            table = Table(file, f"{kind} {number}:", values)
+            table = TomlTable(file, f"{kind} {number}:", values)
             _check(file, table.name, values, _KEYS[kind])
-            found.append((f"{NAME}: {_where(kind, table)}", make, table))
-    if not found:
+            asked.append((f"{NAME}: {_where(kind, table)}", make, table))
+    if not asked:
         raise InputError(f"{file}: names nobody; write [[webhook]] with url, or [[mqtt]] with host and topic")
-    return found
+    return asked
 
 
-def _where(kind: str, table: Table) -> str:
+def _where(kind: str, table: TomlTable) -> str:
     """Say where the messages of a table go, and which variables with them; paths of webhooks are often secrets."""
     url = table.text("url")
     place = _broker(table) if kind == "mqtt" else _host(table, url)
@@ -89,19 +89,19 @@ def _where(kind: str, table: Table) -> str:
     return f"{kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
 
 
-def _broker(table: Table) -> str:
+def _broker(table: TomlTable) -> str:
     port = table.values.get("port", 8883 if table.values.get("tls") is True else 1883)
     return f"{table.text('host')}:{port}, topic {table.text('topic')}"
 
 
-def _host(table: Table, url: str | None) -> str:
+def _host(table: TomlTable, url: str | None) -> str:
     if url is None:
         return "the URL of a variable"
     _check_url(table, url)
     return urlsplit(url).netloc
 
 
-def _webhook(table: Table, environment: Mapping[str, str]) -> Receiver:
+def _webhook(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
     given = table.text("url"), _secret(table, "url_env", environment)
     if (given[0] is None) == (given[1] is None):
         raise InputError(f"{table.file}: {table.name} needs url, or url_env, one of them")
@@ -115,7 +115,7 @@ def _webhook(table: Table, environment: Mapping[str, str]) -> Receiver:
     return Webhook(url, token, timeout)
 
 
-def _mqtt(table: Table, environment: Mapping[str, str]) -> Receiver:
+def _mqtt(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
     host, topic = (_needed(table, key) for key in ("host", "topic"))
     if any(sign in topic for sign in "+#\0") or len(topic.encode()) > 65535:
         raise InputError(f"{table.file}: {table.name} topic should be that of one place, without + and #")
@@ -136,7 +136,7 @@ def _mqtt(table: Table, environment: Mapping[str, str]) -> Receiver:
     return Broker(host, port, topic, user, password, tls, timeout)
 
 
-def _check_url(table: Table, url: str) -> None:
+def _check_url(table: TomlTable, url: str) -> None:
     """Raise InputError, without the URL, unless it leads to a web server and holds no user or password."""
     wrong = InputError(
         f"{table.file}: {table.name} its URL should be http:// or https:// with a host and without user or password; "
@@ -152,7 +152,7 @@ def _check_url(table: Table, url: str) -> None:
         raise wrong
 
 
-def _secret(table: Table, key: str, environment: Mapping[str, str]) -> str | None:
+def _secret(table: TomlTable, key: str, environment: Mapping[str, str]) -> str | None:
     """Return the value of the variable that a key names. Raises InputError where it is not set."""
     name = table.text(key)
     if name is None:
@@ -168,11 +168,11 @@ def _secret(table: Table, key: str, environment: Mapping[str, str]) -> str | Non
     return value
 
 
-def _timeout(table: Table) -> float:
+def _timeout(table: TomlTable) -> float:
     return table.number("timeout_s", least=_SHORTEST) or _TIMEOUT
 
 
-def _needed(table: Table, key: str) -> str:
+def _needed(table: TomlTable, key: str) -> str:
     text = table.text(key)
     if text is None:
         raise InputError(f"{table.file}: {table.name} {key} is missing")

@@ -39,7 +39,7 @@ def tell(
     """
     workspace, done = location.folder, threading.Event()
     look = partial(_alarms, location, robot)
-    found = look()  # before anything is made: there may be no workspace
+    alarms = look()  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
     receivers = read_receivers(config) if config is not None else _of_workspace(workspace, announce)
     with told_in(workspace) as told:
@@ -47,7 +47,7 @@ def tell(
             signal.signal(number, lambda *_: done.set())
         deliveries = [Delivery(receiver, announce) for receiver in receivers]
         names = ["standard output", *(receiver.name for receiver in receivers)]
-        announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in found)} active now")
+        announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in alarms)} active now")
         try:
             follow(look, told, _write, deliveries, done, announce, sparql)
         finally:

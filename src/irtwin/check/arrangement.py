@@ -18,11 +18,11 @@ import scipy
 
 from irtwin.check.built_otherwise import turned_axes
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import Rows, rows_of
+from irtwin.check.rigid_body import RigidBodyRows, rows_of
 from irtwin.check.whole_body import Held, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 
 _ROWS = 900  # over all runs
 _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
@@ -56,7 +56,7 @@ class _Fault:
     factors: np.ndarray
     order: np.ndarray
 
-    def cured(self, rows: Rows) -> Rows:
+    def cured(self, rows: RigidBodyRows) -> RigidBodyRows:
         if self.field == "torque":
             return replace(rows, torque=self._undone(rows.torque))
         q, dq, ddq = map(self._undone, (rows.q, rows.dq, rows.ddq))
@@ -81,11 +81,11 @@ class _Axis:
     joint: int
     model: pin.Model
 
-    def cured(self, rows: Rows) -> Rows:
+    def cured(self, rows: RigidBodyRows) -> RigidBodyRows:
         return replace(rows, model=self.model)
 
 
-def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collection[str] = ()) -> list[Finding]:
+def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collection[str] = ()) -> list[LogFinding]:
     """Return the clearest such fault alone: others are seen once it is cured.
 
     `reversed_torques`: columns that are known to have the wrong sign.
@@ -125,7 +125,7 @@ def says_position(robot: Robot, moving: Moving, joint: int) -> float:
     return of_torque.t(of_position)
 
 
-def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> Rows | None:
+def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> RigidBodyRows | None:
     """Return the rows that show such a fault; None where there are too few."""
     rows = rows_of(robot, moving, _ROWS) if len(robot.joint_names) <= _MOST_JOINTS else None
     if rows is None or len(rows.q) < _FEWEST:
@@ -134,26 +134,26 @@ def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> Ro
     return replace(rows, torque=rows.torque * np.where([name in reversed_torques for name in names], -1.0, 1.0))
 
 
-def _left(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> float:
+def _left(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> float:
     body, torque = _cured(rows, body, fault)
     return body.fit(torque).left
 
 
-def _held(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> Held:
+def _held(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> Held:
     body, torque = _cured(rows, body, fault)
     return body.held_out(torque)
 
 
-def _cured(rows: Rows, body: WholeBody, fault: _Fault | _Axis) -> tuple[WholeBody, np.ndarray]:
+def _cured(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> tuple[WholeBody, np.ndarray]:
     """Return what explains the cured torques, of rows whose motion `body` is of, and these torques (N, n)."""
     cured = fault.cured(rows)
     unmoved = cured.q is rows.q and cured.model is rows.model
     return body if unmoved else WholeBody.of(cured), cured.torque
 
 
-def _of_another_robot(axis: _Axis, gain: float, t: float, robot: Robot, moving: Moving) -> Finding:
+def _of_another_robot(axis: _Axis, gain: float, t: float, robot: Robot, moving: Moving) -> LogFinding:
     ratio, name = float(np.exp(gain)), robot.joints[axis.joint].name
-    return Finding(
+    return LogFinding(
         "other_robot", "robot.urdf", moving.names, certain=True, mended=False,
         evidence={"residual_ratio": ratio, "t": round(t, 1)},
         say=f"robot.urdf is not of the robot that was logged: were the axis of {name} turned by 90 degrees, one set of "
@@ -162,22 +162,22 @@ def _of_another_robot(axis: _Axis, gain: float, t: float, robot: Robot, moving: 
     )  # fmt: skip
 
 
-def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: Robot, moving: Moving) -> Finding:
+def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: Robot, moving: Moving) -> LogFinding:
     ratio, named = float(np.exp(gain)), fault.columns(robot)
     prefix = CHANNELS[fault.field].prefix
     mended = fault.fault == "sign" and fault.field == "torque"
-    said = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
+    what = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
     cure = _CURE.get((fault.fault, prefix), "name them by their joints")
     other = f" (or {rivals[0].columns(robot)}: the torques cannot tell which)" if rivals else ""
-    return Finding(
+    return LogFinding(
         fault.fault, named, moving.names, certain=True, mended=mended,
         evidence={"residual_ratio": ratio, "t": round(t, 1)},
-        say=f"{named} {said}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
+        say=f"{named} {what}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
         f"{cure}",
     )  # fmt: skip
 
 
-def _faults(rows: Rows, joints: np.ndarray) -> Iterator[_Fault]:
+def _faults(rows: RigidBodyRows, joints: np.ndarray) -> Iterator[_Fault]:
     for field in ("torque", "q"):
         yield from _singles(field, joints)
         yield from _pairs(field, joints)
@@ -203,7 +203,7 @@ def _pairs(field: str, joints: np.ndarray) -> Iterator[_Fault]:
             yield _Fault("swap", field, (a, b), np.ones(len(joints)), order)
 
 
-def _assigned(rows: Rows, joints: np.ndarray) -> np.ndarray | None:
+def _assigned(rows: RigidBodyRows, joints: np.ndarray) -> np.ndarray | None:
     """Return in which column each joint's torque stands, by what its motion alone explains; None where vague."""
     shares = np.log(rows.unexplained(joints))
     own, order = scipy.optimize.linear_sum_assignment(shares)

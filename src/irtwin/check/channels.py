@@ -9,7 +9,7 @@ import numpy as np
 from irtwin.check.moving import Moving
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, columns_of
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.sampling import interval
 
 _JITTER = 0.3  # of the interval: median deviation of the times between samples
@@ -20,9 +20,9 @@ _STEPS = 12  # values over the whole range: too coarse to fit to
 _FEWEST = 200  # samples, for all of these
 
 
-def channel_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the columns that are dead, held, cut off or coarse, and times that jump about."""
-    found = [finding for finding in (_jitter(moving),) if finding is not None]
+    findings = [finding for finding in (_jitter(moving),) if finding is not None]
     known = {
         column: [columns_of(run.signals, robot.joint_names)[column] for run in moving.runs]
         for column in _columns(robot, moving)
@@ -32,9 +32,9 @@ def channel_findings(robot: Robot, moving: Moving) -> list[Finding]:
         for check in (_held,) if speeds else (_dead, _held, _cut_off, _coarse):
             finding = check(column, values, moving)
             if finding is not None:
-                found.append(finding)
+                findings.append(finding)
                 break
-    return found
+    return findings
 
 
 def _columns(robot: Robot, moving: Moving) -> Iterator[str]:
@@ -45,7 +45,7 @@ def _columns(robot: Robot, moving: Moving) -> Iterator[str]:
         yield from CHANNELS[field].columns(names)
 
 
-def _jitter(moving: Moving) -> Finding | None:
+def _jitter(moving: Moving) -> LogFinding | None:
     worst = 0.0
     for run in moving.runs:
         gaps = np.diff(run.signals.time)
@@ -53,24 +53,24 @@ def _jitter(moving: Moving) -> Finding | None:
     if worst < _JITTER:
         return None
     say = f"the times between samples differ by {worst:.0%} of the interval, as a rule; log at an even rate"
-    return Finding("jitter", "time", moving.names, False, False, {"share": round(worst, 3)}, say)
+    return LogFinding("jitter", "time", moving.names, False, False, {"share": round(worst, 3)}, say)
 
 
-def _dead(column: str, values: list[np.ndarray], moving: Moving) -> Finding | None:
+def _dead(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     regulated = column == CHANNELS["meter_voltage"].prefix and values[0][0] != 0  # a supply that holds its voltage
     if regulated or any(np.ptp(each) > 0 for each in values):
         return None
     say = f"{column} is {values[0][0]:g} throughout, though the robot moves; connect what measures it, or leave it out"
-    return Finding("dead", column, moving.names, True, False, {"value": float(values[0][0])}, say)
+    return LogFinding("dead", column, moving.names, True, False, {"value": float(values[0][0])}, say)
 
 
-def _held(column: str, values: list[np.ndarray], moving: Moving) -> Finding | None:
+def _held(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     paces = [_pace(each) for each in values]
     if not all(pace is not None and pace >= 2 for pace in paces):
         return None
     pace = float(np.median([pace for pace in paces if pace is not None]))
     say = f"{column} changes every {pace:g} samples only, as if held in between; straight lines join its changes"
-    return Finding("held_samples", column, moving.names, True, True, {"samples": pace}, say)
+    return LogFinding("held_samples", column, moving.names, True, True, {"samples": pace}, say)
 
 
 def _pace(values: np.ndarray) -> float | None:
@@ -84,7 +84,7 @@ def _pace(values: np.ndarray) -> float | None:
     return usual if np.mean(changes == usual) > _HELD else None
 
 
-def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> Finding | None:
+def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     if column.startswith(CHANNELS["q"].prefix + "_"):
         return None  # a joint may stand at its end
     for each in values:
@@ -93,7 +93,7 @@ def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> Finding |
             if len(each) >= _FEWEST and at_end.mean() > _FLAT and _longest(at_end) >= _ROW and np.ptp(each) > 0:
                 share = float(at_end.mean())
                 say = f"{column} stays at {end:.4g} for {share:.1%} of the time, as if cut off there; widen its range"
-                return Finding(
+                return LogFinding(
                     "saturation", column, moving.names, False, False, {"at": float(end), "share": share}, say
                 )
     return None
@@ -104,10 +104,10 @@ def _longest(holds: np.ndarray) -> int:
     return int((ends[1::2] - ends[::2]).max(initial=0))
 
 
-def _coarse(column: str, values: list[np.ndarray], moving: Moving) -> Finding | None:
+def _coarse(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     together = np.concatenate(values)
     count = len(np.unique(together))
     if len(together) < _FEWEST or not 1 < count <= _STEPS:
         return None
     say = f"{column} has {count} different values only; log it with more digits"
-    return Finding("quantisation", column, moving.names, False, False, {"values": float(count)}, say)
+    return LogFinding("quantisation", column, moving.names, False, False, {"values": float(count)}, say)

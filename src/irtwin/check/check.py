@@ -19,7 +19,7 @@ from irtwin.check.torque import torque_findings, unsigned_findings
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Signals, columns_of, from_columns
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 
 
@@ -28,7 +28,7 @@ class Checked:
     """A data set, mended where that leaves no doubt, and what was found in the one that was given."""
 
     data_set: DataSet
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
 
     @property
     def sound(self) -> bool:
@@ -39,40 +39,40 @@ class Checked:
 def check(data_set: DataSet) -> Checked:
     """Look for faults of a log that would be taken for physics."""
     with threadpool_limits(limits=1, user_api="blas"):  # its matrices are small
-        found = _findings(data_set)
-    return Checked(_mended(data_set, found), tuple(found))
+        findings = _findings(data_set)
+    return Checked(_mended(data_set, findings), tuple(findings))
 
 
-def _findings(data_set: DataSet) -> list[Finding]:
+def _findings(data_set: DataSet) -> list[LogFinding]:
     """Return all findings; what would follow from one that stops is not looked for."""
-    found = _by_column(data_set)
+    findings = _by_column(data_set)
     if not data_set.robot.joints:  # a meter's log
-        return found
+        return findings
     seen = moving(data_set)
     if seen.runs:
-        found += plausibility_findings(data_set, seen) + unsigned_findings(data_set.robot, seen)
-        if not any(finding.stops for finding in found):
-            found += channel_findings(data_set.robot, seen) + speed_findings(data_set.robot, seen)
-        if not any(finding.stops for finding in found):
-            found += _by_bodies(data_set.robot, seen)
-    return found
+        findings += plausibility_findings(data_set, seen) + unsigned_findings(data_set.robot, seen)
+        if not any(finding.stops for finding in findings):
+            findings += channel_findings(data_set.robot, seen) + speed_findings(data_set.robot, seen)
+        if not any(finding.stops for finding in findings):
+            findings += _by_bodies(data_set.robot, seen)
+    return findings
 
 
-def _by_bodies(robot: Robot, seen: Moving) -> list[Finding]:
+def _by_bodies(robot: Robot, seen: Moving) -> list[LogFinding]:
     """Return what bodies and friction say of the torques and positions."""
     arranged = arrangement_findings(robot, seen)
     if any(finding.stops for finding in arranged):
         return arranged
-    found = torque_findings(robot, seen)
-    reversed_torques = [finding.channel for finding in found if finding.fault == "sign" and finding.mended]
+    findings = torque_findings(robot, seen)
+    reversed_torques = [finding.channel for finding in findings if finding.fault == "sign" and finding.mended]
     if reversed_torques:  # beside several, the one that is right looks reversed
         arranged = [
             finding for finding in arrangement_findings(robot, seen, reversed_torques)
             if finding.mended and finding.channel not in reversed_torques
         ]  # fmt: skip
     named = {finding.channel for finding in arranged}
-    found = arranged + [finding for finding in found if finding.channel not in named]
-    return found if any(finding.certain for finding in found) else found + estimate_findings(robot, seen)
+    findings = arranged + [finding for finding in findings if finding.channel not in named]
+    return findings if any(finding.certain for finding in findings) else findings + estimate_findings(robot, seen)
 
 
 def checked(data_set: DataSet) -> Checked:
@@ -85,19 +85,19 @@ def checked(data_set: DataSet) -> Checked:
     return result
 
 
-def _by_column(data_set: DataSet) -> list[Finding]:
+def _by_column(data_set: DataSet) -> list[LogFinding]:
     """Return what reading found: one finding a column, of all runs that have it."""
-    found: dict[tuple[str, str], Finding] = {}
+    by_column: dict[tuple[str, str], LogFinding] = {}
     for finding in data_set.findings:
         of_all = finding.channel == CHANNELS["q"].prefix
         for name in CHANNELS["q"].columns(data_set.robot.joint_names) if of_all else (finding.channel,):
-            known = found.get((finding.fault, name))
+            known = by_column.get((finding.fault, name))
             runs = (*known.runs, *finding.runs) if known else finding.runs
-            found[finding.fault, name] = replace(known or finding, channel=name, runs=runs)
-    return list(found.values())
+            by_column[finding.fault, name] = replace(known or finding, channel=name, runs=runs)
+    return list(by_column.values())
 
 
-def _mended(data_set: DataSet, findings: Sequence[Finding]) -> DataSet:
+def _mended(data_set: DataSet, findings: Sequence[LogFinding]) -> DataSet:
     reversed_torques = {finding.channel for finding in findings if finding.fault == "sign" and finding.mended}
     at_reading = {(finding.fault, finding.channel) for finding in _by_column(data_set)}  # and mended there
     held = {

@@ -12,12 +12,12 @@ import numpy as np
 
 from irtwin.check.built_otherwise import tilted
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import Rows, rows_of
+from irtwin.check.rigid_body import RigidBodyRows, rows_of
 from irtwin.check.torque import scale_findings
 from irtwin.check.whole_body import Fitted, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 
 _ROWS = 1500  # over all runs
 _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
@@ -41,7 +41,7 @@ _NEARER = 2  # looks at a delay, or at a zero that seems to be off
 _TURN = 1e-3  # rad over which a torque's change with a position is taken
 
 
-def estimate_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def estimate_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques that are late or of another scale than the others', and positions whose zero is off."""
     rows = rows_of(robot, moving, _ROWS)
     if rows is None or len(rows.q) < _FEWEST or len(robot.joint_names) > _MOST_JOINTS:
@@ -50,7 +50,7 @@ def estimate_findings(robot: Robot, moving: Moving) -> list[Finding]:
     return _scales(robot, moving, fitted) or _delays(robot, moving, rows, fitted) or _zeros(robot, moving, rows, fitted)
 
 
-def _delays(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Finding]:
+def _delays(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -> list[LogFinding]:
     after, before = (rows_of(robot, moving, _ROWS, later) for later in (_STEP, -_STEP))
     if after is None or before is None:
         return []
@@ -59,7 +59,7 @@ def _delays(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fi
     joints = np.flatnonzero(moving.joints).tolist()
     late = {joint: _lateness(fitted, rates, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
-    found = []
+    delays = []
     for joint in joints:
         others = [late[other].friction for other in joints if other != joint]
         number, deviation = late[joint].beside(others)
@@ -72,8 +72,8 @@ def _delays(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fi
             if not 0 < number < _LATEST:
                 break
         if _LATE < number < _LATEST and _beyond(number, deviation, _LATE):
-            found.append(_delay(names[joint], number, deviation, moving))
-    return found
+            delays.append(_delay(names[joint], number, deviation, moving))
+    return delays
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Lateness:
         return float(weights @ [late for late, _ in known] / weights.sum()), float(weights.sum() ** -0.5)
 
 
-def _earlier(robot: Robot, moving: Moving, rows: Rows, joint: int, by: float) -> np.ndarray:
+def _earlier(robot: Robot, moving: Moving, rows: RigidBodyRows, joint: int, by: float) -> np.ndarray:
     """Return the torques (N, n), that of the joint as it is logged so much later."""
     later = rows_of(robot, moving, _ROWS, of_torque=by)
     return rows.torque if later is None else np.where(np.arange(len(robot.joints)) == joint, later.torque, rows.torque)
@@ -110,16 +110,16 @@ def _lateness(fitted: Fitted, rates: tuple[np.ndarray, np.ndarray], joint: int) 
     return Lateness(fitted.estimate(body, (rubbed,)), fitted.estimate(rubbed, (body,)))
 
 
-def _delay(name: str, late: float, deviation: float, moving: Moving) -> Finding:
+def _delay(name: str, late: float, deviation: float, moving: Moving) -> LogFinding:
     evidence = {"delay_ms": round(1000 * late, 1), "deviation_ms": round(1000 * deviation, 1)}
     say = (
         f"{name} comes about {1000 * late:.2g} ms (± {1000 * deviation:.2g}) after the motion that it explains, beyond "
         "what friction does; log both at one time"
     )
-    return Finding("delay", name, moving.names, False, False, evidence, say)
+    return LogFinding("delay", name, moving.names, False, False, evidence, say)
 
 
-def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
+def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[LogFinding]:
     joints = np.flatnonzero(moving.joints).tolist()
     scales = {joint: _scale(fitted, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
@@ -140,7 +140,7 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[Finding]:
         f"{names[joint]} is {np.exp(log):.2g} times (± {deviation:.0%}) as large as the bodies that it carries are by "
         "the torques of other joints; check its unit, torque constant and gear ratio"
     )
-    return [Finding("scale", names[joint], moving.names, False, False, evidence, say)]
+    return [LogFinding("scale", names[joint], moving.names, False, False, evidence, say)]
 
 
 def _gained(fitted: Fitted, cured: Fitted) -> float:
@@ -171,10 +171,10 @@ def _rescaled(fitted: Fitted, joint: int, scale: float) -> Fitted:
     return fitted.body.fit(fitted.torque / np.where(np.arange(fitted.torque.shape[1]) == joint, scale, 1.0))
 
 
-def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Finding]:
+def _zeros(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -> list[LogFinding]:
     """Return the position whose zero is off; what a tilted base or a spring at the joint does is no such thing."""
     tilts = _tilts(rows, fitted)
-    found = []
+    zeros = []
     for joint in np.flatnonzero(moving.joints).tolist():
         if robot.joints[joint].kind == "prismatic":
             continue
@@ -187,10 +187,10 @@ def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fin
             more, deviation = _zero(turned, again, _tilts(turned, again), joint)
             off += more
         if deviation < _SHOWN and _beyond(abs(off), deviation, _ZERO):
-            found.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
-    if not found:
+            zeros.append((_fit(_turned(rows, joint, -off)).left, joint, off, deviation))
+    if not zeros:
         return []
-    _, joint, off, deviation = min(found)  # of one that is off, others seem to be off as well
+    _, joint, off, deviation = min(zeros)  # of one that is off, others seem to be off as well
     own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
     if own.t(cured) < _SURE:
         return []
@@ -200,33 +200,33 @@ def _zeros(robot: Robot, moving: Moving, rows: Rows, fitted: Fitted) -> list[Fin
         f"{name} reads about {off:+.3f} rad (± {deviation:.2g}) beside where gravity and inertia put the joint; "
         "compare its zero with the URDF's"
     )
-    return [Finding("zero_offset", name, moving.names, False, False, evidence, say)]
+    return [LogFinding("zero_offset", name, moving.names, False, False, evidence, say)]
 
 
-def _zero(rows: Rows, fitted: Fitted, tilts: tuple[np.ndarray, ...], joint: int) -> tuple[float, float]:
+def _zero(rows: RigidBodyRows, fitted: Fitted, tilts: tuple[np.ndarray, ...], joint: int) -> tuple[float, float]:
     """Return by how much (rad) a position reads too much, and its deviation."""
     shapes = (rows.q, np.cos(rows.q), np.sin(rows.q))  # of a hose, of a balancer
     springs = tuple(_only(shape - shape.mean(axis=0), joint) for shape in shapes)
     return fitted.estimate(-_change(_turned(rows, joint, _TURN), fitted), (*tilts, *springs))
 
 
-def _tilts(rows: Rows, fitted: Fitted) -> tuple[np.ndarray, ...]:
+def _tilts(rows: RigidBodyRows, fitted: Fitted) -> tuple[np.ndarray, ...]:
     """Return how the torques change as the base tilts about x and y."""
     return tuple(
         _change(replace(rows, model=tilted(rows.model, by)), fitted) for by in ((_TURN, 0.0, 0.0), (0.0, _TURN, 0.0))
     )
 
 
-def _change(turned: Rows, fitted: Fitted) -> np.ndarray:
+def _change(turned: RigidBodyRows, fitted: Fitted) -> np.ndarray:
     """Return the rate at which what bodies do changes as something turns by 1 mrad, N m/rad (N, n)."""
     return np.asarray((fitted.parts(turned.columns())[0] - fitted.of_bodies) / _TURN)
 
 
-def _fit(rows: Rows) -> Fitted:
+def _fit(rows: RigidBodyRows) -> Fitted:
     return WholeBody.of(rows).fit(rows.torque)
 
 
-def _turned(rows: Rows, joint: int, by: float) -> Rows:
+def _turned(rows: RigidBodyRows, joint: int, by: float) -> RigidBodyRows:
     return replace(rows, q=rows.q + _only(np.full_like(rows.q, by), joint))
 
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from irtwin.check.moving import Moving
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.channels import CHANNELS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import interval
@@ -24,28 +24,28 @@ _KILO = 1000.0
 _MECHANICAL = 1.0  # W: less is friction's and noise's
 
 
-def plausibility_findings(data_set: DataSet, moving: Moving) -> list[Finding]:
+def plausibility_findings(data_set: DataSet, moving: Moving) -> list[LogFinding]:
     """Return what cannot be, by the robot's own sizes and limits."""
-    found = [
+    findings = [
         urdf_finding(data_set.robot),
         *(_payload(data_set)),
         *(_position(moving, index, joint) for index, joint in enumerate(data_set.robot.joints)),
         _time(data_set.robot, moving),
         _power(data_set.robot, moving),
     ]
-    return [finding for finding in found if finding is not None]
+    return [finding for finding in findings if finding is not None]
 
 
-def urdf_finding(robot: Robot) -> Finding | None:
+def urdf_finding(robot: Robot) -> LogFinding | None:
     """Return the finding where a description's lengths are no metres."""
     longest = max((float(np.linalg.norm(at.translation)) for at in robot.model.jointPlacements), default=0.0)
     if longest < _FARTHEST:
         return None
     say = f"robot.urdf puts two joints {longest:.4g} m apart: it looks like millimetres; give lengths in m"
-    return Finding("implausible", "robot.urdf", (), True, False, {"length_m": longest}, say)
+    return LogFinding("implausible", "robot.urdf", (), True, False, {"length_m": longest}, say)
 
 
-def _payload(data_set: DataSet) -> list[Finding]:
+def _payload(data_set: DataSet) -> list[LogFinding]:
     own = data_set.robot.weight or sum(link.mass for link in data_set.robot.links)
     heavy = [run for run in data_set.runs if own > 0 and run.payload_mass > _HEAVIEST * own]
     if not heavy:
@@ -53,10 +53,10 @@ def _payload(data_set: DataSet) -> list[Finding]:
     mass = max(run.payload_mass for run in heavy)
     say = f"payload_mass = {mass:g} is more than a robot of {own:.3g} kg can carry: it looks like g; give kg"
     names = tuple(run.name for run in heavy)
-    return [Finding("unit", "payload_mass", names, True, False, {"payload_kg": mass, "robot_kg": own}, say)]
+    return [LogFinding("unit", "payload_mass", names, True, False, {"payload_kg": mass, "robot_kg": own}, say)]
 
 
-def _position(moving: Moving, index: int, joint: Joint) -> Finding | None:
+def _position(moving: Moving, index: int, joint: Joint) -> LogFinding | None:
     """Positions in degrees leave the joint's range and speed far behind."""
     if joint.kind == "prismatic":
         return None
@@ -73,11 +73,11 @@ def _position(moving: Moving, index: int, joint: Joint) -> Finding | None:
                 f"{run.file}: column {name} spans {spans:.3g} at up to {speed:.3g} per second, far beyond the joint's "
                 "limits in rad: it looks like degrees; convert it to rad"
             )
-            return Finding("unit", name, (run.name,), True, False, {"span": spans, "speed": speed}, say)
+            return LogFinding("unit", name, (run.name,), True, False, {"span": spans, "speed": speed}, say)
     return None
 
 
-def _time(robot: Robot, moving: Moving) -> Finding | None:
+def _time(robot: Robot, moving: Moving) -> LogFinding | None:
     """Times in ms make every motion a thousand times slower."""
     limits = np.array([joint.velocity for joint in robot.joints])
     slow = [
@@ -91,10 +91,10 @@ def _time(robot: Robot, moving: Moving) -> Finding | None:
         f"{slow[0].file}: a sample every {step:.3g} s, and every joint slower than 1 % of its speed limit: time looks "
         "like ms; convert it to s"
     )
-    return Finding("unit", "time", tuple(run.name for run in slow), True, False, {"interval_s": step}, say)
+    return LogFinding("unit", "time", tuple(run.name for run in slow), True, False, {"interval_s": step}, say)
 
 
-def _power(robot: Robot, moving: Moving) -> Finding | None:
+def _power(robot: Robot, moving: Moving) -> LogFinding | None:
     """Electrical power far below what the joints do is in kW, far beyond it in mW."""
     pairs = [(motion.power, _done(robot, motion)) for motion in moving.motions if motion.power is not None]
     if not pairs:
@@ -105,10 +105,10 @@ def _power(robot: Robot, moving: Moving) -> Finding | None:
     evidence = {"power": power, "mechanical_w": done}
     if power < _ELECTRICAL * done and power * _KILO > done:
         say = f"power reaches {power:.3g} where the joints do {done:.3g} W: it looks like kW; convert it to W"
-        return Finding("unit", "power", moving.names, True, False, evidence, say)
+        return LogFinding("unit", "power", moving.names, True, False, evidence, say)
     if power > 100 * _KILO * done or (power > _KILO * done and power > 200 * _KILO):
         say = f"power reaches {power:.3g} where the joints do {done:.3g} W: it looks like mW; convert it to W"
-        return Finding("unit", "power", moving.names, True, False, evidence, say)
+        return LogFinding("unit", "power", moving.names, True, False, evidence, say)
     return None
 
 

@@ -18,7 +18,7 @@ _EXACT = 0.01  # of a torque's deviation: less is left in simulated logs alone, 
 
 
 @dataclass(frozen=True)
-class Rows:
+class RigidBodyRows:
     """N samples of a robot of n joints over all runs: motion and torque, each (N, n)."""
 
     model: pin.Model
@@ -61,7 +61,9 @@ class Rows:
         return body_regressor(self.model, self.q, self.dq, self.ddq)
 
 
-def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torque: float = 0.0) -> Rows | None:
+def rows_of(
+    robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torque: float = 0.0
+) -> RigidBodyRows | None:
     """Return at most so many samples of the runs with torque, of the payload that most have; None where none has it.
 
     `later`, `of_torque`: by how much (s) the motion, and the torque, are those of a later time.
@@ -81,7 +83,7 @@ def rows_of(robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torq
             if motion.torque is not None
         ]
     )
-    return Rows(robot.model, q, dq, ddq, torque)
+    return RigidBodyRows(robot.model, q, dq, ddq, torque)
 
 
 def _alike(motions: list[Motion]) -> list[Motion]:

@@ -10,7 +10,7 @@ _BLOCKS = 20  # stretches of time that count as independent
 
 
 @dataclass(frozen=True)
-class Fit:
+class RobustFit:
     """Coefficients (K,) and their covariance (K, K), from blocks of time."""
 
     coefficients: np.ndarray
@@ -23,7 +23,7 @@ class Fit:
         return value / deviation if deviation > 0 else 0.0
 
 
-def fit(columns: np.ndarray, values: np.ndarray) -> Fit:
+def fit(columns: np.ndarray, values: np.ndarray) -> RobustFit:
     """Fit values (N,) by columns (N, K), rows in the order of time.
 
     The covariance is the sandwich estimate over 20 blocks (Liang and Zeger, Biometrika 73, 1986, eq. 2.4).
@@ -38,4 +38,4 @@ def fit(columns: np.ndarray, values: np.ndarray) -> Fit:
     )
     covariance = bread @ (scores.T @ scores) @ bread * (_BLOCKS / (_BLOCKS - 1))
     scale = np.where(norms > 0, 1 / np.where(norms > 0, norms, 1.0), 0.0)
-    return Fit(coefficients * scale, covariance * np.outer(scale, scale))
+    return RobustFit(coefficients * scale, covariance * np.outer(scale, scale))

@@ -10,7 +10,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import differentiate
 from irtwin.signals.filter import low_pass
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import interpolated
@@ -26,7 +26,7 @@ _BEYOND = 2.0  # standard deviations by which it exceeds a filter's
 _SLOW = 0.25  # of the cutoff, which is ten times the motion's band: above, derivatives are noise, which hides a delay
 
 
-def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the speed channels that contradict the positions, or `time` where its unit alone explains it."""
     pairs = [_speeds(run, motion) for run, motion in zip(moving.runs, moving.motions, strict=True)]
     pairs = [pair for pair in pairs if pair is not None]
@@ -39,26 +39,26 @@ def speed_findings(robot: Robot, moving: Moving) -> list[Finding]:
     gains = {joint: _gain(derived[:, joint], logged[:, joint]) for joint in joints if abs(alike[joint, joint]) > _ALIKE}
     if (time := _time_unit(list(gains.values()), moving)) is not None:
         return [time]
-    found = []
+    findings = []
     for joint in joints:
         name = names[joint]
         if np.ptp(logged[:, joint]) == 0:
-            found.append(_finding("dead", name, moving, {}, "never changes, though the joint moves"))
+            findings.append(_finding("dead", name, moving, {}, "never changes, though the joint moves"))
         elif (other := _exchanged(alike, joint)) is not None:
             if joint < other:
-                said = "stand in each other's columns: name them by their joints"
-                found.append(_finding("swap", f"{name} <-> {names[other]}", moving, {}, said))
+                advice = "stand in each other's columns: name them by their joints"
+                findings.append(_finding("swap", f"{name} <-> {names[other]}", moving, {}, advice))
         elif joint in gains:
-            found += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
+            findings += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
         else:
-            found += _delayed(name, joint, moving)
-    return found
+            findings += _delayed(name, joint, moving)
+    return findings
 
 
-def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], said: str) -> Finding:
-    return Finding(
+def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], what: str) -> LogFinding:
+    return LogFinding(
         fault, channel, moving.names, certain=True, mended=True, evidence=evidence,
-        say=f"{channel} {said}; the speeds of the positions are used instead",
+        say=f"{channel} {what}; the speeds of the positions are used instead",
     )  # fmt: skip
 
 
@@ -93,17 +93,17 @@ def _is(gain: float, factor: float) -> bool:
     return bool(abs(gain / factor - 1) < _NEAR)
 
 
-def _time_unit(gains: list[float], moving: Moving) -> Finding | None:
+def _time_unit(gains: list[float], moving: Moving) -> LogFinding | None:
     """Times in another unit make the positions' speeds smaller by its factor, those of all joints alike."""
     for unit, factor in _TIMES.items():
         if gains and all(_is(gain, factor) for gain in gains):
             evidence = {"factor": float(np.median(gains))}
-            said = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
-            return Finding("unit", "time", moving.names, True, False, evidence, f"time {said}")
+            what = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
+            return LogFinding("unit", "time", moving.names, True, False, evidence, f"time {what}")
     return None
 
 
-def _scaled(name: str, gain: float, moving: Moving) -> list[Finding]:
+def _scaled(name: str, gain: float, moving: Moving) -> list[LogFinding]:
     evidence = {"gain": round(gain, 4)}
     for unit, factor in _UNITS.items():
         if _is(gain, factor):
@@ -115,7 +115,7 @@ def _scaled(name: str, gain: float, moving: Moving) -> list[Finding]:
     return []
 
 
-def _delayed(name: str, joint: int, moving: Moving) -> list[Finding]:
+def _delayed(name: str, joint: int, moving: Moving) -> list[LogFinding]:
     """Return the finding where a logged speed comes late or early.
 
     For short delays d, the speed v(t - d) is v - d dv/dt.
@@ -126,10 +126,10 @@ def _delayed(name: str, joint: int, moving: Moving) -> list[Finding]:
             derived, logged = (low_pass(each[:, joint], motion.rate, _SLOW * motion.cutoff) for each in pair)
             columns.append(np.column_stack([derived, differentiate(derived, motion.rate)]))
             values.append(logged)
-    found = fit(np.vstack(columns), np.concatenate(values))
-    gain, change = found.coefficients
-    t = abs(found.t(np.array([0.0, 1.0])))
+    delay_fit = fit(np.vstack(columns), np.concatenate(values))
+    gain, change = delay_fit.coefficients
+    t = abs(delay_fit.t(np.array([0.0, 1.0])))
     if not gain or t < _SURE or abs(delay := float(-change / gain)) * (1 - _BEYOND / t) < _LATE:
         return []
-    said = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
-    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1), "t": round(t, 1)}, said)]
+    what = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
+    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1), "t": round(t, 1)}, what)]

@@ -11,11 +11,11 @@ import numpy as np
 
 from irtwin.check.arrangement import says_position
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import Rows, friction, rows_of
-from irtwin.check.robust_fit import Fit, fit
+from irtwin.check.rigid_body import RigidBodyRows, friction, rows_of
+from irtwin.check.robust_fit import RobustFit, fit
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 
 _ROWS = 1500  # over all runs
 _SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
@@ -28,17 +28,17 @@ _OTHERS = 3  # gains that tell the usual one
 _EXPLAINED = 0.4  # of a torque's variance by its own joint's motion, without which a sign means nothing
 
 
-def torque_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the torque channels that are reversed, or no torque of their joint."""
     rows = rows_of(robot, moving, _ROWS)
     if rows is None or len(rows.q) < _FEWEST:
         return []
     nominal = rows.nominal()
-    found = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
-    return [finding for finding in found if finding is not None]
+    findings = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
+    return [finding for finding in findings if finding is not None]
 
 
-def unsigned_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return that torque has no sign, where no joint of several has any below zero though all move both ways."""
     torques = [run.signals.torque for run in moving.runs if run.signals.torque is not None]
     if len(torques) < len(moving.runs) or moving.joints.sum() < _SEVERAL:
@@ -54,36 +54,36 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[Finding]:
         "or leave it out: commands (cmd_JOINT) can be held against a simulator's model without it"
     )
     name = CHANNELS["torque"].column(robot.joints[int(np.flatnonzero(moving.joints)[0])].name)
-    return [Finding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
+    return [LogFinding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
 
 
-def scale_findings(robot: Robot, moving: Moving) -> list[Finding]:
+def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
     rows = rows_of(robot, moving, _ROWS)
     return [] if rows is None or len(rows.q) < _FEWEST else _scales(robot, moving, rows, rows.nominal())
 
 
-def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, joint: int) -> Finding | None:
+def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray, joint: int) -> LogFinding | None:
     """Return what is wrong with the direction of a joint's torque."""
     torque, speed = rows.torque[:, joint], rows.dq[:, joint]
     if np.ptp(torque) == 0:
         return None
     losses = friction(speed)
     columns = np.column_stack([nominal[:, joint], rows.ddq[:, joint], losses])
-    found = fit(columns, torque)
-    residual = torque - columns @ found.coefficients
+    friction_fit = fit(columns, torque)
+    residual = torque - columns @ friction_fit.coefficients
     if np.var(residual) > (1 - _EXPLAINED) * np.var(torque):
         return None
-    body = found.t(np.eye(5)[0])
+    body = friction_fit.t(np.eye(5)[0])
     dry, viscous = (losses[:, :2] * speed[:, None]).mean(axis=0)  # what they take from the motion
-    lost = found.t(np.array([0.0, 0.0, dry, viscous, 0.0]))
+    lost = friction_fit.t(np.array([0.0, 0.0, dry, viscous, 0.0]))
     evidence = {"gravity_t": round(body, 1), "friction_t": round(lost, 1)}
     name = CHANNELS["torque"].column(robot.joints[joint].name)
-    drives = _drives(found, dry, viscous) or (lost < -_SURE and body > _SURE)
+    drives = _drives(friction_fit, dry, viscous) or (lost < -_SURE and body > _SURE)
     if not drives and ((lost < -_SURE and body < _LIKELY) or (body < -_SURE and lost < _LIKELY)):
         return _wrong_sign(robot, moving, joint, evidence, _reversed(body, lost))
     if drives:
-        return Finding(
+        return LogFinding(
             "not_joint_torque", name, moving.names, certain=False, mended=False, evidence=evidence,
             say=f"{name} is not the torque of its joint alone: gravity and inertia have the right direction in it, but "
             "friction would drive the joint; log the torque on the joint side, or leave the column out",
@@ -91,27 +91,27 @@ def _direction(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray, jo
     return None
 
 
-def _drives(found: Fit, dry: float, viscous: float) -> bool:
+def _drives(friction_fit: RobustFit, dry: float, viscous: float) -> bool:
     """Return whether friction takes energy by one of its parts and gives more by the other, as no friction does."""
     parts = np.array([[0.0, 0.0, dry, 0.0, 0.0], [0.0, 0.0, 0.0, viscous, 0.0]])
-    t_dry, t_viscous = (found.t(part) for part in parts)
-    power = np.abs(parts @ found.coefficients)
+    t_dry, t_viscous = (friction_fit.t(part) for part in parts)
+    power = np.abs(parts @ friction_fit.coefficients)
     return min(abs(t_dry), abs(t_viscous)) > _SURE and t_dry * t_viscous < 0 and bool(power[1] > power[0])
 
 
-def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, float], why: str) -> Finding:
+def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, float], why: str) -> LogFinding:
     """Return the finding, of the position where that explains the torques of the other joints as well."""
     names = {field: CHANNELS[field].column(robot.joints[joint].name) for field in ("torque", "q")}
     position = says_position(robot, moving, joint)
     evidence = {**evidence, "position_t": round(position, 1)}
     if position > _SURE:
-        return Finding(
+        return LogFinding(
             "sign", names["q"], moving.names, certain=True, mended=False, evidence=evidence,
             say=f"{names['q']} has the wrong sign: {why}, and the torques of other joints fit the motion reversed; "
             "change it, and that of the speed",
         )  # fmt: skip
     other = f" (or {names['q']}: the torques cannot tell which)" if position > -_LIKELY else ""
-    return Finding(
+    return LogFinding(
         "sign", names["torque"], moving.names, certain=True, mended=True, evidence=evidence,
         say=f"{names['torque']} has the wrong sign{other}: {why}; its sign is changed here, change it in the log",
     )  # fmt: skip
@@ -125,13 +125,13 @@ def _reversed(body: float, lost: float) -> str:
     return " and ".join(reason for reason, holds in reasons if holds)
 
 
-def _scales(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray) -> list[Finding]:
+def _scales(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray) -> list[LogFinding]:
     gains = {}
     for joint in np.flatnonzero(moving.joints).tolist():
         columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]
-        found = fit(np.column_stack(columns), rows.torque[:, joint])
-        if found.t(np.eye(5)[0]) > _SURE_SCALE:
-            gains[joint] = float(found.coefficients[0])
+        scale_fit = fit(np.column_stack(columns), rows.torque[:, joint])
+        if scale_fit.t(np.eye(5)[0]) > _SURE_SCALE:
+            gains[joint] = float(scale_fit.coefficients[0])
     usual = float(np.median(list(gains.values()))) if len(gains) >= _OTHERS else 0.0
     return [
         _scale(CHANNELS["torque"].column(robot.joints[joint].name), gain / usual, moving)
@@ -140,7 +140,7 @@ def _scales(robot: Robot, moving: Moving, rows: Rows, nominal: np.ndarray) -> li
     ]
 
 
-def _scale(name: str, ratio: float, moving: Moving) -> Finding:
+def _scale(name: str, ratio: float, moving: Moving) -> LogFinding:
     say = f"{name} is {ratio:.2g} times as large, by the URDF's bodies, as the torques of other joints; check its gain"
     evidence = {"ratio": round(ratio, 2)}
-    return Finding("scale", name, moving.names, certain=False, mended=False, evidence=evidence, say=say)
+    return LogFinding("scale", name, moving.names, certain=False, mended=False, evidence=evidence, say=say)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.check.rigid_body import Rows
+from irtwin.check.rigid_body import RigidBodyRows
 
 BLOCKS = 20  # stretches of time that count as independent
 _LEAST = 0.01  # of a torque's deviation: less is left in simulated logs alone, and means nothing
@@ -45,7 +45,7 @@ class WholeBody:
     used: np.ndarray  # of all columns of the rows: those that are not zero throughout
 
     @classmethod
-    def of(cls, rows: Rows) -> WholeBody:
+    def of(cls, rows: RigidBodyRows) -> WholeBody:
         """Return bodies and friction of the rows' motion."""
         columns = rows.columns()
         used = np.any(columns, axis=(0, 1))

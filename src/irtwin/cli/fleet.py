@@ -14,7 +14,7 @@ import click
 from irtwin.cli.options import FOLDER, announce, refuse, say
 
 if TYPE_CHECKING:
-    from irtwin.fleet.fleet import Status
+    from irtwin.fleet.fleet import FleetStatus
 
 _SHOWN = 20  # data sets that were set aside
 _BATCH = {"run": 100, "diagnose": 20}  # data sets
@@ -58,7 +58,7 @@ def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[
     return decorate
 
 
-def show(found: Status) -> None:
+def show(found: FleetStatus) -> None:
     """Print how many data sets are in each state, and say which were set aside."""
     for state, number in sorted(found.counts.items()):
         click.echo(f"{state:8} {number}")

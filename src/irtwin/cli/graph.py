@@ -42,12 +42,11 @@ def query(question: str | None, robot: str | None, location: Location, form: str
     from irtwin import asking
     from irtwin.knowledge.questions.queries import to_csv, to_json
     from irtwin.knowledge.store.no_network import leave_network
-    from irtwin.storage.series_place import are_elsewhere
 
     if question is None:
         answer = asking.questions(location.folder)
     else:
-        if location.graph_url is None and not are_elsewhere(location.folder):
+        if location.graph_url is None:
             leave_network()
         answer = asking.ask(question, location, robot=robot)
     for fault in answer.faults:

@@ -103,13 +103,6 @@ base_option = click.option(
     metavar="IRI",
     help="What the IRIs of individuals begin with, as https://plant.example/energy/. It stays once a robot is there.",
 )
-series_option = click.option(
-    "--series",
-    "series_url",
-    metavar="URL",
-    help="Object storage for the series, as s3://bucket/prefix; said once, it is remembered. Default: the workspace. "
-    "Keys and the server come from AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_ENDPOINT_URL and the like.",
-)
 payload_mass_option = click.option("--payload-mass", type=Number(0.0, 1e5), default=0.0, help="Payload mass, kg.")
 payload_com_option = click.option(
     "--payload-com",

@@ -26,21 +26,19 @@ from irtwin.cli.options import (
     payload_mass_option,
     refuse,
     say,
-    series_option,
     tell_contradictions,
 )
 from irtwin.location import Location
 
 if TYPE_CHECKING:
-    from irtwin.signals.finding import Finding
+    from irtwin.signals.finding import LogFinding
 
 
 @click.command()
-@of_many("run", "base", "series_url")
+@of_many("run", "base")
 @located
 @click.option("--repair", is_flag=True, help="Remove bad samples, and say how many and which.")
 @base_option
-@series_option
 def run(dataset: Path, location: Location, **asked: Any) -> None:
     """Build a twin, a graph and a report from a data set, or from many.
 
@@ -94,7 +92,6 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @click.command()
 @located
 @base_option
-@series_option
 @click.option("--no-open", is_flag=True, help="Do not show the page in a browser.")
 @click.option(
     "--case-study", is_flag=True, help="Plan, price, measure and show a motion instead, as the seed paper does."
@@ -258,6 +255,6 @@ def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) 
             click.echo(line)
 
 
-def _state(finding: Finding) -> str:
+def _state(finding: LogFinding) -> str:
     state = "mended" if finding.mended else "cure first" if finding.stops else "doubtful"
     return f"{finding.fault.replace('_', ' ')} ({state})"

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from irtwin.cli.fleet import show
-from irtwin.cli.options import FILE, located, say, series_option
+from irtwin.cli.options import FILE, located, say
 from irtwin.location import Location
 
 
@@ -61,9 +61,9 @@ def repair(location: Location) -> None:
 def trust(folder: Path, withdraw: bool) -> None:
     """Allow what the files of a WORKSPACE ask for, and list it.
 
-    A workspace may come from elsewhere. Rules, templates and the like in its folder, whom its alarms.toml tells, with
-    which variables, and the object storage of its series.toml: none of it runs, sends or is written to before. You say
-    so once; what a file asks for later is asked for again.
+    A workspace may come from elsewhere. Rules, templates and the like in its folder, and whom its alarms.toml tells,
+    with which variables: none of it runs or sends before. You say so once; what a file asks for later is asked for
+    again.
 
     \b
     Example: irtwin workspace trust plant
@@ -127,8 +127,7 @@ def backup(archive: Path, location: Location) -> None:
 @workspace.command()
 @click.argument("archive", type=FILE)
 @located
-@series_option
-def restore(archive: Path, location: Location, series_url: str | None) -> None:
+def restore(archive: Path, location: Location) -> None:
     """Create a new workspace from an ARCHIVE that `irtwin workspace backup` wrote.
 
     A damaged archive restores nothing, and nothing is overwritten.
@@ -138,5 +137,5 @@ def restore(archive: Path, location: Location, series_url: str | None) -> None:
     """
     from irtwin.knowledge.store.backup import restore as restore_all
 
-    restore_all(archive, location, series_url)
+    restore_all(archive, location)
     click.echo(location.folder)

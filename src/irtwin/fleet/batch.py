@@ -56,13 +56,12 @@ _USUAL = Record("", BEGUN)  # whose fields have their types
 class Sets:
     """What a batch is for, `run` or `diagnose`, and its data sets.
 
-    `base`: what the IRIs of its workspace begin with; `series`: where in object storage its series go; if said.
+    `base`: what the IRIs of its workspace begin with, if said.
     """
 
     kind: str
     data_sets: list[str]
     base: str | None = None
-    series: str | None = None
 
 
 @dataclass(frozen=True)
@@ -72,11 +71,9 @@ class Batch:
     folder: Path
 
     @classmethod
-    def create(
-        cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None, series: str | None = None
-    ) -> Batch:
-        """Write down which data sets a new batch has, what its IRIs begin with, and where its series go."""
-        write(folder / _SETS, json.dumps(asdict(Sets(kind, list(places), base, series)), indent=1).encode())
+    def create(cls, folder: Path, kind: str, places: Sequence[str], base: str | None = None) -> Batch:
+        """Write down which data sets a new batch has, and what its IRIs begin with."""
+        write(folder / _SETS, json.dumps(asdict(Sets(kind, list(places), base)), indent=1).encode())
         return cls(folder)
 
     @cached_property
@@ -84,24 +81,24 @@ class Batch:
         """What it was made of. Raises InputError where that cannot be read."""
         file = self._inside(_SETS)
         try:
-            found = Sets(**parse_json(read_input(file, _MOST_BYTES)))
-            if not isinstance(found.data_sets, list) or found.kind not in (RUN, DIAGNOSE):
+            sets = Sets(**parse_json(read_input(file, _MOST_BYTES)))
+            if not isinstance(sets.data_sets, list) or sets.kind not in (RUN, DIAGNOSE):
                 raise ValueError("it says no data sets, or not what for")
         except (ValueError, TypeError) as error:
             raise InputError(
                 f"{file}: cannot be read ({error}); remove its folder, and its sets are taken again"
             ) from None
-        return found
+        return sets
 
     def record(self, place: str) -> Record | None:
         """Return what is known of a data set; None where it was never begun, or its record is damaged."""
         file = self._record_file(place)
         try:
-            found = Record(**parse_json(read_input(file, _MOST_BYTES)))
+            record = Record(**parse_json(read_input(file, _MOST_BYTES)))
         except (InputError, ValueError, TypeError):
             return None  # it is tried again
-        sound = all(isinstance(own, type(usual)) for own, usual in zip(astuple(found), astuple(_USUAL), strict=True))
-        return found if sound else None
+        sound = all(isinstance(own, type(usual)) for own, usual in zip(astuple(record), astuple(_USUAL), strict=True))
+        return record if sound else None
 
     def records(self) -> Iterator[Record | None]:
         """Yield the record of each data set."""
@@ -147,13 +144,13 @@ class Batch:
                         return
                     attempts = before.attempts + 1 if before.state == BEGUN else 1
                 if attempts > _ATTEMPTS:
-                    said = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
-                    return self._write(Record(place, FAILED, said, attempts=attempts, checksum=now))
+                    why = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
+                    return self._write(Record(place, FAILED, why, attempts=attempts, checksum=now))
                 self._write(Record(place, BEGUN, attempts=attempts, checksum=now))
-                state, said = self._done(place, data_set)
+                state, why = self._done(place, data_set)
         except OSError as error:  # a storage that does not answer
-            now, state, said = "", FAILED, str(error)
-        self._write(Record(place, state, said, time.monotonic() - began, attempts, now))
+            now, state, why = "", FAILED, str(error)
+        self._write(Record(place, state, why, time.monotonic() - began, attempts, now))
 
     def _done(self, place: str, data_set: Path) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
@@ -163,8 +160,7 @@ class Batch:
             if self.sets.kind == RUN:
                 from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
 
-                said = self.sets
-                workflow.run(data_set, self._inside("workspace"), base=said.base, series_url=said.series)
+                workflow.run(data_set, self._inside("workspace"), base=self.sets.base)
             else:
                 from irtwin import diagnosing
 

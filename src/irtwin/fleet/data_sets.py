@@ -23,10 +23,10 @@ def find_data_sets(source: str) -> list[str]:
     `source` is a folder (every folder below that has a dataset.toml), a text file with one place a line, or a URL that
     fsspec knows, such as s3://bucket/robots. Raises InputError where there is none.
     """
-    found = _in_storage(source) if "://" in source else _on_disk(Path(source))
-    if not found:
+    places = _in_storage(source) if "://" in source else _on_disk(Path(source))
+    if not places:
         raise InputError(f"{source}: holds no data set; a data set is a folder with {_FILE}")
-    return sorted(dict.fromkeys(found))
+    return sorted(dict.fromkeys(places))
 
 
 def _on_disk(source: Path) -> list[str]:
@@ -46,8 +46,8 @@ def _on_disk(source: Path) -> list[str]:
 
 def _in_storage(url: str) -> list[str]:
     files, root = _fsspec(url).core.url_to_fs(url)
-    found = files.find(root)
-    return [files.unstrip_protocol(path[: -len(_FILE) - 1]) for path in found if path.endswith(f"/{_FILE}")]
+    names = files.find(root)
+    return [files.unstrip_protocol(path[: -len(_FILE) - 1]) for path in names if path.endswith(f"/{_FILE}")]
 
 
 @contextmanager

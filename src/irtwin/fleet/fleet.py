@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,15 +17,13 @@ from irtwin.fleet.data_sets import find_data_sets
 from irtwin.fleet.schedule import work_here, work_on_cluster
 from irtwin.storage import base_iri
 from irtwin.storage.files import inside
-from irtwin.storage.object_storage import checked_url
-from irtwin.storage.series_place import look
 
 _NAME = "batch_{:04d}"
 _EVERY = 5.0  # s between two lines of how far a fleet is
 
 
 @dataclass(frozen=True)
-class Status:
+class FleetStatus:
     """How many data sets are in each state (`left` where none is final), and the records of those set aside."""
 
     counts: Counter[str]
@@ -42,19 +39,16 @@ def work(
     workers: int,
     scheduler: str | None = None,
     base: str | None = None,
-    series_url: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
-) -> Status:
+) -> FleetStatus:
     """Take every data set of a source through `run` or `diagnose`, results below `folder`.
 
     What was done before and has not changed is not done again. `batch`: at most so many data sets share a workspace;
-    `base`: what the IRIs of its individuals begin with, one for the whole fleet; `series_url`: object storage
-    (`s3://bucket/prefix`) that is to hold the series, below it a prefix for each batch. It is remembered.
-    Raises InputError where the source holds none, or the folder is of another kind or base or has its series elsewhere.
+    `base`: what the IRIs of its individuals begin with, one for the whole fleet; it is remembered.
+    Raises InputError where the source holds none, or the folder is of another kind or base.
     """
     base = None if base is None else base_iri.checked(base, "--base")
-    series_url = _place_of_series(folder, series_url)
-    _plan(find_data_sets(source), folder, kind, batch, workers, base, series_url)
+    _plan(find_data_sets(source), folder, kind, batch, workers, base)
     batches = [one for one in batches_of(folder) if one.sets.kind == kind]
     ended = count(1)
 
@@ -90,22 +84,6 @@ def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
         teller.join()
 
 
-def _place_of_series(folder: Path, series_url: str | None) -> str | None:
-    """Return where in object storage a fleet's series go: what is asked for, or what was said before."""
-    there = batches_of(folder)
-    before = there[0].sets.series.rpartition("/")[0] if there and there[0].sets.series else None
-    if series_url is None:
-        return before
-    series_url = checked_url(series_url)
-    if there and series_url != before:
-        raise InputError(
-            f"{folder}: the series of this fleet are in {before or 'the folders of its batches'}; leave --series away, "
-            "or give another --out"
-        )
-    look(series_url)
-    return series_url
-
-
 def _plan(
     places: Sequence[str],
     folder: Path,
@@ -113,7 +91,6 @@ def _plan(
     size: int,
     workers: int,
     base: str | None,
-    series_url: str | None,
 ) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
     there = batches_of(folder)
@@ -130,9 +107,7 @@ def _plan(
     new = [place for place in places if place not in known]
     share = max(1, min(size, -(-len(new) // max(workers, 1))))
     for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):
-        name = _NAME.format(number)
-        series = None if series_url is None else f"{series_url}/{name}-{uuid.uuid4().hex[:8]}"
-        Batch.create(folder / name, kind, new[start : start + share], base, series)
+        Batch.create(folder / _NAME.format(number), kind, new[start : start + share], base)
 
 
 def batches_of(folder: Path) -> list[Batch]:
@@ -140,7 +115,7 @@ def batches_of(folder: Path) -> list[Batch]:
     return [Batch(inside(folder, file.parent.name)) for file in sorted(folder.glob("*/sets.json"))]
 
 
-def status_of(batches: Sequence[Batch]) -> Status:
+def status_of(batches: Sequence[Batch]) -> FleetStatus:
     """Count what became of the data sets of some batches."""
     counts: Counter[str] = Counter()
     aside = []
@@ -149,7 +124,7 @@ def status_of(batches: Sequence[Batch]) -> Status:
         counts[state] += 1
         if record is not None and state in (REFUSED, FAILED):
             aside.append(record)
-    return Status(counts, tuple(aside))
+    return FleetStatus(counts, tuple(aside))
 
 
 def _records(batches: Sequence[Batch]) -> Iterator[Record | None]:

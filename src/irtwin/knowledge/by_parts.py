@@ -30,7 +30,7 @@ MOST_WAITING = 50_000  # quads that wait to be written; while they are, workers 
 
 
 @dataclass(frozen=True)
-class Change:
+class PartChange:
     """What changes with the conclusions of some parts: quads that go and come, and notes that stood before.
 
     `minted` are nodes that are not of the parts, which only their conclusions speak of.
@@ -58,7 +58,7 @@ class Changes:
     names: set[str] = field(default_factory=set)
     noted: set[Quad] = field(default_factory=set)
 
-    def take(self, change: Change) -> None:
+    def take(self, change: PartChange) -> None:
         """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
         if has_blank_node(change.removed | change.added):
             raise Joined("a node without a name")
@@ -103,19 +103,19 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | 
     return changes
 
 
-def _read(removed: bytes, added: bytes, noted: bytes, minted: set[Name]) -> Change:
+def _read(removed: bytes, added: bytes, noted: bytes, minted: set[Name]) -> PartChange:
     gone, come, before = (set(parse(some, format=RdfFormat.N_QUADS)) for some in (removed, added, noted))
-    return Change(gone, come, before, minted)
+    return PartChange(gone, come, before, minted)
 
 
-def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[Change]:
+def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[PartChange]:
     """Yield what changes with the conclusions of some parts. Raises Joined where they bear on others."""
-    for region, found in _conclude(ontology, regions):
-        removed, added = region.concluded, found.quads()
+    for region, concluded in _conclude(ontology, regions):
+        removed, added = region.concluded, concluded.quads()
         removed, added = removed - added, added - removed  # what was concluded before speaks of the region's nodes
         nodes = {node for quad in added if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
         noted = {quad for quad in region.concluded if graph_of(quad) == GRAPH_REASONED}
-        yield Change(removed, added, noted, nodes - region.nodes)
+        yield PartChange(removed, added, noted, nodes - region.nodes)
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
@@ -129,21 +129,21 @@ def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Regio
         return
     _refuse_crossing(ontology, region.asserted)
     try:
-        found = _beside(ontology, region.asserted)
+        concluded = _beside(ontology, region.asserted)
     except (Contradiction, Equality):
         if len(regions) > 1:
             for alone in regions:
                 yield from _conclude(ontology, [alone])
             return
-        found = _alone(ontology, region.asserted)
-    _refuse_crossing(ontology, found.concluded())
-    yield region, found
+        concluded = _alone(ontology, region.asserted)
+    _refuse_crossing(ontology, concluded.concluded())
+    yield region, concluded
 
 
-def _refuse_crossing(ontology: Ontology, said: Iterable[Triple]) -> None:
+def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
     """Raise Joined for a statement that concerns all parts."""
     properties, classes = ontology.models
-    for it in said:
+    for it in statements:
         is_of_models = it.predicate in properties or (it.predicate == TYPE and it.object in classes)
         if is_of_models or it.subject in ontology.terms:
             raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
@@ -163,11 +163,11 @@ def _alone(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
     robots = parts.spoken_for(ontology, asserted)
     try:
         try:
-            found = conclude()
+            concluded = conclude()
         except Contradiction as clash:
-            aside, found = contain(clash, ontology.triples, asserted, conclude)
-            found.made_by = aside.notes(robots)
+            aside, concluded = contain(clash, ontology.triples, asserted, conclude)
+            concluded.made_by = aside.notes(robots)
     except Contradiction as endless:
         return Conclusions(made_by={Triple(robot, CONTRADICTION, Literal(str(endless))) for robot in robots})
-    found.contents[GRAPH_OWL_RL] = found.contents[GRAPH_OWL_RL] - ontology.schema.kept
-    return found
+    concluded.contents[GRAPH_OWL_RL] = concluded.contents[GRAPH_OWL_RL] - ontology.schema.kept
+    return concluded

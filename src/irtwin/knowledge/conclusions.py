@@ -64,17 +64,17 @@ def by_rules(
     With a closure of it, rules and closure conclude in turn; what is set aside is concluded by neither.
     """
 
-    def close(found: set[Triple]) -> Iterable[Triple]:
+    def close(concluded: set[Triple]) -> Iterable[Triple]:
         if closure is None:
             return ()
-        closure.add(found - aside)
+        closure.add(concluded - aside)
         return closure.worth_keeping()
 
     seen = chain(known, closure.worth_keeping() if closure else ())
-    found = Conclusions(running.conclusions(seen, all_rules(ontology.resources), close)).without(aside)
+    concluded = Conclusions(running.conclusions(seen, all_rules(ontology.resources), close)).without(aside)
     if closure is not None:
-        found.contents[GRAPH_OWL_RL] = closure.worth_keeping()
-    return found
+        concluded.contents[GRAPH_OWL_RL] = closure.worth_keeping()
+    return concluded
 
 
 def infer(ontology: Ontology, premises: set[Triple], aside: AbstractSet[Triple] = frozenset()) -> Conclusions:
@@ -109,8 +109,8 @@ def sizes(graph: KnowledgeGraph) -> Counter[str]:
 
 def notes_of(sizes: Counter[str]) -> set[Quad]:
     """Return the quads that note the sizes of named graphs."""
-    said = (Triple(NamedNode(name), TRIPLES, Literal(count)) for name, count in sizes.items() if count)
-    return set(in_graph(said, GRAPH_REASONED))
+    notes = (Triple(NamedNode(name), TRIPLES, Literal(count)) for name, count in sizes.items() if count)
+    return set(in_graph(notes, GRAPH_REASONED))
 
 
 def graph_of(quad: Quad) -> str:

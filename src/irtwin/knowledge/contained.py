@@ -47,10 +47,10 @@ def contain(
     common: what is not to be doubted, the ontology. Raises Contradiction where nothing else clashes, or where there is
     no end of clashes.
     """
-    aside, said = set[Triple](), str(clash)
+    aside, reason = set[Triple](), str(clash)
     for _ in range(_MOST_LOOKS):
         try:
-            found = infer(aside)
+            inferred = infer(aside)
         except Contradiction as more:
             clashing = more.given - common - aside
             if not clashing:
@@ -58,11 +58,11 @@ def contain(
             aside |= clashing
         else:
             statements = frozenset(aside & premises)
-            return Aside(statements, _in_words(said, statements), frozenset(aside - statements)), found
+            return Aside(statements, _in_words(reason, statements), frozenset(aside - statements)), inferred
     raise clash
 
 
-def _in_words(said: str, statements: AbstractSet[Triple]) -> str:
+def _in_words(reason: str, statements: AbstractSet[Triple]) -> str:
     shown = sorted(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}" for it in statements)
     more = f" and {len(shown) - _MOST_NAMED} more" if len(shown) > _MOST_NAMED else ""
-    return f"{said.partition(': ')[0]}: {'; '.join(shown[:_MOST_NAMED])}{more}; nothing is concluded from these"
+    return f"{reason.partition(': ')[0]}: {'; '.join(shown[:_MOST_NAMED])}{more}; nothing is concluded from these"

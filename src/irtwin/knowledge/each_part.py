@@ -15,7 +15,7 @@ from queue import SimpleQueue
 from typing import TypeVar
 
 from irtwin.knowledge import parts
-from irtwin.knowledge.part_worker import Told, Worker
+from irtwin.knowledge.part_worker import PartTask, PartWorker
 from irtwin.knowledge.parts import MOST_TOGETHER, Name, Ontology, Region, Seen
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import view
@@ -68,7 +68,7 @@ def _batches(robots: list[Name], held: Counter[str]) -> Iterator[list[Name]]:
 
 def _workers(
     graph: KnowledgeGraph, ontology: Ontology, work: Work[Made], batches: int, held: Counter[str], begun: ExitStack
-) -> list[Worker[Made]]:
+) -> list[PartWorker[Made]]:
     """Begin processes for batches of robots, if it is worth it; they end with `begun`."""
     count = min(batches, _processors(), MOST_WORKERS)
     if count < 2 or held.total() < LEAST_FOR_WORKERS or graph.folder is None:
@@ -76,15 +76,15 @@ def _workers(
     place = begun.enter_context(view(graph.folder))
     if place is None:  # no view can be had
         return []
-    told = Told(place, ontology.resources, work)
-    return [begun.enter_context(Worker(told)) for _ in range(count)]
+    told = PartTask(place, ontology.resources, work)
+    return [begun.enter_context(PartWorker(told)) for _ in range(count)]
 
 
 def _shared(
-    workers: list[Worker[Made]], batches: Iterable[list[Name]]
+    workers: list[PartWorker[Made]], batches: Iterable[list[Name]]
 ) -> Generator[tuple[list[Made], Seen], None, None]:
     """Yield what workers make of batches of robots, in their order, and what they read; few wait to be taken."""
-    idle: SimpleQueue[Worker[Made]] = SimpleQueue()
+    idle: SimpleQueue[PartWorker[Made]] = SimpleQueue()
     for worker in workers:
         idle.put(worker)
 

@@ -179,11 +179,11 @@ def _check_shapes(file: Resource) -> None:
 
 def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> str:
     """Say which rule of SHACL's own a shape breaks, and on which line."""
-    found = [
+    faults = [
         tuple(report.value(result, SH[name]) for name in ("resultPath", "value", "resultMessage", "focusNode"))
         for result in report.objects(None, SH.result)
     ]
-    path, value, message, node = min(found, key=lambda one: (one[0] is None, str(one)))
+    path, value, message, node = min(faults, key=lambda one: (one[0] is None, str(one)))
     while isinstance(node, rdflib.BNode) and (above := next(shapes.subjects(None, node), None)) is not None:
         node = above
     written = f"sh:{_end(str(path))}" if isinstance(value, rdflib.Literal) else _end(str(node))
@@ -253,10 +253,10 @@ _CHECKS: dict[str, Callable[[Resource], None]] = {
 
 
 def _prefixed(shapes: rdflib.Graph, text: str) -> str:
-    found = [
+    undeclared = [
         (shapes.value(one, SH.prefix), shapes.value(one, SH.namespace)) for one in shapes.objects(None, SH.declare)
     ]
-    return "".join(f"PREFIX {prefix}: <{space}>\n" for prefix, space in found) + text
+    return "".join(f"PREFIX {prefix}: <{space}>\n" for prefix, space in undeclared) + text
 
 
 def _with_line(file: Resource, message: str) -> str:
@@ -274,8 +274,8 @@ def _line_of(file: Resource, text: str) -> int:
     wanted = next((line.strip() for line in text.splitlines() if line.strip()), "")
     lines = list(enumerate(read_text(file.path, MOST_BYTES).splitlines(), 1))
     as_name = re.compile(rf"[:#/]{re.escape(wanted)}\b") if re.fullmatch(r"[\w-]+", wanted) else re.compile("$^")
-    found = [number for number, line in lines if as_name.search(line)] or [n for n, line in lines if wanted in line]
-    return found[0] if wanted and found else 1
+    numbers = [number for number, line in lines if as_name.search(line)] or [n for n, line in lines if wanted in line]
+    return numbers[0] if wanted and numbers else 1
 
 
 def _end(iri: str) -> str:

@@ -26,7 +26,7 @@ Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
-class Told(Generic[Made]):
+class PartTask(Generic[Made]):
     """Where the graph is, what extends it, and what to do with some parts of it."""
 
     place: Path
@@ -34,10 +34,10 @@ class Told(Generic[Made]):
     work: Callable[[Ontology, list[Region]], Iterator[Made]]
 
 
-class Worker(Generic[Made]):
+class PartWorker(Generic[Made]):
     """Such a process, seen from the one that asks; to be used as a context."""
 
-    def __init__(self, told: Told[Made]):
+    def __init__(self, told: PartTask[Made]):
         self._process = subprocess.Popen(
             [sys.executable, "-m", "irtwin.knowledge.part_worker"],
             stdin=subprocess.PIPE,
@@ -82,7 +82,7 @@ class Worker(Generic[Made]):
 def main() -> None:
     """Answer until standard input ends."""
     source, out = sys.stdin.buffer, sys.stdout.buffer
-    told: Told[Any] = pickle.load(source)
+    told: PartTask[Any] = pickle.load(source)
     with KnowledgeGraph.as_it_stands(told.place, resources=told.resources) as graph:
         ontology = Ontology(graph)
         robots = set(parts.robots_of(graph, ontology))
@@ -96,7 +96,7 @@ def main() -> None:
 
 
 def _answer(
-    graph: KnowledgeGraph, ontology: Ontology, robots: set[Name], batch: list[Name], told: Told[Made]
+    graph: KnowledgeGraph, ontology: Ontology, robots: set[Name], batch: list[Name], told: PartTask[Made]
 ) -> object:
     seen, made, own = Seen(), list[Made](), set(batch)
 

@@ -104,7 +104,7 @@ class Region:
 
     def take(self, rows: Iterable[Row], ontology: Ontology) -> set[Name]:
         """Take in quads; return the nodes of parts that are their objects."""
-        terms, found, counts = ontology.terms, set[Name](), dict[NamedNode, int]()
+        terms, names, counts = ontology.terms, set[Name](), dict[NamedNode, int]()
         places = dict[NamedNode, str]()
         for subject, predicate, object, graph in rows:
             place = places.get(graph)
@@ -120,10 +120,10 @@ class Region:
                 if place == _NOTED:
                     continue
             if type(object) in _NAMES and predicate != TYPE and object not in terms:
-                found.add(object)
+                names.add(object)
         for graph, count in counts.items():
             self.read[_kind(graph.value)] += count
-        return found
+        return names
 
 
 def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> Region | None:
@@ -135,10 +135,10 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
     todo -= terms
     while todo:
         region.nodes |= todo
-        found = region.take(graph.said_of(todo), ontology)
+        nodes = region.take(graph.said_of(todo), ontology)
         before = graph.leading_to(todo, _NOT_FOLLOWED)
-        found |= region.take((row for row in graph.said_of(before & ontology.terms) if row[2] in todo), ontology)
-        todo = (found | before - ontology.terms) - region.nodes
+        nodes |= region.take((row for row in graph.said_of(before & ontology.terms) if row[2] in todo), ontology)
+        todo = (nodes | before - ontology.terms) - region.nodes
     return region
 
 
@@ -168,10 +168,10 @@ def some(
 
 def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
     """Return parts that were read lately, each by a node of it, if nothing was asserted meanwhile."""
-    count, found = _RECENT.get(graph, (-1, {}))
+    count, recent = _RECENT.get(graph, (-1, {}))
     if count != graph.asserted_since:
-        _RECENT[graph] = graph.asserted_since, (found := {})
-    return found
+        _RECENT[graph] = graph.asserted_since, (recent := {})
+    return recent
 
 
 class Seen:
@@ -262,8 +262,10 @@ def of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
     """Return what was concluded of the ontology alone, as a part without nodes."""
     region = Region()
     if graph.graphs(GRAPH_INFERRED):
-        said = graph.said_of(term for term in ontology.terms if isinstance(term, Name))
-        of_none = (row for row in said if _place(row[3].value) != _ASSERTED and not ontology.nodes(Triple(*row[:3])))
+        statements = graph.said_of(term for term in ontology.terms if isinstance(term, Name))
+        of_none = (
+            row for row in statements if _place(row[3].value) != _ASSERTED and not ontology.nodes(Triple(*row[:3]))
+        )
         region.take(of_none, ontology)
     return region
 
@@ -305,22 +307,22 @@ def parted(ontology: Ontology, triples: Iterable[Triple]) -> Callable[[Name], Na
 
 def robots_about(ontology: Ontology, triples: Iterable[Triple], some: Iterable[Triple]) -> list[Name]:
     """Return the robots of those parts of a graph that some of its triples stand in."""
-    said = list(triples)
-    part_of = parted(ontology, said)
+    statements = list(triples)
+    part_of = parted(ontology, statements)
     about = {part_of(node) for one in some for node in ontology.nodes(one)}
-    return [robot for robot in robots(ontology, said) if part_of(robot) in about]
+    return [robot for robot in robots(ontology, statements) if part_of(robot) in about]
 
 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return the robots of a part."""
-    found = {node for one in part if (one.predicate, one.object) == (TYPE, _ROBOT) for node in ontology.nodes(one)}
-    return sorted(found, key=str)
+    robots = {node for one in part if (one.predicate, one.object) == (TYPE, _ROBOT) for node in ontology.nodes(one)}
+    return sorted(robots, key=str)
 
 
 def spoken_for(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return who stands for a part: its robots; where it has none, its first node."""
-    said = list(part)
-    return robots(ontology, said) or [min((node for one in said for node in ontology.nodes(one)), key=str)]
+    statements = list(part)
+    return robots(ontology, statements) or [min((node for one in statements for node in ontology.nodes(one)), key=str)]
 
 
 @lru_cache(maxsize=1)

@@ -71,10 +71,10 @@ class Inferences:
     @property
     def contradictions(self) -> dict[str, list[str]]:
         """Return each contradiction in words, and whom it is about."""
-        found: dict[str, list[str]] = {}
+        contradictions: dict[str, list[str]] = {}
         for node, why in self.set_aside:
-            found.setdefault(why, []).append(node)
-        return found
+            contradictions.setdefault(why, []).append(node)
+        return contradictions
 
 
 @seldom_collected()
@@ -165,12 +165,12 @@ def _reason_over_all(
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
     }
     if engine == NATIVE:
-        found = _infer_without_contradiction(ontology, premises - ontology.triples)
+        inferred = _infer_without_contradiction(ontology, premises - ontology.triples)
     else:
-        found = _infer_by(engine, ontology, premises)
-    found.made_of[_OWL_RL] = everything
-    found.made_by.add(_made_by(engine))
-    new = found.quads()
+        inferred = _infer_by(engine, ontology, premises)
+    inferred.made_of[_OWL_RL] = everything
+    inferred.made_by.add(_made_by(engine))
+    new = inferred.quads()
     noted = notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
     new |= noted
     if has_blank_node(new ^ old):
@@ -190,9 +190,9 @@ def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> C
     try:
         return infer(ontology, premises)
     except Contradiction as clash:
-        aside, found = contain(clash, ontology.triples, premises, partial(infer, ontology, premises))
-        found.made_by = aside.notes(parts.robots_about(ontology, premises, aside.statements))
-        return found
+        aside, inferred = contain(clash, ontology.triples, premises, partial(infer, ontology, premises))
+        inferred.made_by = aside.notes(parts.robots_about(ontology, premises, aside.statements))
+        return inferred
 
 
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclusions:
@@ -205,9 +205,9 @@ def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclus
 
 def made_of(graph: KnowledgeGraph) -> object:
     """Return the name of what the closure was made of, or None."""
-    said = graph.triples(GRAPH_REASONED)
-    found = (it.object for it in said if (it.subject, it.predicate) == (_OWL_RL, DERIVED_FROM))
-    return next(found, None)
+    statements = graph.triples(GRAPH_REASONED)
+    sources = (it.object for it in statements if (it.subject, it.predicate) == (_OWL_RL, DERIVED_FROM))
+    return next(sources, None)
 
 
 def engine_of(graph: KnowledgeGraph) -> str:

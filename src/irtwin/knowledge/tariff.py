@@ -17,13 +17,13 @@ def tariff_of(workspace: Path) -> Iterator[Triple]:
     """Yield what `plant.toml` of a workspace says of the tariff; nothing where it says none. InputError where it is
     at fault."""
     tariff = read_tariff(workspace)
-    said: dict[str, float | str | None] = {
+    values: dict[str, float | str | None] = {
         term("Energy_Price"): tariff.price,
         term("Currency"): tariff.currency or None,
         term("Emission_Factor"): tariff.co2,
         term("Operating_Hours"): tariff.hours,
     }
-    known = {name: value for name, value in said.items() if value is not None}
+    known = {name: value for name, value in values.items() if value is not None}
     for name, value in known.items():
         yield Triple(ELECTRICITY, NamedNode(name), Literal(value))
     if known:

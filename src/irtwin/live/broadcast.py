@@ -126,13 +126,13 @@ def reachable(path: Path) -> Iterator[str]:
 
 def _line(state: State) -> bytes:
     power = state.of("power")[0]
-    said = {
+    values = {
         "robot": state.robot_id,
         "time": state.time,
         "q": state.of("q"),
         "power": None if math.isnan(power) else power,
     }
-    return json.dumps(said, separators=(",", ":")).encode() + b"\n"
+    return json.dumps(values, separators=(",", ":")).encode() + b"\n"
 
 
 def _rounded(values: np.ndarray) -> list[float]:

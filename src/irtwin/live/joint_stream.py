@@ -79,30 +79,30 @@ class StateReader:
         if len(line) > LONGEST_LINE:
             raise InputError(f"a line is longer than {LONGEST_LINE} bytes")
         try:
-            said = parse_json(line)
+            message = parse_json(line)
         except ValueError:
             if _HTTP.match(line):
                 raise InputError("an HTTP request, which a web page may have sent; its connection is closed") from None
             raise InputError("a line is not JSON") from None
-        if not isinstance(said, dict):
+        if not isinstance(message, dict):
             raise InputError("a line is not a JSON object")
-        name = said.get("robot")
+        name = message.get("robot")
         robot = self._ids.get(_nfc(name)) if isinstance(name, str) else None
         if robot is None:
             raise InputError(
                 f"no robot {str(name)[:100]!r} in the workspace: run its data set first; known are {self._known}"
             )
-        order = self._order(robot, said.get("name"))
-        time = checked_time(_number(said, "time"), "`time`")
+        order = self._order(robot, message.get("name"))
+        time = checked_time(_number(message, "time"), "`time`")
         for field in REQUIRED:
-            if field in STREAMED and STREAMED[field].streamed not in said:
+            if field in STREAMED and STREAMED[field].streamed not in message:
                 raise InputError(f"`{STREAMED[field].streamed}` is missing")
-        payload = _number(said, "payload") if "payload" in said else None
-        values = tuple([_values(said, channel, order) for channel in STREAMED.values()])
-        performs = said.get("performs")
+        payload = _number(message, "payload") if "payload" in message else None
+        values = tuple([_values(message, channel, order) for channel in STREAMED.values()])
+        performs = message.get("performs")
         if performs is not None and not isinstance(performs, str):
             raise InputError("`performs` is not the name of a planned run")
-        return State(robot, time, values, payload, _centre(said) if "payload_com" in said else None, performs)
+        return State(robot, time, values, payload, _centre(message) if "payload_com" in message else None, performs)
 
     @property
     def _known(self) -> str:
@@ -181,15 +181,15 @@ def _nfc(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def _number(said: Mapping[str, Any], name: str) -> float:
-    value = said.get(name)
+def _number(message: Mapping[str, Any], name: str) -> float:
+    value = message.get(name)
     if not _is_number(value, _GREATEST[name]):
         raise InputError(f"`{name}` is not a number within {_GREATEST[name]:g}")
     return float(value)
 
 
-def _centre(said: Mapping[str, Any]) -> tuple[float, float, float]:
-    centre = said["payload_com"]
+def _centre(message: Mapping[str, Any]) -> tuple[float, float, float]:
+    centre = message["payload_com"]
     if not isinstance(centre, list) or len(centre) != 3 or not all(_is_number(it, 100.0) for it in centre):
         raise InputError("`payload_com` must have 3 numbers within 100: m in the frame of the flange")
     x, y, z = map(float, centre)
@@ -200,13 +200,13 @@ def _is_number(value: Any, most: float) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and -most <= value <= most
 
 
-def _values(said: Mapping[str, Any], channel: Channel, order: Sequence[int]) -> tuple[float, ...]:
+def _values(message: Mapping[str, Any], channel: Channel, order: Sequence[int]) -> tuple[float, ...]:
     name = str(channel.streamed)
-    if name not in said:
+    if name not in message:
         return (math.nan,) * (len(order) if channel.per_joint else 1)
     if not channel.per_joint:
-        return (_number(said, name),)
-    values = said[name]
+        return (_number(message, name),)
+    values = message[name]
     most = _GREATEST[name]
     if not isinstance(values, list) or len(values) != len(order) or not all(_is_number(it, most) for it in values):
         raise InputError(f"`{name}` must have {len(order)} numbers within {most:g}, one for each joint")

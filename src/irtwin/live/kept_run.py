@@ -46,7 +46,7 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
 
 def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, Header, Rows]]:
     """Return the journals of runs that a crash ended; what cannot be read is put aside and announced."""
-    found = []
+    left = []
     for path in left_behind(folder):
         try:
             header, samples = read_journal(path)
@@ -60,8 +60,8 @@ def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, 
             remove(path)
             continue
         announce(f"{header.run_id}: a crash ended this run; its {len(samples)} samples on disk are kept")
-        found.append((path, header, samples))
-    return found
+        left.append((path, header, samples))
+    return left
 
 
 def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float | None = None) -> Tables:

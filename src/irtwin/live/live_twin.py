@@ -149,13 +149,13 @@ class LiveTwin:
 
     def _end_before_jump(self, robot_id: str, run: WatchedRun | None, clock: StreamClock, by: float) -> None:
         """End the run whose stream's clock was set, and tell it; a pause of the stream ends it without a word."""
-        said = None if clock.paused(by) else jump(by)
+        jumped = None if clock.paused(by) else jump(by)
         if run is not None:
-            if said is not None:
-                run.health.end(said)
+            if jumped is not None:
+                run.health.end(jumped)
             self._leave(run)
-        if said is not None:
-            self._announce(f"{self.robots.names[robot_id]}: {said}; its run ends, and no time is stored twice")
+        if jumped is not None:
+            self._announce(f"{self.robots.names[robot_id]}: {jumped}; its run ends, and no time is stored twice")
 
     def _hold(self, state: State, clock: StreamClock) -> None:
         """Keep a state whose time leaps until the next one comes; one that cannot be stored anyway is refused."""

@@ -11,7 +11,7 @@ from irtwin.live.stream_clock import WrongTime
 _MOST_REASONS = 100  # told: some for each robot of a cell; further ones are counted alone
 
 
-class Refusals:
+class RefusedLines:
     """Tells `announce`; threads may refuse at once. `count` of all."""
 
     def __init__(self, announce: Callable[[str], None]) -> None:

@@ -74,13 +74,13 @@ class Rtde:
     def what(self) -> str:
         """Which values come, and what is missing for others."""
         torque = "actual_current" in self._fields
-        said = ["positions", *(["speeds"] if "actual_qd" in self._fields else [])]
-        said += ["torques (current times torque constant)"] if torque and self._constants else []
-        said += ["temperatures"] if "joint_temperatures" in self._fields else []
-        said += ["power (robot voltage times robot current)"] if self._has_power else []
+        parts = ["positions", *(["speeds"] if "actual_qd" in self._fields else [])]
+        parts += ["torques (current times torque constant)"] if torque and self._constants else []
+        parts += ["temperatures"] if "joint_temperatures" in self._fields else []
+        parts += ["power (robot voltage times robot current)"] if self._has_power else []
         lacking = [] if not torque or self._constants else ["no torques: give torque_constant of each joint"]
         lacking += [] if self._has_power else ["no power: the controller does not offer it"]
-        return "; ".join([", ".join(said), *lacking])
+        return "; ".join([", ".join(parts), *lacking])
 
     def follow(
         self,
@@ -96,9 +96,9 @@ class Rtde:
         while not done.is_set():
             try:
                 with closing(self._socket):
-                    for said, offset in self._packages(done):
+                    for values, offset in self._packages(done):
                         try:
-                            take(self._state(said, offset))
+                            take(self._state(values, offset))
                         except InputError as error:
                             refuse(error)
             except (OSError, LostError) as error:
@@ -171,10 +171,10 @@ class Rtde:
                 continue  # a text of the controller's, say
             if len(content) != form.size or content[0] != self._recipe:
                 raise LostError("a data package is not what was asked for")
-            said = self._by_name(form.unpack(content)[1:])
-            if offset is None and 0.0 <= said["timestamp"][0] <= _LONGEST_UP:
-                offset = time.time() - said["timestamp"][0]
-            yield said, math.nan if offset is None else offset
+            values = self._by_name(form.unpack(content)[1:])
+            if offset is None and 0.0 <= values["timestamp"][0] <= _LONGEST_UP:
+                offset = time.time() - values["timestamp"][0]
+            yield values, math.nan if offset is None else offset
 
     def _by_name(self, values: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
         said, place = {}, 0

@@ -60,10 +60,10 @@ class ShownRuns:
         """Return what OWL concludes of a run from quads about it: of which kinds it is, and what leads to it."""
         run = NamedNode(self._graph.iri(run_iri(run_id)))
         try:
-            found = Beside(Ontology.of(self._graph).schema, {quad.triple for quad in quads}).worth_keeping()
+            concluded = Beside(Ontology.of(self._graph).schema, {quad.triple for quad in quads}).worth_keeping()
         except (Contradiction, Equality):  # told by `irtwin run`, which sets aside what clashes
             return set()
-        return set(in_graph((it for it in found if run in (it.subject, it.object)), GRAPH_OWL_RL))
+        return set(in_graph((it for it in concluded if run in (it.subject, it.object)), GRAPH_OWL_RL))
 
     def alarms(self, quads: Iterable[Quad]) -> set[Quad]:
         """Return what the rules of `rules/live_rules.ttl` conclude from a run's excursions or state among the quads."""
@@ -72,8 +72,8 @@ class ShownRuns:
     def _conclusions(self, quads: Iterable[Quad], rules: tuple[Rule, ...]) -> set[Quad]:
         if self._beside is None:
             self._beside = self._graph.construct(_BESIDE)
-        found = conclusions(self._beside | {quad.triple for quad in quads}, rules)
-        return {quad for name, triples in found.items() for quad in in_graph(triples, name)}
+        concluded = conclusions(self._beside | {quad.triple for quad in quads}, rules)
+        return {quad for name, triples in concluded.items() for quad in in_graph(triples, name)}
 
     def refresh(self) -> None:
         """Bring the graph up to date with the database."""
@@ -83,7 +83,7 @@ class ShownRuns:
         """Return what the graph says of a live run."""
         run = NamedNode(self._graph.iri(run_iri(run_id)))
         graphs = " ".join(f"<{GRAPH_ACTIVITY}{activity}>" for activity in activities(run_id))
-        found = self._graph.answer(
+        triples = self._graph.answer(
             f"""SELECT ?g ?s ?p ?o {{
               {{ VALUES ?g {{ {graphs} }} GRAPH ?g {{ ?s ?p ?o }} }} UNION
               {{ GRAPH ?g {{ {run} ?p ?o }} BIND({run} AS ?s)
@@ -91,7 +91,7 @@ class ShownRuns:
               {{ GRAPH ?g {{ ?s irt:alarm_of_Run {run} ; ?p ?o }}
                  FILTER(STRSTARTS(STR(?g), "{GRAPH_SHACL}")) }} }}"""
         )
-        return {Quad(row["s"], row["p"], row["o"], row["g"]) for row in cast(QuerySolutions, found)}
+        return {Quad(row["s"], row["p"], row["o"], row["g"]) for row in cast(QuerySolutions, triples)}
 
 
 class AlarmNews:
@@ -102,12 +102,14 @@ class AlarmNews:
 
     def news(self, quads: Iterable[Quad]) -> list[str]:
         """Return a line for each alarm among the quads whose state is new."""
-        said: dict[str, dict[str, str]] = {}
+        kinds_of: dict[str, dict[str, str]] = {}
         for quad in quads:
             if quad.predicate.value in (_STATE, _REASON) and isinstance(quad.object, Literal):
-                said.setdefault(str(quad.subject), {})[quad.predicate.value] = quad.object.value
+                kinds_of.setdefault(str(quad.subject), {})[quad.predicate.value] = quad.object.value
         lines = [
-            f"alarm {of[_STATE]}: {of[_REASON]}" for alarm, of in said.items() if self._states.get(alarm) != of[_STATE]
+            f"alarm {of[_STATE]}: {of[_REASON]}"
+            for alarm, of in kinds_of.items()
+            if self._states.get(alarm) != of[_STATE]
         ]
-        self._states = {alarm: of[_STATE] for alarm, of in said.items()}
+        self._states = {alarm: of[_STATE] for alarm, of in kinds_of.items()}
         return lines

@@ -47,7 +47,7 @@ class StreamClock:
         self._heard = time.monotonic()
         self._silence = 0.0
 
-    def tell(self, said: float) -> tuple[Tick, float | None]:
+    def tell(self, stamp: float) -> tuple[Tick, float | None]:
         """Take a state's time, s since 1970.
 
         Return what it is, and by how many seconds the clock was set before it, None where it was not: a leap is
@@ -55,20 +55,20 @@ class StreamClock:
         """
         self._hear()
         if self.now is None:
-            return self._go(said), None
-        step = said - self.now
+            return self._go(stamp), None
+        step = stamp - self.now
         if 0 < step <= HOLE:
-            return self._go(said), None
+            return self._go(stamp), None
         if -HOLE < step <= 0:
-            return self._take_late(said, self.now)
-        if self._leapt is None or said <= self._leapt:
-            self._leapt = said
+            return self._take_late(stamp, self.now)
+        if self._leapt is None or stamp <= self._leapt:
+            self._leapt = stamp
             return Tick.LEAP, None
         leapt, by = self._leapt, self._leapt - self.now
         self._go(leapt)
-        if said - leapt <= HOLE:
-            return self._go(said), by
-        self._leapt = said
+        if stamp - leapt <= HOLE:
+            return self._go(stamp), by
+        self._leapt = stamp
         return Tick.LEAP, by
 
     def paused(self, by: float) -> bool:
@@ -81,13 +81,13 @@ class StreamClock:
             self._silence = now - self._heard
         self._heard = now
 
-    def _go(self, said: float) -> Tick:
-        self.now, self._leapt, self._late = said, None, None
+    def _go(self, stamp: float) -> Tick:
+        self.now, self._leapt, self._late = stamp, None, None
         return Tick.NEXT
 
-    def _take_late(self, said: float, now: float) -> tuple[Tick, float | None]:
-        first, newest = self._late or (said, said)
-        self._late = (first, said) if said > newest else (said, said)
-        if said - self._late[0] < STALE:
+    def _take_late(self, stamp: float, now: float) -> tuple[Tick, float | None]:
+        first, newest = self._late or (stamp, stamp)
+        self._late = (first, stamp) if stamp > newest else (stamp, stamp)
+        if stamp - self._late[0] < STALE:
             return Tick.LATE, None
-        return self._go(said), first - now
+        return self._go(stamp), first - now

@@ -40,12 +40,12 @@ class StreamHealth:
         if frozen is None:
             self.stale_since = self.reason = None
 
-    def late(self, said: float, newest: float) -> None:
+    def late(self, stamp: float, newest: float) -> None:
         """Note a state that is not later than the newest, times in s since 1970."""
-        if said == newest:
+        if stamp == newest:
             self._late = "the stream repeats the state that was taken last"
         else:
-            self._late = f"the stream went back in time, by {seconds(newest - said)}"
+            self._late = f"the stream went back in time, by {seconds(newest - stamp)}"
 
     def leaps(self, by: float) -> None:
         """Note a state whose time is so many seconds away that nobody trusts it yet."""

@@ -16,12 +16,11 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
-from irtwin.live.refusals import Refusals
+from irtwin.live.refusals import RefusedLines
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.location import Location
 from irtwin.providers.records import find_robot, find_run, load_robot
-from irtwin.storage import series_place
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
@@ -49,11 +48,10 @@ def watch(
     With `rtde`: what the controller there says of the robot of this name, until a signal comes.
     With `performs`: the first run of that robot carries out the plan of this name.
 
-    Raises InputError for a fault in what extends the workspace, or where its series cannot be kept, before a sample is
-    read.
+    Raises InputError for a fault in what extends the workspace, before a sample is read.
     """
     sys.setswitchinterval(SWITCH)
-    refusals = Refusals(announce)
+    refusals = RefusedLines(announce)
     done = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: done.set())
@@ -94,10 +92,9 @@ def _alone(place: Workspace) -> AbstractContextManager[None]:
 
 
 def _checked(place: Workspace) -> Workspace:
-    """Look through what extends the workspace, and for its series' place: a fault is said now, not when a run ends."""
+    """Look through what extends the workspace: a fault is said now, not when a run ends."""
     check(place.resources)
     check_mappings(place.resources, place.engine)
-    series_place.check(place.folder)
     return place
 
 
@@ -153,12 +150,12 @@ def _refusing(take: Callable[[State], None], refuse: Callable[[InputError], None
 
 def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:
     """Return what takes states, the first of which says the plan that its run carries out."""
-    said = False
+    told = False
 
     def take_with_plan(state: State) -> None:
-        nonlocal said
-        take(state if said else replace(state, performs=plan))
-        said = True
+        nonlocal told
+        take(state if told else replace(state, performs=plan))
+        told = True
 
     return take_with_plan
 

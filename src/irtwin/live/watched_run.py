@@ -136,8 +136,8 @@ class WatchedRun:
 
     def counts(self, waited: float) -> live_run.Values:
         """Return what the graph says of how well it kept up, and how long the robot has been at rest."""
-        said = {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
+        counts = {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
         if self.newest is None or self.standing_since is None:
-            return said
+            return counts
         since = datetime.fromtimestamp(self.standing_since, UTC).replace(tzinfo=None)
-        return {**said, "standing_since": since, "standing_s": float(int(self.newest.time - self.standing_since))}
+        return {**counts, "standing_since": since, "standing_s": float(int(self.newest.time - self.standing_since))}

@@ -87,21 +87,21 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     started = datetime.now(UTC)
     with workspace.reading() as session:
         of_robot = select(gap_schema.GapDiagnosis).where(gap_schema.GapDiagnosis.robot_id == robot_id)
-        found = session.scalars(of_robot).one_or_none()
-    if found is None:
+        diagnosis = session.scalars(of_robot).one_or_none()
+    if diagnosis is None:
         raise InputError(f"{robot_id}: no diagnosis in {workspace.folder}; run `irtwin diagnose` with it first")
-    if found.twin_file is None or found.twin_sha256 is None:
+    if diagnosis.twin_file is None or diagnosis.twin_sha256 is None:
         raise InputError(
-            f"{robot_id}: its diagnosis ({values(found)['verdict']}) added nothing to the twin, so there is nothing to "
-            "adopt"
+            f"{robot_id}: its diagnosis ({values(diagnosis)['verdict']}) added nothing to the twin, so there is "
+            "nothing to adopt"
         )
-    text = workspace.read_document(found.twin_file, found.twin_sha256)
-    twin = from_json(text, inside(workspace.folder, found.twin_file))
+    text = workspace.read_document(diagnosis.twin_file, diagnosis.twin_sha256)
+    twin = from_json(text, inside(workspace.folder, diagnosis.twin_file))
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
     made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known, parts)
-    used = [*made.used, f"gap_diagnosis/{found.diagnosis_id}"]
+    used = [*made.used, f"gap_diagnosis/{diagnosis.diagnosis_id}"]
     twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
     _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")
     return twin_id
@@ -146,10 +146,10 @@ def _rows(
     return row, [*gap_rows.rows(diagnosis, curves, of)], documents
 
 
-def _texts(said: Document, curves: Curves, twin: str | None, motion: str | None) -> dict[str, str]:
+def _texts(document: Document, curves: Curves, twin: str | None, motion: str | None) -> dict[str, str]:
     """Return the files that hold a diagnosis, by their endings."""
     given = {
-        ".json": _text(said.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
+        ".json": _text(document.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
         ".motion.csv": motion,
     }  # fmt: skip
     return {kind: text for kind, text in given.items() if text is not None}

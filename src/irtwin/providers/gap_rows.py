@@ -35,14 +35,14 @@ class Of:
         return UNITS[word].replace("N m", "N").replace("rad", "m") if slides else UNITS[word]
 
 
-def row(said: Document, of: Of) -> Row:
+def row(document: Document, of: Of) -> Row:
     """Return the columns of a diagnosis that its document tells."""
-    return _row(DOCUMENT, None, said, of)
+    return _row(DOCUMENT, None, document, of)
 
 
-def rows(said: Document, drawn: Curves, of: Of) -> Iterator[OfDiagnosis]:
+def rows(document: Document, drawn: Curves, of: Of) -> Iterator[OfDiagnosis]:
     """Yield all further rows of a diagnosis. Raises InputError where it names a joint or a run that is not there."""
-    for whole, tables in ((said, DOCUMENT.parts), (drawn, OF_CURVES)):
+    for whole, tables in ((document, DOCUMENT.parts), (drawn, OF_CURVES)):
         for table in tables:
             yield from _rows(table, whole, {"diagnosis_id": of.diagnosis_id}, of)
 

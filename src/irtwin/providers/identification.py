@@ -43,8 +43,8 @@ def fitted_data_set(workspace: Workspace, robot_id: str, known: RobotMotions, pa
     cut = {motion.run: float(motion.time[0]) for motion in parts.held_out}
     names = {motion.run for motion in parts.fit}
     runs = [_fitted(load_run(workspace, known.robot, known.keys[name]), cut.get(name), names) for name in sorted(names)]
-    said = stored_data_set(workspace, robot_id, known.robot)
-    return replace(said, runs=tuple(runs), cutoff=known.cutoff.hz)
+    stored = stored_data_set(workspace, robot_id, known.robot)
+    return replace(stored, runs=tuple(runs), cutoff=known.cutoff.hz)
 
 
 def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
@@ -55,8 +55,8 @@ def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
 def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotions, parts: Split) -> Made:
     """Return the rows and the file of a robot's twin, which was fitted to `parts` of the known motions."""
     keys = known.keys
-    said = stored_data_set(workspace, robot_id, twin.robot)
-    twin = replace(twin, torque_scale=torque_scale_of(twin, said, parts.fit, ScaleOfTorque()))
+    stored = stored_data_set(workspace, robot_id, twin.robot)
+    twin = replace(twin, torque_scale=torque_scale_of(twin, stored, parts.fit, ScaleOfTorque()))
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"
@@ -147,8 +147,8 @@ def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Para
 def _scaled(twin: Twin, one: Parameter | BaseParameter) -> dict[str, float]:
     """Return the ends of a parameter's interval with the scale of torque in it; none where it does not go with that."""
     scale = twin.torque_scale
-    found = None if scale is None else scale.interval(one.value, one.unit, one.lower, one.upper)
-    return {} if found is None else {"scaled_lower": found[0], "scaled_upper": found[1]}
+    interval = None if scale is None else scale.interval(one.value, one.unit, one.lower, one.upper)
+    return {} if interval is None else {"scaled_lower": interval[0], "scaled_upper": interval[1]}
 
 
 def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]:

@@ -91,12 +91,12 @@ def improve(
     if not loop.within:
         announce("  looking for effects that the twin lacks")
         try:
-            found = diagnose(replace(fitted, effects=loop.best.twin.effect_ids))
+            diagnosis = diagnose(replace(fitted, effects=loop.best.twin.effect_ids))
         except InputError as error:
             announce(f"  these runs do not say: {error}")
         else:
-            experiment = found.experiment
-            effects = None if found.twin is None else found.twin.effects
+            experiment = diagnosis.experiment
+            effects = None if diagnosis.twin is None else diagnosis.twin.effects
             if effects is not None and effects != loop.best.twin.effects:
                 loop.try_out(_DIAGNOSED, lambda: fit(effects), parts)
     _keep_twin(workspace, robot_id, known, loop.best)
@@ -125,24 +125,24 @@ class _Loop:
         started = datetime.now(UTC)
         self.announce(f"  fitting the {tried}")
         twin = fit()
-        found = _Twin(_made(self.workspace, self.robot_id, self.known, twin, parts)[0], twin, parts)
+        fitted = _Twin(_made(self.workspace, self.robot_id, self.known, twin, parts)[0], twin, parts)
         before, after = _worst(self.best.twin, parts.held_out), _worst(twin, parts.held_out)
         earlier = self.best.twin_id
         if after < before:
-            self.best = found
+            self.best = fitted
         outcome = NO_BETTER if after >= before else WITHIN if self.within else BETTER
         self.rounds.append(Round(tried, before, after, outcome))
         self.announce(
             f"  worst energy error on what neither was fitted to: {before:.3g} %, then {after:.3g} %: {outcome}"
         )
-        row = self._row(self.rounds[-1], earlier, found)
+        row = self._row(self.rounds[-1], earlier, fitted)
         read = {motion.run for motion in (*parts.fit, *parts.held_out)}
         run_ids = [run_id for name, run_id in self.known.keys.items() if name in read]
         used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
         done = activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
         self.workspace.replace_activity(done, used, [row])
 
-    def _row(self, tried: Round, earlier: str, found: _Twin) -> schema.ImprovementRound:
+    def _row(self, tried: Round, earlier: str, fitted: _Twin) -> schema.ImprovementRound:
         of_robot = schema.ImprovementRound.robot_id == self.robot_id
         with self.workspace.reading() as session:
             last = session.scalar(select(func.max(schema.ImprovementRound.number)).where(of_robot)) or 0
@@ -151,9 +151,9 @@ class _Loop:
             robot_id=self.robot_id,
             number=last + 1,
             tried=tried.tried,
-            effects=",".join(found.twin.effect_ids),
+            effects=",".join(fitted.twin.effect_ids),
             earlier_twin_id=earlier,
-            tried_twin_id=found.twin_id,
+            tried_twin_id=fitted.twin_id,
             error_before_percent=tried.before,
             error_after_percent=tried.after,
             limit_percent=self.limit,

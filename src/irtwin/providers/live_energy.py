@@ -54,8 +54,8 @@ class KnownTwin:
 
 def known_twin(workspace: Workspace, robot_id: str) -> KnownTwin | None:
     """Return a robot's twin; None where it has none. Raises InputError where its file is gone or another."""
-    found = records.known_twin(workspace, robot_id)
-    return None if found is None else KnownTwin(*found, _bands(workspace, found[0], found[1].robot.joint_names))
+    known = records.known_twin(workspace, robot_id)
+    return None if known is None else KnownTwin(*known, _bands(workspace, known[0], known[1].robot.joint_names))
 
 
 class LiveEnergy:
@@ -279,8 +279,8 @@ def _windows(workspace: Workspace, run_id: str, joints: tuple[str, ...]) -> np.n
     missing = np.full(table.num_rows, np.nan)
     there = set(table.column_names)
     columns = [np.array(table[name]) - np.array(table[f"{name}_model"]) if name in there else missing for name in names]
-    found = Windows().take(np.array(table["time"]), np.column_stack(columns), begins=True)
-    return np.array([root for _, root in found]).reshape(-1, len(names))
+    windows = Windows().take(np.array(table["time"]), np.column_stack(columns), begins=True)
+    return np.array([root for _, root in windows]).reshape(-1, len(names))
 
 
 def _moment(seconds: float) -> datetime:

@@ -31,7 +31,7 @@ class MeshCopy:
 def mesh_copies(data_set: DataSet) -> tuple[dict[str, MeshCopy], list[str]]:
     """Return the meshes that a data set's robot names, by that name, and a line for each that cannot be drawn."""
     copies: dict[str, MeshCopy] = {}
-    said = []
+    undrawn = []
     beside = data_set.folder if data_set.urdf is None else data_set.urdf.parent
     solids = structure_of(data_set.robot).solids if data_set.robot.urdf else ()  # a meter's log has none
     for name in dict.fromkeys(solid.file for solid in solids if solid.file is not None):
@@ -39,11 +39,11 @@ def mesh_copies(data_set: DataSet) -> tuple[dict[str, MeshCopy], list[str]]:
             file = find_mesh(name, data_set.folder, beside)
             content = read_mesh_file(file)
         except InputError as error:
-            said.append(f"{error}; shapes stand in for it")
+            undrawn.append(f"{error}; shapes stand in for it")
             continue
         sha256 = hashlib.sha256(content).hexdigest()
         copies[name] = MeshCopy(f"{MESHES}/{sha256}{file.suffix.lower()}", sha256, content)
-    return copies, said
+    return copies, undrawn
 
 
 def meshes_of_graph(

@@ -17,33 +17,33 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     assert began is not None
     samples = workspace.read_series(run_id, MEASURED)
     time, power = (samples[name].to_numpy().astype(float) for name in ("time", "power"))
-    found = load_profile(time, power)
-    working = sum(state.seconds for state in found.states if state.name == "working")
-    on = sum(state.seconds for state in found.states if state.name != "off")
-    standby = None if found.standby is None else found.standby * on
+    profile = load_profile(time, power)
+    working = sum(state.seconds for state in profile.states if state.name == "working")
+    on = sum(state.seconds for state in profile.states if state.name != "off")
+    standby = None if profile.standby is None else profile.standby * on
     hour = began.replace(minute=0, second=0, microsecond=0)
     hours = by_hour(time, power, (began - hour).total_seconds())
-    cycles = found.cycles or Cycles(0, 0.0, 0.0)
+    cycles = profile.cycles or Cycles(0, 0.0, 0.0)
     read = inputs(workspace, robot_id, [run_id])
     rows = [
         RunState(
             run_id=run_id,
-            current_state="standstill" if found.standing[-1] else "moving",
+            current_state="standstill" if profile.standing[-1] else "moving",
             idle_share=min(max(1.0 - working / run.run_time_s, 0.0), 1.0),
         ),
         RunEnergy(
             run_id=run_id,
-            energy_consumption_j=None if run.role == "simulated" else found.energy,
+            energy_consumption_j=None if run.role == "simulated" else profile.energy,
             energy_from="measured",
-            run_power_w=found.energy / run.run_time_s,
+            run_power_w=profile.energy / run.run_time_s,
             peak_power_w=float(power.max()),
-            measured_energy_j=found.energy,
+            measured_energy_j=profile.energy,
             standby_energy_j=standby,
-            standby_share=None if standby is None or found.energy <= 0 else min(standby / found.energy, 1.0),
+            standby_share=None if standby is None or profile.energy <= 0 else min(standby / profile.energy, 1.0),
         ),
         MeteredLoad(
             run_id=run_id,
-            standby_power_w=found.standby,
+            standby_power_w=profile.standby,
             cycle_count=cycles.count or None,
             cycle_time_s=cycles.seconds or None,
             cycle_energy_j=cycles.energy or None,
@@ -55,7 +55,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
                 run_id=run_id, number=number, robot_id=robot_id, state=state.name, seconds=state.seconds,
                 power_w=state.power, differs=False,
             )
-            for number, state in enumerate(found.states, start=1)
+            for number, state in enumerate(profile.states, start=1)
         ),
     ]  # fmt: skip
     return Made(robot_id, read, rows, metered=[one for one in read if one.startswith("series/")])

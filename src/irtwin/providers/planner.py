@@ -61,10 +61,10 @@ def populate(
 def ready(graph: KnowledgeGraph) -> dict[str, list[str]]:
     """Return the IRIs of the individuals that are ready for each provider, by its name."""
     rule = next(rule for rule in all_rules(graph.resources) if rule.name == _READY_FOR)
-    found: dict[str, list[str]] = {}
+    ready_by_provider: dict[str, list[str]] = {}
     for triple in sorted(graph.construct(rule.construct), key=str):
-        found.setdefault(triple.object.value.rpartition("/")[2], []).append(triple.subject.value)  # type: ignore[union-attr]
-    return dict(sorted(found.items()))
+        ready_by_provider.setdefault(triple.object.value.rpartition("/")[2], []).append(triple.subject.value)  # type: ignore[union-attr]
+    return dict(sorted(ready_by_provider.items()))
 
 
 def _provide(workspace: Workspace, graph: KnowledgeGraph, name: str, subject: str) -> None:

@@ -72,10 +72,10 @@ def activity(provider: str, robot_id: str, subject: str, started: datetime, by: 
 
 
 def _entry_point(name: str) -> EntryPoint:
-    found = [point for point in entry_points(group=GROUP) if point.name == name]
-    if not found:
+    points = [point for point in entry_points(group=GROUP) if point.name == name]
+    if not points:
         raise InputError(
             f'provider "{name}" is declared in the ontology, but no installed package registers it as an entry '
             f"point of {GROUP}; install that package, or remove the declaration"
         )
-    return found[0]
+    return points[0]

@@ -381,10 +381,10 @@ def check_plans(workspace: Workspace, robot_id: str, plans: Sequence[log.Run]) -
 
 def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
     """Give back a robot's twin with its twin_id. Raises InputError where it has none, or its file is gone."""
-    found = known_twin(workspace, robot_id)
-    if found is None:
+    known = known_twin(workspace, robot_id)
+    if known is None:
         raise InputError(f"{workspace.folder}: robot {robot_id} has no twin yet; run its data set first")
-    return found
+    return known
 
 
 def known_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin] | None:
@@ -418,15 +418,15 @@ def _source_files(robot_id: str, data_set: log.DataSet) -> list[SourceFile]:
 
 def flat_notes(notes: Mapping[str, Any], below: str = "") -> dict[str, list[str]]:
     """Return the values of notes as text, by names: "supply.voltage" of a table within, several of a list."""
-    found: dict[str, list[str]] = {}
+    flat: dict[str, list[str]] = {}
     for name, value in notes.items():
         if isinstance(value, Mapping):
-            found |= flat_notes(value, f"{below}{name}.")
+            flat |= flat_notes(value, f"{below}{name}.")
         elif isinstance(value, list | tuple):
-            found[f"{below}{name}"] = [_text(one) for one in value]
+            flat[f"{below}{name}"] = [_text(one) for one in value]
         else:
-            found[f"{below}{name}"] = [_text(value)]
-    return found
+            flat[f"{below}{name}"] = [_text(value)]
+    return flat
 
 
 def _text(value: Any) -> str:

@@ -64,8 +64,8 @@ _SIZES = {
 def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
     """Return a robot made of what the graph says of it. Raises InputError where the graph does not know its links."""
     asked = {"arm": robot_iri}
-    links, said = graph.query(_LINKS, asked).rows, graph.query(_ROBOT, asked).rows
-    if not links or not said:
+    links, of_robot = graph.query(_LINKS, asked).rows, graph.query(_ROBOT, asked).rows
+    if not links or not of_robot:
         raise InputError(f"<{robot_iri}>: the graph does not know its links; run its data set again")
     joints = graph.query(_JOINTS, asked).rows
     structure = Structure(
@@ -73,7 +73,7 @@ def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
         tuple(map(_connection, joints)),
         tuple(map(_solid, graph.query(_SHAPES, asked).rows)),
     )
-    name = said[0]["name"]
+    name = of_robot[0]["name"]
     moving = [_joint(row) for row in joints if row["axis_x"] is not None]
     robot = parse_urdf(urdf_text(name, structure, moving), source=f"{name} in the graph")
     accelerations = {row["name"]: row["acceleration"] for row in joints}  # of these a URDF has no word
@@ -81,9 +81,9 @@ def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
         robot,
         name=name,
         joints=tuple(replace(joint, acceleration=accelerations[joint.name]) for joint in robot.joints),
-        manufacturer=said[0]["manufacturer"],
-        type=said[0]["type"],
-        weight=said[0]["weight"],
+        manufacturer=of_robot[0]["manufacturer"],
+        type=of_robot[0]["type"],
+        weight=of_robot[0]["weight"],
     )
 
 

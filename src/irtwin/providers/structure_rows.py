@@ -75,9 +75,9 @@ def device_rows(robot_id: str, data_set: DataSet) -> Iterator[Base]:
 
 
 def _link(robot_id: str, number: int, body: Body) -> Link:
-    said = body.inertia if body.inertia is not None and all(map(math.isfinite, body.inertia)) else (None,) * 6
+    inertia = body.inertia if body.inertia is not None and all(map(math.isfinite, body.inertia)) else (None,) * 6
     x, y, z = body.com or (None, None, None)
-    moments = {f"inertia_{name}_kg_m2": value for name, value in zip(_MOMENTS, said, strict=True)}
+    moments = {f"inertia_{name}_kg_m2": value for name, value in zip(_MOMENTS, inertia, strict=True)}
     return Link(
         robot_id=robot_id,
         name=body.name,

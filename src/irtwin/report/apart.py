@@ -24,10 +24,10 @@ _MEMORY = 1 << 30  # bytes
 
 def written_apart(resources: Resources, template: str, values: Mapping[str, Any]) -> str:
     """Return the page that a template makes of values. Raises InputError where it fails, or takes too much."""
-    said = _said(pickle.dumps((resources, template, dict(values))))
-    if "page" in said:
-        return str(said["page"])
-    raise InputError(f"{resources.path('reports', template)}: {said['fault']}; see the files that extend reports/")
+    answer = _said(pickle.dumps((resources, template, dict(values))))
+    if "page" in answer:
+        return str(answer["page"])
+    raise InputError(f"{resources.path('reports', template)}: {answer['fault']}; see the files that extend reports/")
 
 
 def _said(task: bytes) -> dict[str, str]:
@@ -40,8 +40,8 @@ def _said(task: bytes) -> dict[str, str]:
     if done.returncode == -signal.SIGXCPU:
         return too_long
     done.check_returncode()
-    said: dict[str, str] = json.loads(done.stdout)
-    return said
+    answer: dict[str, str] = json.loads(done.stdout)
+    return answer
 
 
 def _answer(seconds: float, memory: int) -> str:

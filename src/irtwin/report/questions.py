@@ -24,7 +24,7 @@ class Graph(Protocol):
 
 
 @dataclass(frozen=True)
-class Question:
+class PageQuestion:
     """A SPARQL SELECT with its title; `bind` names the variables that must be given an IRI."""
 
     name: str
@@ -37,7 +37,7 @@ class Question:
 class Answer:
     """A question's rows. `first` is the row of a question that has one answer, or None."""
 
-    question: Question
+    question: PageQuestion
     rows: tuple[Row, ...]
 
     @property
@@ -49,7 +49,7 @@ class Answer:
 Answers = Mapping[str, Answer]
 
 
-def questions_of(resources: Resources, report: str) -> dict[str, Question]:
+def questions_of(resources: Resources, report: str) -> dict[str, PageQuestion]:
     """Return the questions of a report, by file stem."""
     return read_questions(file.path for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/"))
 
@@ -60,24 +60,24 @@ def added_to(resources: Resources, report: str) -> list[str]:
     return [file.path.stem for file in files if file.is_extension and not file.replaces]
 
 
-def read_questions(files: Iterable[Path]) -> dict[str, Question]:
+def read_questions(files: Iterable[Path]) -> dict[str, PageQuestion]:
     """Read questions, by file stem. Raises InputError where one is not UTF-8."""
     return {file.stem: _parse(file) for file in files}
 
 
-def ask(graph: Graph, questions: Mapping[str, Question], bindings: Mapping[str, str]) -> dict[str, Answer]:
+def ask(graph: Graph, questions: Mapping[str, PageQuestion], bindings: Mapping[str, str]) -> dict[str, Answer]:
     """Ask every question; one whose variables are not all in `bindings` has no rows."""
     return {name: Answer(question, _rows(graph, question, bindings)) for name, question in questions.items()}
 
 
-def _parse(file: Path) -> Question:
+def _parse(file: Path) -> PageQuestion:
     text = read_text(file, MOST_BYTES)
     header = dict(_HEADER.findall(text))
     bind = tuple(name.strip() for name in header.get("bind", "").split(",") if name.strip())
-    return Question(file.stem, header["title"], bind, _HEADER.sub("", text).strip())
+    return PageQuestion(file.stem, header["title"], bind, _HEADER.sub("", text).strip())
 
 
-def _rows(graph: Graph, question: Question, bindings: Mapping[str, str]) -> tuple[Row, ...]:
+def _rows(graph: Graph, question: PageQuestion, bindings: Mapping[str, str]) -> tuple[Row, ...]:
     if not set(question.bind) <= set(bindings):
         return ()
     return tuple(graph.query(question.text, {name: bindings[name] for name in question.bind}))

@@ -11,7 +11,7 @@ IN_MEMORY = 4 << 20  # bytes of an answer; what its client has not taken beyond 
 _PIECE = 1 << 16  # bytes
 
 
-class Answer:
+class Reply:
     """The bytes that the client has not taken yet.
 
     `whole` once the last of them is there, `broken_off` where it never will be.
@@ -67,17 +67,17 @@ class Answer:
         self._file.close()
 
 
-class Answers:
+class Replies:
     """The answers under way, which have some room together; the one that takes most of it is given up first."""
 
     def __init__(self, room: int):
         self._room = room
-        self._under_way: set[Answer] = set()
+        self._under_way: set[Reply] = set()
 
     @contextmanager
-    def new(self) -> Iterator[Answer]:
+    def new(self) -> Iterator[Reply]:
         """Give an answer, until it is sent."""
-        answer = Answer()
+        answer = Reply()
         self._under_way.add(answer)
         try:
             yield answer

@@ -12,8 +12,8 @@ from starlette.requests import Request
 
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.table import to_python
-from irtwin.report.questions import Answer, Answers, Question, Row
-from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
+from irtwin.report.questions import Answer, Answers, PageQuestion, Row
+from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
@@ -33,19 +33,19 @@ class Asking:
         self._pool, self._updates, self._limits = pool, updates, limits
         self.base = base  # of the graph's individuals
 
-    async def answers(self, request: Request, questions: Mapping[str, Question], bindings: Bindings) -> Answers:
+    async def answers(self, request: Request, questions: Mapping[str, PageQuestion], bindings: Bindings) -> Answers:
         """Answer a page's questions; `bindings` gives variables an IRI or a literal. Raises Refusal."""
         texts = {name: bound(question.text, bindings) for name, question in questions.items()}
         bodies = await self._told(request, [(text, _JSON) for text in texts.values()])
         rows = await asyncio.to_thread(lambda: [_rows(body) for _, body in bodies])
-        return {name: Answer(questions[name], found) for name, found in zip(texts, rows, strict=True)}
+        return {name: Answer(questions[name], answered) for name, answered in zip(texts, rows, strict=True)}
 
     async def holds(self, request: Request, pattern: str, bindings: Bindings) -> bool:
         """Whether the graph has what a pattern asks for."""
         ((_, body),) = await self._told(request, [(bound(f"ASK {{ {pattern} }}", bindings), _JSON)])
-        found = parse_query_results(body, QueryResultsFormat.JSON)
-        assert isinstance(found, QueryBoolean)
-        return bool(found)
+        answer = parse_query_results(body, QueryResultsFormat.JSON)
+        assert isinstance(answer, QueryBoolean)
+        return bool(answer)
 
     async def written(self, request: Request, text: str, accept: str) -> tuple[str, bytes]:
         """Return an answer as it is sent, and its media type."""
@@ -57,20 +57,20 @@ class Asking:
         ((head, _),) = await self._all("", [("ASK {}", _JSON)])
         return head.standing
 
-    async def _told(self, request: Request, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
+    async def _told(self, request: Request, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
         """Return answers for a client, who is told how the graph stands."""
         answers = await self._all(client(request), asked)
         for head, _ in answers:
             note(request, head.standing)
         return answers
 
-    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
+    async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
         for _ in range(_TRIES):
             with suppress(NotBegun):
                 return await self._of_one_worker(client, asked)
         raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
 
-    async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[Head, bytes]]:
+    async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
         async with self._pool.worker(client) as worker:
             deadline = time.monotonic() + self._limits.seconds
             try:
@@ -82,7 +82,7 @@ class Asking:
                     503, f"the page's queries were cancelled after {seconds:g} s: the graph is large"
                 ) from None
 
-    async def _body(self, worker: Worker, text: str, accept: str) -> tuple[Head, bytes]:
+    async def _body(self, worker: Worker, text: str, accept: str) -> tuple[AnswerHead, bytes]:
         about = {"text": text, "default_graphs": (), "named_graphs": (), "base": self.base, "accept": accept}
         head = await worker.ask({**about, "at_once": self._updates.just_now})
         body = bytearray()
@@ -94,7 +94,7 @@ class Asking:
 
 
 def _rows(body: bytes) -> tuple[Row, ...]:
-    found = parse_query_results(body, QueryResultsFormat.JSON)
-    assert not isinstance(found, QueryBoolean)
-    names = [variable.value for variable in found.variables]
-    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in found)
+    solutions = parse_query_results(body, QueryResultsFormat.JSON)
+    assert not isinstance(solutions, QueryBoolean)
+    names = [variable.value for variable in solutions.variables]
+    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in solutions)

@@ -23,7 +23,7 @@ async def catch_up(asking: Asking, location: Location) -> None:
 
     What fails is said once, and tried again ever more seldom.
     """
-    pause, said = LOOK, ""
+    pause, told = LOOK, ""
     while True:
         fault = ""
         try:
@@ -31,9 +31,9 @@ async def catch_up(asking: Asking, location: Location) -> None:
                 fault = await _caught_up(location)
         except Refusal:
             pass  # all workers are taken, or one was lost: the next look tells
-        if fault and fault != said:
+        if fault and fault != told:
             _log.warning("the graph is behind the database, and cannot catch up: %s", fault)
-        pause, said = (min(2 * pause, LONGEST), fault) if fault else (LOOK, "")
+        pause, told = (min(2 * pause, LONGEST), fault) if fault else (LOOK, "")
         await asyncio.sleep(pause)
 
 

@@ -15,7 +15,7 @@ HEAD = 10.0  # s from a connection's opening, or from its last answer, to the en
 STALL = 30.0  # s in which a client has to take some 50 kB of an answer
 
 
-class Connection(H11Protocol):
+class TimedConnection(H11Protocol):
     """uvicorn's connection, with a limit on what it waits for.
 
     Where there are as many connections as may be, a new one takes the place of one of the client that has most: of the
@@ -72,7 +72,7 @@ class Connection(H11Protocol):
             self._end_head()
 
     def _take_the_place_of_another(self) -> None:
-        others = cast("set[Connection]", self.connections - {self})
+        others = cast("set[TimedConnection]", self.connections - {self})
         try:
             most = gives_way(Counter(other._of for other in others), self._of)
         except Displaced:
@@ -84,7 +84,7 @@ class Connection(H11Protocol):
         elif most != self._of:
             self._end(max(theirs, key=lambda other: other._opened))
 
-    def _end(self, other: Connection) -> None:
+    def _end(self, other: TimedConnection) -> None:
         other.transport.abort()
         self.connections.discard(other)  # now: others may come before its end is told
 

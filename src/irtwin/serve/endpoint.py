@@ -12,9 +12,9 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from irtwin.serve import description, graph_store, negotiation, page
-from irtwin.serve.answer import Answer, Answers
+from irtwin.serve.answer import Replies, Reply
 from irtwin.serve.asking import Asking
-from irtwin.serve.pool import Head, Limits, NotBegun, Pool, Worker
+from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
@@ -34,7 +34,7 @@ class Endpoint:
         self._pool, self._asking = pool, asking
         self._updates = updates
         self._limits = limits
-        self._answers = Answers(_ROOM * limits.answer)
+        self._answers = Replies(_ROOM * limits.answer)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request. A client that leaves ends its query."""
@@ -115,8 +115,8 @@ class Endpoint:
         return description.response(accept, _address(request), named, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
-        said = request.headers
-        await self._updates.do(operation, _address(request), said.get("authorization", ""), said.get("from", ""))
+        headers = request.headers
+        await self._updates.do(operation, _address(request), headers.get("authorization", ""), headers.get("from", ""))
         return Response(status_code=204)
 
     async def _query(self, operation: Operation, request: Request, send: Send) -> None:
@@ -148,7 +148,9 @@ class Endpoint:
                     answer.break_off()
             await sending
 
-    async def _ask(self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float) -> Head:
+    async def _ask(
+        self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float
+    ) -> AnswerHead:
         """Ask a worker; return what is known of the answer."""
         asked = {
             "text": operation.text,
@@ -174,7 +176,7 @@ def refused(refusal: Refusal) -> Response:
     return PlainTextResponse(text, status_code=refusal.status, headers=refusal.headers)
 
 
-async def _send(answer: Answer, head: Head, request: Request, send: Send) -> None:
+async def _send(answer: Reply, head: AnswerHead, request: Request, send: Send) -> None:
     """Send an answer at its client's pace, or that he has it already; one that is broken off is not ended."""
     headers = {"Content-Type": _with_charset(head.media_type), "Vary": "Accept", "Cache-Control": "no-cache"}
     if head.etag is not None:

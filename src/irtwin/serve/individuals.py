@@ -55,15 +55,15 @@ async def respond(asking: Asking, known: Resources, request: Request) -> Respons
 
 
 def _page(iri: str, answers: Answers, base: str, standing: str | None) -> str:
-    found = individual.individual(iri, answers, base)
-    said = {"found": found, "most": individual.MOST_VALUES, "base": base, "graph_stands": standing}
-    return page.render("individual/page.html.jinja", answers, {"individual": iri}, **said)
+    shown = individual.individual(iri, answers, base)
+    values = {"found": shown, "most": individual.MOST_VALUES, "base": base, "graph_stands": standing}
+    return page.render("individual/page.html.jinja", answers, {"individual": iri}, **values)
 
 
 def _iri(request: Request, base: str) -> str:
     """Return the IRI that has the request's path, whose letters beyond ASCII a client writes as percents."""
     raw = request.scope.get("raw_path", b"").decode("ascii", errors="replace").partition("?")[0]
-    path = _NOT_ASCII.sub(lambda found: unquote(found[0]), raw)
+    path = _NOT_ASCII.sub(lambda match: unquote(match[0]), raw)
     above = base if path.startswith(urlsplit(base).path) else ONTOLOGY
     iri = above.removesuffix(urlsplit(above).path) + path
     try:

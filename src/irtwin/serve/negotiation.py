@@ -44,7 +44,7 @@ def best(accept: str, offered: Sequence[str] | Mapping[str, str]) -> str | None:
 
     An empty header takes anything. The quality of a type is that of the range that names it most closely.
     """
-    ranges = [found for part in accept.split(",") if (found := _range(part)) is not None]
+    ranges = [accepted for part in accept.split(",") if (accepted := _range(part)) is not None]
     if not accept.strip():
         return next(iter(offered))
     choice = max(offered, key=lambda media_type: _quality(media_type, ranges), default=None)
@@ -57,7 +57,7 @@ def wants_page(accept: str) -> bool:
 
 
 def _quality(media_type: str, ranges: Sequence[_Range]) -> float:
-    closest = max(ranges, key=lambda found: found.precision(media_type), default=None)
+    closest = max(ranges, key=lambda one: one.precision(media_type), default=None)
     return closest.quality if closest is not None and closest.precision(media_type) else 0.0
 
 

@@ -62,13 +62,13 @@ def _documentation(known: Resources) -> str:
 
 @cache
 def _modules() -> dict[str, Path]:
-    found = {}
+    modules = {}
     for file in sorted(folder("ontology").glob("*.ttl")):
         for triple in read_turtle(file):
             path = _path(triple)
             if path is not None:
-                found[path] = file
-    return found
+                modules[path] = file
+    return modules
 
 
 def _path(triple: Triple) -> str | None:

@@ -64,8 +64,8 @@ def asset(request: Request) -> Response:
 def questions(resources: Resources, base: str, request: Request) -> Response:
     """Return the named questions, the prefixes that they use, and what headings are made of."""
     known = [{"title": q.title, "question": q.question, "text": q.text} for q in named_questions(resources).values()]
-    said = {"prefixes": prefixes(base), "questions": known, "headings": {"units": UNITS, "words": WORDS}}
-    return Response(json.dumps(said), media_type="application/json")
+    values = {"prefixes": prefixes(base), "questions": known, "headings": {"units": UNITS, "words": WORDS}}
+    return Response(json.dumps(values), media_type="application/json")
 
 
 @cache

@@ -16,7 +16,7 @@ from irtwin.errors import InputError
 from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.questions import Answers, Question
+from irtwin.report.questions import Answers, PageQuestion
 from irtwin.serve.asking import Asking, Bindings
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
@@ -58,48 +58,48 @@ class PlantPages:
     async def _plant(self, request: Request) -> Response:
         asked, wrong = self._chosen(request)
         answers = await self._asking.answers(request, asked.of_days(page.questions()), {})
-        said = {**self._beside(request), "number": page_number(request.query_params.get("page")), "asked": asked}
-        said |= {"trouble": wrong} if wrong else {}
+        values = {**self._beside(request), "number": page_number(request.query_params.get("page")), "asked": asked}
+        values |= {"trouble": wrong} if wrong else {}
 
         def drawn() -> str:
-            found = overview.overview(answers, asked)
-            return page.render("page.html.jinja", answers, {}, found=found, reports=self._reports.names(), **said)
+            plant = overview.overview(answers, asked)
+            return page.render("page.html.jinja", answers, {}, found=plant, reports=self._reports.names(), **values)
 
         return await html(drawn)
 
     async def _robot(self, request: Request) -> Response:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
-        said = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
-        said["number"] = page_number(request.query_params.get("page"))
-        shown = {**robot.of_robot(answers, said["zone"]), **said}
+        values = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
+        values["number"] = page_number(request.query_params.get("page"))
+        shown = {**robot.of_robot(answers, values["zone"]), **values}
         return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
 
     async def _run(self, request: Request) -> Response:
         iri = self._individual("run", request.path_params["name"])
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
-        said = self._beside(request) | self._reports.of_robot(self._links.tail(run["robot"]))
-        said["curves"] = curves.of_run(answers)
+        values = self._beside(request) | self._reports.of_robot(self._links.tail(run["robot"]))
+        values["curves"] = curves.of_run(answers)
         return await html(
-            lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **said),
-            WITH_CURVES if said["curves"] else POLICY,
+            lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **values),
+            WITH_CURVES if values["curves"] else POLICY,
         )
 
     async def _compare(self, request: Request) -> Response:
         trouble, drawn = "", None
         try:
-            found, answers = await self._compared(request)
-            drawn = None if found is None else await self._both_logs(request)
+            compared, answers = await self._compared(request)
+            drawn = None if compared is None else await self._both_logs(request)
         except InputError as error:
-            found, trouble = None, str(error)
+            compared, trouble = None, str(error)
             answers = await self._choice(request)
-        said = {**self._beside(request), "curves": drawn}
+        values = {**self._beside(request), "curves": drawn}
         bindings = {"robot": self._individual("robot", request.query_params.get("robot", ""))}
-        said |= {"asked": dict(request.query_params), "query": request.url.query, "found": found}
-        said |= {"trouble": trouble} if trouble else {}
+        values |= {"asked": dict(request.query_params), "query": request.url.query, "found": compared}
+        values |= {"trouble": trouble} if trouble else {}
         policy = WITH_CURVES if drawn else POLICY
-        return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **said), policy)
+        return await html(lambda: page.render("comparison/page.html.jinja", answers, bindings, **values), policy)
 
     async def _robots_table(self, request: Request) -> Response:
         asked, _ = self._chosen(request)
@@ -107,7 +107,7 @@ class PlantPages:
         return await table(request, "robots", lambda: overview.sheet(overview.overview(answers, asked)))
 
     @staticmethod
-    def _chosen(request: Request) -> tuple[choice.Choice, str]:
+    def _chosen(request: Request) -> tuple[choice.Selection, str]:
         """Return what a form asks of the plant, and what is wrong with it: all of it is shown then."""
         try:
             return choice.choice(request.query_params), ""
@@ -132,12 +132,12 @@ class PlantPages:
 
     async def _comparison_table(self, request: Request) -> Response:
         try:
-            found, _ = await self._compared(request)
+            compared, _ = await self._compared(request)
         except InputError as error:
             raise Refusal(400, str(error)) from None
-        if found is None:
+        if compared is None:
             raise Refusal(400, "say both sides: a_from, a_to, b_from and b_to, or by=run, a_run and b_run")
-        return await table(request, "comparison", lambda: comparison.to_sheet(found))
+        return await table(request, "comparison", lambda: comparison.to_sheet(compared))
 
     async def _compared(self, request: Request) -> tuple[comparison.Comparison | None, Answers]:
         """Return what a form asks for, None where it does not say both sides, and all answers. Raises InputError."""
@@ -171,7 +171,7 @@ class PlantPages:
         return await self._known(request, asked, {"robot": iri}, "robot")
 
     async def _known(
-        self, request: Request, asked: Mapping[str, Question], bindings: dict[str, str], about: str
+        self, request: Request, asked: Mapping[str, PageQuestion], bindings: dict[str, str], about: str
     ) -> Answers:
         """Answer questions about an individual; Refusal where the first of them knows nothing of it."""
         answers = await self._asking.answers(request, asked, bindings)

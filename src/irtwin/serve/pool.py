@@ -37,7 +37,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Head:
+class AnswerHead:
     """What is known of an answer before its bytes: media type, how the graph stands (`irtwin.asking`), and its ETag.
 
     An answer has an ETag where all of it was there before its first byte left.
@@ -87,7 +87,7 @@ class Worker:
         """Whether the process is there."""
         return self._process.returncode is None
 
-    async def ask(self, request: dict[str, Any]) -> Head:
+    async def ask(self, request: dict[str, Any]) -> AnswerHead:
         """Send a query; return the head of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
         self.idle = False
         self._write(request)
@@ -101,7 +101,7 @@ class Worker:
         if "status" in head:
             self.idle = True
             raise Refusal(head["status"], head["message"])
-        return Head(**head)
+        return AnswerHead(**head)
 
     async def pieces(self) -> AsyncIterator[bytes]:
         """Give the answer's bytes as they come; Refusal where they end too early."""

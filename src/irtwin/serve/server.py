@@ -30,7 +30,7 @@ from irtwin.location import Location
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
 from irtwin.serve.catching_up import catch_up
-from irtwin.serve.connections import Connection
+from irtwin.serve.connections import TimedConnection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.live_page import LivePages
@@ -76,7 +76,7 @@ def serve(
     )
     config = uvicorn.Config(
         app,
-        http=Connection,
+        http=TimedConnection,
         log_level="error",
         access_log=False,
         server_header=False,

@@ -20,12 +20,12 @@ def client(request: Request) -> str:
 def client_of(address: str) -> str:
     """Return the client that an address is of: an IPv6 network of 64 bits is one, as a machine may use all of it."""
     try:
-        found = ipaddress.ip_address(address.partition("%")[0])
+        client = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:
         return address  # what a proxy says of its client
-    if isinstance(found, ipaddress.IPv4Address):
-        return str(found)
-    return str(found.ipv4_mapped or ipaddress.ip_network((found, 64), strict=False))
+    if isinstance(client, ipaddress.IPv4Address):
+        return str(client)
+    return str(client.ipv4_mapped or ipaddress.ip_network((client, 64), strict=False))
 
 
 def gives_way(taken: Mapping[str, int], client: str) -> str:

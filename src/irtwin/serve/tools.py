@@ -11,11 +11,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from functools import wraps
+from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
-from irtwin import __version__
 from irtwin.errors import InputError
 from irtwin.location import Location
 
@@ -40,12 +40,12 @@ def server(location: Location, seconds: float) -> MCPServer[Any]:
         from mcp.types import ToolAnnotations
     except ModuleNotFoundError as error:
         raise InputError("--mcp needs the package mcp; install irtwin[mcp]") from error
-    found = MCPServer("irtwin", instructions=_ABOUT, version=__version__, log_level="WARNING")
+    offered = MCPServer("irtwin", instructions=_ABOUT, version=version("irtwin"), log_level="WARNING")
     calls = _Calls(location, seconds)
     for tool in (calls.questions, calls.ask, calls.explain, calls.diagnose, calls.predict):
         reads = ToolAnnotations(read_only_hint=True, open_world_hint=False)
-        found.tool(annotations=reads)(_refusing(tool, ToolError))
-    return found
+        offered.tool(annotations=reads)(_refusing(tool, ToolError))
+    return offered
 
 
 def _refusing(tool: Callable[..., Any], refusal: type[Exception]) -> Callable[..., Any]:
@@ -98,8 +98,8 @@ class _Calls:
         with TemporaryDirectory() as folder:
             out = Path(folder) / "predicted.parquet"
             command = ["predict", "--quiet", f"--out={out}", "--", str(self._inside(twin)), str(self._inside(motion))]
-            said = self._said(command, self._seconds * _LONGER)
-        return self._told(said.stdout.removeprefix(f"{out}: ").strip(), command, said.stderr)
+            done = self._said(command, self._seconds * _LONGER)
+        return self._told(done.stdout.removeprefix(f"{out}: ").strip(), command, done.stderr)
 
     def _inside(self, path: str) -> Path:
         file = (self._folder / path).resolve()
@@ -108,13 +108,13 @@ class _Calls:
         return file
 
     def _answer(self, command: Sequence[str]) -> dict[str, Any]:
-        said = self._said(command, self._seconds)
-        return self._told(json.loads(said.stdout), command, said.stderr)
+        done = self._said(command, self._seconds)
+        return self._told(json.loads(done.stdout), command, done.stderr)
 
     def _said(self, command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
         """Return what a command said; InputError with what it refused, or where it takes too long."""
         try:
-            said = subprocess.run(
+            done = subprocess.run(
                 [sys.executable, "-m", "irtwin", *command],
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
@@ -124,10 +124,15 @@ class _Calls:
             )
         except subprocess.TimeoutExpired as error:
             raise InputError(f"not answered within {seconds:g} s; ask for less, or give --timeout") from error
-        if said.returncode:
-            raise InputError(said.stderr.strip() or f"ended with status {said.returncode}")
-        return said
+        if done.returncode:
+            raise InputError(done.stderr.strip() or f"ended with status {done.returncode}")
+        return done
 
     def _told(self, answer: object, command: Sequence[str], notes: str) -> dict[str, Any]:
         """Return an answer with what it is from: the command that gives it again, and what was said beside it."""
-        return {"answer": answer, "by": " ".join(["irtwin", *command]), "version": __version__, "notes": notes.strip()}
+        return {
+            "answer": answer,
+            "by": " ".join(["irtwin", *command]),
+            "version": version("irtwin"),
+            "notes": notes.strip(),
+        }

@@ -90,5 +90,5 @@ class Updates:
 
 def _named(author: str) -> str:
     """Return who asserts, as the request says, on one line."""
-    said = "".join(letter for letter in author if letter.isprintable()).strip()
-    return said[:_LONGEST_NAME] or NOBODY
+    readable = "".join(letter for letter in author if letter.isprintable()).strip()
+    return readable[:_LONGEST_NAME] or NOBODY

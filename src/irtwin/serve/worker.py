@@ -26,7 +26,7 @@ from irtwin.limits import limit_memory, limit_processor_time
 from irtwin.location import Location
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import needs_network, reading
+from irtwin.serve.source import reading
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
@@ -82,7 +82,7 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
     """Answer queries until standard input ends; bytes of memory and seconds for each."""
     out = sys.stdout.buffer
     location = Location.told(json.loads(sys.stdin.buffer.readline()))
-    if not needs_network(location):
+    if location.graph_url is None:
         leave_network()
     with reading(location) as current:
         limit_memory(memory)
@@ -117,18 +117,18 @@ def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) ->
 
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
-    found = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
-    offered = negotiation.SOLUTIONS if isinstance(found, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
+    answer = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
+    offered = negotiation.SOLUTIONS if isinstance(answer, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
     media_type = negotiation.best(request["accept"], offered)
     if media_type is None:
         raise Refusal(406, f"this answer comes as {', '.join(offered)}; none of them is in Accept")
     sink.media_type = media_type
     name = offered[media_type]
     file = cast(IO[bytes], sink)
-    if isinstance(found, QuerySolutions | QueryBoolean):
-        found.serialize(file, format=_RESULTS[name])
+    if isinstance(answer, QuerySolutions | QueryBoolean):
+        answer.serialize(file, format=_RESULTS[name])
     else:
-        serialize(found, file, format=_RDF[name], prefixes=graph.prefixes)
+        serialize(answer, file, format=_RDF[name], prefixes=graph.prefixes)
     sink.end()
 
 

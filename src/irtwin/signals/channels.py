@@ -131,14 +131,14 @@ def from_columns(columns: Mapping[str, Samples], joints: Iterable[str]) -> Signa
     KeyError, with its name, where a column is absent of a channel that has others, or of time or the positions.
     """
     names = tuple(joints)
-    found: dict[str, Samples] = {}
+    samples: dict[str, Samples] = {}
     for field, channel in CHANNELS.items():
         own = channel.columns(names)
         if field in REQUIRED or any(name in columns for name in own):
             parts = [columns[name] for name in own]
             nothing = np.empty((len(columns["time"]), 0))  # of a robot whose joints nobody logged
-            found[field] = np.column_stack([nothing, *parts]) if channel.per_joint else parts[0]
-    return Signals(**found)
+            samples[field] = np.column_stack([nothing, *parts]) if channel.per_joint else parts[0]
+    return Signals(**samples)
 
 
 def csv_text(motion: Signals, joint_names: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, from_table
 from irtwin.robot.denavit_hartenberg import Table as DhTable
 from irtwin.robot.description import Robot
-from irtwin.signals.toml_file import Table, shown
+from irtwin.signals.toml_file import TomlTable, shown
 
 DH_KEYS = ("convention", "base", "tool", "row")
 ROW_KEYS = (
@@ -36,17 +36,17 @@ _FARTHEST = 1e3  # m, or rad
 _MOST_ROWS = 100
 
 
-def robot_of_table(name: str, robot: Table) -> Robot:
+def robot_of_table(name: str, robot: TomlTable) -> Robot:
     """Make the robot of the key `dh` of [robot]. Raises InputError, naming file, table and key, on what is wrong."""
     values = robot.values["dh"]
     if not isinstance(values, dict):
         raise InputError(f"{robot.file}: [robot.dh] should be a table, with convention and [[robot.dh.row]]")
-    table = Table(robot.file, "[robot.dh]", values)
+    table = TomlTable(robot.file, "[robot.dh]", values)
     table.check_keys(DH_KEYS)
     convention = table.text("convention")
     if convention not in CONVENTIONS:
-        said = "is missing" if convention is None else f'= "{convention}"'
-        raise InputError(f"{robot.file}: [robot.dh] convention {said}; use {' or '.join(CONVENTIONS)} (Craig's)")
+        given = "is missing" if convention is None else f'= "{convention}"'
+        raise InputError(f"{robot.file}: [robot.dh] convention {given}; use {' or '.join(CONVENTIONS)} (Craig's)")
     rows = values.get("row")
     if not isinstance(rows, list) or not rows:
         raise InputError(f"{robot.file}: [[robot.dh.row]] is missing; give one for each joint, base to flange")
@@ -60,10 +60,10 @@ def robot_of_table(name: str, robot: Table) -> Robot:
     return from_table(name, described)
 
 
-def _row(robot: Table, number: int, values: Any) -> Row:
+def _row(robot: TomlTable, number: int, values: Any) -> Row:
     if not isinstance(values, dict):
         raise InputError(f"{robot.file}: [[robot.dh.row]] {number} should be a table, not {shown(values)}")
-    table = Table(robot.file, f"[[robot.dh.row]] {number}", values)
+    table = TomlTable(robot.file, f"[[robot.dh.row]] {number}", values)
     table.check_keys(ROW_KEYS)
     kind = table.text("type", "revolute") or ""
     if kind not in _TYPES:
@@ -92,7 +92,7 @@ def _row(robot: Table, number: int, values: Any) -> Row:
     return row
 
 
-def _limits(table: Table, kind: str) -> tuple[float, float]:
+def _limits(table: TomlTable, kind: str) -> tuple[float, float]:
     lower, upper = table.number("lower"), table.number("upper")
     if kind == "continuous":
         if lower is not None or upper is not None:
@@ -107,7 +107,7 @@ def _limits(table: Table, kind: str) -> tuple[float, float]:
     return lower, upper
 
 
-def _within(table: Table, key: str) -> float:
+def _within(table: TomlTable, key: str) -> float:
     """Return a length or an angle: 0 where it is absent, refused where no robot has it, as degrees or millimetres."""
     value = table.number(key) or 0.0
     angle = key in ("alpha", "theta")
@@ -117,7 +117,7 @@ def _within(table: Table, key: str) -> float:
     return value
 
 
-def _placement(table: Table, key: str) -> np.ndarray:
+def _placement(table: TomlTable, key: str) -> np.ndarray:
     """Return the (4, 4) transform of six numbers x, y, z, roll, pitch, yaw; the identity where they are absent."""
     six = _numbers(table, key, 6, "x, y, z in m and roll, pitch, yaw in rad")
     if six is None:
@@ -125,12 +125,12 @@ def _placement(table: Table, key: str) -> np.ndarray:
     return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(np.array(six[3:])), np.array(six[:3])).homogeneous)
 
 
-def _numbers(table: Table, key: str, count: int, meaning: str) -> Any:
+def _numbers(table: TomlTable, key: str, count: int, meaning: str) -> Any:
     """Return a tuple of so many numbers; None where the key is absent."""
     value = table.values.get(key)
     if value is None:
         return None
     if not (isinstance(value, list) and len(value) == count):
         raise InputError(f"{table.file}: {table.name} {key} should be {count} numbers ({meaning}), not {shown(value)}")
-    parts = (Table(table.file, f"{table.name} {key}", {"part": part}).number("part") for part in value)
+    parts = (TomlTable(table.file, f"{table.name} {key}", {"part": part}).number("part") for part in value)
     return tuple(0.0 if part is None else part for part in parts)

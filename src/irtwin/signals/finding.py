@@ -8,7 +8,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Finding:
+class LogFinding:
     """One fault of a log.
 
     fault: its kind, "sign", "swap", "unit", ...; channel: the column as in the log, "a <-> b" for two that are swapped,

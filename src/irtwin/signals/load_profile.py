@@ -19,7 +19,7 @@ _REPEATS = 0.5  # correlation of power with itself a cycle later
 
 
 @dataclass(frozen=True)
-class State:
+class LoadState:
     """A state of the supply: how long it lasted in all, s, and its mean power, W."""
 
     name: str
@@ -41,7 +41,7 @@ class LoadProfile:
     """A run by its power; `standby`: W, None where no lower level was found; `standing`: (N,) at standby or off."""
 
     energy: float  # J
-    states: tuple[State, ...]
+    states: tuple[LoadState, ...]
     standby: float | None
     cycles: Cycles | None
     standing: np.ndarray
@@ -59,7 +59,7 @@ def load_profile(time: Samples, power: Samples) -> LoadProfile:
     share = np.gradient(time)  # s that each sample stands for
     share *= (time[-1] - time[0]) / share.sum()
     states = tuple(
-        State(name, float(share[mask].sum()), float(np.average(power[mask], weights=share[mask])))
+        LoadState(name, float(share[mask].sum()), float(np.average(power[mask], weights=share[mask])))
         for number, name in enumerate((OFF, STANDBY, WORKING))
         if (mask := levels == number).any()
     )
@@ -137,10 +137,10 @@ def _repeating(time: Samples, power: Samples, spent: Samples) -> Cycles | None:
     size = 1 << (2 * count - 1).bit_length()
     centred = np.interp(even, time, power)
     centred -= centred.mean()
-    found = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2)[: count // _FEWEST + 1]
-    if found[0] <= 0:
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2)[: count // _FEWEST + 1]
+    if correlation[0] <= 0:
         return None
-    same = found / found[0] * count / (count - np.arange(len(found)))
+    same = correlation / correlation[0] * count / (count - np.arange(len(correlation)))
     below = np.flatnonzero(same < 0)
     if len(below) == 0:
         return None

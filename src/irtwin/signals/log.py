@@ -14,11 +14,11 @@ from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.dh_table import robot_of_table
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled, checked_cutoff, holes
 from irtwin.signals.sources.bag_source import number_topics
-from irtwin.signals.toml_file import Table, shown, take
+from irtwin.signals.toml_file import TomlTable, shown, take
 from irtwin.toml_text import read_toml
 
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
@@ -91,7 +91,7 @@ class DataSet:
     simulated: bool
     notes: Mapping[str, Any]
     repairs: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[LogFinding, ...] = ()
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
     plans: tuple[Run, ...] = ()
     torque_scale_uncertainty: float | None = None  # share by which logged torque may be off, 95 %
@@ -113,13 +113,13 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     folder = Path(folder)
     file = folder / "dataset.toml"
     document = _document(file)
-    table = Table(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
+    table = TomlTable(file, "[robot]", take(document, "robot", dict, file, "[robot]"))
     robot = _robot(folder, table)
     repairs = [f"{file}: {_held(robot)}"] if robot.held else []
     repairs += [
         f"{file}: [robot] {key} is kept as a note; did you mean {near}?" for key, near in table.near_misses(ROBOT_KEYS)
     ]
-    findings: list[Finding] = []
+    findings: list[LogFinding] = []
     topics = _topics(file, document, robot)
     listed = _resolved(list(_runs(folder, file, document, robot, repair, commanded, repairs, findings, topics)), file)
     runs = tuple(run for run in listed if run.role != PLANNED)
@@ -128,7 +128,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     power_at = table.text("power_at")
     if power_at is not None and power_at not in _POWER_AT:
         raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
-    Table(file, "", document).check_keys(DATA_SET_KEYS)
+    TomlTable(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
     twin = _optional(file, document, "twin", TWIN_KEYS)
     effects = twin.values.get("effects")
@@ -235,14 +235,14 @@ def topics_told(file: Path, robot: Robot) -> dict[str, str]:
     return {}
 
 
-def _listing(file: Path) -> Iterator[tuple[dict[str, Any], Table]]:
+def _listing(file: Path) -> Iterator[tuple[dict[str, Any], TomlTable]]:
     """Yield the data sets around a run that list it, each with the run's table."""
     for folder in list(file.absolute().parents)[:2]:
         toml = folder / "dataset.toml"
         document = read_toml(toml) if toml.is_file() else {}
         runs = document.get("run")
         for number, values in enumerate(runs if isinstance(runs, list) else [], start=1):
-            table = Table(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
+            table = TomlTable(toml, f"[[run]] {number}", values if isinstance(values, dict) else {})
             named = table.text("file")
             if named is not None and real_path(folder / named) == real_path(file):
                 yield document, table
@@ -253,10 +253,10 @@ def read_robot(source: Path) -> Robot:
     file = source / "dataset.toml" if source.is_dir() else source
     if file.suffix != ".toml":
         return read_urdf(file)
-    return _robot(file.parent, Table(file, "[robot]", take(_document(file), "robot", dict, file, "[robot]")))
+    return _robot(file.parent, TomlTable(file, "[robot]", take(_document(file), "robot", dict, file, "[robot]")))
 
 
-def _robot(folder: Path, table: Table) -> Robot:
+def _robot(folder: Path, table: TomlTable) -> Robot:
     name = table.text("name")
     if name is None:
         raise InputError(f"{table.file}: [robot] name is missing")
@@ -284,7 +284,7 @@ def _robot(folder: Path, table: Table) -> Robot:
         values = sheets.get(joint.name, {})
         if not isinstance(values, dict):
             raise InputError(f"{table.file}: [robot.joint.{joint.name}] should be a table")
-        sheet = Table(table.file, f"[robot.joint.{joint.name}]", values)
+        sheet = TomlTable(table.file, f"[robot.joint.{joint.name}]", values)
         sheet.check_keys(SHEET_KEYS)
         given: dict[str, Any] = {key: sheet.number(key, least=0.0) for key in SHEET_KEYS}
         joints.append(replace(joint, **given))
@@ -298,11 +298,11 @@ def _robot(folder: Path, table: Table) -> Robot:
     )
 
 
-def _metered(name: str, table: Table) -> Robot:
+def _metered(name: str, table: TomlTable) -> Robot:
     """Return a robot of which a meter's power is all that was logged. Raises InputError where joints are said too."""
-    said = [key for key in ("urdf", "dh", "joint") if key in table.values]
-    if table.values["joints"] != [] or said:
-        wrong = f"and {said[0]}" if said else f"= {shown(table.values['joints'])}"
+    given = [key for key in ("urdf", "dh", "joint") if key in table.values]
+    if table.values["joints"] != [] or given:
+        wrong = f"and {given[0]}" if given else f"= {shown(table.values['joints'])}"
         raise InputError(
             f"{table.file}: [robot] joints {wrong}: joints = [] alone says that no joint was logged, of a meter; "
             "else describe the robot by urdf or dh"
@@ -321,11 +321,11 @@ def _runs(
     repair: bool,
     commanded: bool,
     repairs: list[str],
-    findings: list[Finding],
+    findings: list[LogFinding],
     topics: Mapping[str, str],
 ) -> Iterator[Run]:
     for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
-        table = Table(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
+        table = TomlTable(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
         table.check_notes(RUN_KEYS)
         path = table.path("file", folder)
         role = table.text("role", "observed") or ""
@@ -363,7 +363,7 @@ def _runs(
         yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
 
 
-def _made(table: Table, role: str) -> dict[str, Any]:
+def _made(table: TomlTable, role: str) -> dict[str, Any]:
     """Return what a run made. Raises InputError where a number is none of whole things, or the run is a plan."""
     made: dict[str, Any] = {"product": table.text("product")}
     for key in ("pieces", "cycles"):
@@ -375,13 +375,13 @@ def _made(table: Table, role: str) -> dict[str, Any]:
                 f"{table.file}: {table.name} {key} should be a whole number of 1 or more, not {shown(count)}"
             )
         made[key] = count
-    said = [key for key, value in made.items() if value is not None]
-    if said and role == PLANNED:
-        raise InputError(f"{table.file}: {table.name} is planned; {said[0]} is of a run that was carried out")
+    given = [key for key, value in made.items() if value is not None]
+    if given and role == PLANNED:
+        raise InputError(f"{table.file}: {table.name} is planned; {given[0]} is of a run that was carried out")
     return made
 
 
-def _torque_scale(table: Table) -> float | None:
+def _torque_scale(table: TomlTable) -> float | None:
     share = table.number("torque_scale_uncertainty", least=0.0)
     if share is not None and share >= 1:
         raise InputError(
@@ -396,19 +396,19 @@ def _topics(file: Path, document: Mapping[str, Any], robot: Robot) -> dict[str, 
     return {key: table.text(key) or "" for key in table.values}
 
 
-def _optional(file: Path, document: Mapping[str, Any], name: str, keys: Sequence[str]) -> Table:
+def _optional(file: Path, document: Mapping[str, Any], name: str, keys: Sequence[str]) -> TomlTable:
     values = document.get(name, {})
     if not isinstance(values, dict):
         raise InputError(f"{file}: [{name}] should be a table")
-    table = Table(file, f"[{name}]", values)
+    table = TomlTable(file, f"[{name}]", values)
     table.check_keys(keys)
     return table
 
 
-def _cutoff(table: Table, runs: Sequence[Run]) -> float | None:
+def _cutoff(table: TomlTable, runs: Sequence[Run]) -> float | None:
     cutoff = table.number("cutoff")
-    said = f"{table.file}: {table.name} cutoff"
-    return None if cutoff is None else checked_cutoff(cutoff, [run.signals for run in runs], said)
+    where = f"{table.file}: {table.name} cutoff"
+    return None if cutoff is None else checked_cutoff(cutoff, [run.signals for run in runs], where)
 
 
 def _piece(run: Run, number: int, signals: Signals) -> Run:
@@ -422,15 +422,17 @@ def _piece(run: Run, number: int, signals: Signals) -> Run:
     )
 
 
-def _centre(table: Table) -> tuple[float, float, float]:
+def _centre(table: TomlTable) -> tuple[float, float, float]:
     value = table.values.get("payload_com", [0.0, 0.0, 0.0])
     if not (isinstance(value, list) and len(value) == 3):
         raise InputError(f"{table.file}: {table.name} payload_com should be three numbers in m")
-    x, y, z = (Table(table.file, f"{table.name} payload_com", {"part": part}).number("part") or 0.0 for part in value)
+    x, y, z = (
+        TomlTable(table.file, f"{table.name} payload_com", {"part": part}).number("part") or 0.0 for part in value
+    )
     return x, y, z
 
 
-def _started(table: Table) -> datetime | None:
+def _started(table: TomlTable) -> datetime | None:
     value = table.values.get("started")
     if value is None:
         return None

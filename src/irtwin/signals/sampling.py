@@ -12,7 +12,7 @@ import scipy
 from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.filter import FEWEST_PERIODS
-from irtwin.signals.finding import Finding
+from irtwin.signals.finding import LogFinding
 from irtwin.signals.holes import HOLE
 from irtwin.signals.samples import FEWEST
 
@@ -28,16 +28,16 @@ def interval(time: np.ndarray) -> float:
     return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
 
 
-def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Finding]]:
+def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[LogFinding]]:
     """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
 
     Held positions: one sample of each update stays. A piece of fewer than 20 samples is left out. A run that has
     neither comes back as it is. Raises InputError where no piece is left, or there are more than 100.
     """
-    signals, said = _without_held(signals, path)
+    signals, note = _without_held(signals, path)
     pieces = _cut(signals)
     if len(pieces) == 1:
-        return pieces, said
+        return pieces, note
     long = [piece for piece in pieces if len(piece.time) >= FEWEST]
     first = f"from {pieces[0].time[-1]:.12g} s to {pieces[1].time[0]:.12g} s"
     if not 0 < len(long) <= _MOST_PIECES:
@@ -49,9 +49,9 @@ def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[Findin
     left_out = sum(len(piece.time) for piece in pieces if len(piece.time) < FEWEST)
     dropped = f"; {left_out} samples left out, in pieces of fewer than {FEWEST}" if left_out else ""
     taken = "one run" if len(long) == 1 else f"{len(long)} runs"
-    found = f"{path}: no samples {first}{others}; taken as {taken}{dropped}"
+    message = f"{path}: no samples {first}{others}; taken as {taken}{dropped}"
     evidence = {"holes": float(len(pieces) - 1), "left_out": float(left_out)}
-    return long, [*said, Finding("hole", "time", (path.stem,), True, True, evidence, found)]
+    return long, [*note, LogFinding("hole", "time", (path.stem,), True, True, evidence, message)]
 
 
 def interpolated(time: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -80,15 +80,15 @@ def _cut(signals: Signals) -> list[Signals]:
     return done
 
 
-def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[Finding]]:
+def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[LogFinding]]:
     step = _hold(signals.q)
     if step is None:
         return signals, []
     rows = _updates(signals.q, step)
     logged, true = 1 / interval(signals.time), 1 / interval(signals.time[rows])
-    said = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
+    note = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
     evidence = {"logged_hz": logged, "true_hz": true}
-    return signals.rows(rows), [Finding("held_samples", "q", (path.stem,), True, True, evidence, said)]
+    return signals.rows(rows), [LogFinding("held_samples", "q", (path.stem,), True, True, evidence, note)]
 
 
 def _hold(q: np.ndarray) -> int | None:

@@ -17,7 +17,7 @@ _NEAR, _VERY_NEAR = 0.7, 0.8  # share of letters in common of a key and its miss
 
 
 @dataclass(frozen=True)
-class Table:
+class TomlTable:
     """A TOML table whose faults name it."""
 
     file: Path

@@ -88,15 +88,15 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
     foreign = InputError(f"{archive}: not an irtwin backup; make one with `irtwin workspace backup FILE`")
     if manifest is None or manifest.file_size > _MOST_MANIFEST:
         raise foreign
-    said = parse_json(source.read(manifest))
-    if not isinstance(said, dict) or said.get("format") != _FORMAT["format"]:
+    content = parse_json(source.read(manifest))
+    if not isinstance(content, dict) or content.get("format") != _FORMAT["format"]:
         raise foreign
-    if said.get("version") != _FORMAT["version"]:
+    if content.get("version") != _FORMAT["version"]:
         raise InputError(
-            f"{archive}: made by another irtwin version ({said.get('software')}); restore it with that one"
+            f"{archive}: made by another irtwin version ({content.get('software')}); restore it with that one"
         )
     try:
-        listed = {str(name): (str(one["sha256"]), one["size"]) for name, one in said["files"].items()}
+        listed = {str(name): (str(one["sha256"]), one["size"]) for name, one in content["files"].items()}
     except (AttributeError, KeyError, TypeError):
         raise foreign from None
     agree = len(source.infolist()) == len(listed) + 1 and set(entries) == set(listed)

@@ -29,7 +29,7 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
     it did not know of that.
     """
     by_key = {(row.__tablename__, _key(row)): row for row in rows}
-    said: dict[tuple[str, str], str] = {}
+    values: dict[tuple[str, str], str] = {}
     for fact in facts:
         row = by_key.get((fact.table.name, _key(fact)))
         if row is None:
@@ -39,10 +39,10 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
         by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
         if now == fact.replaced:
             setattr(row, fact.column.name, value_of(fact.column, fact.value))
-            said[str(fact.place), _key(fact)] = f"{what}: {fact.value}, as {by}; the data set says {fact.replaced}"
+            values[str(fact.place), _key(fact)] = f"{what}: {fact.value}, as {by}; the data set says {fact.replaced}"
         elif now != fact.value:
-            said[str(fact.place), _key(fact)] = f"{what}: the data set says {now} now; what {by} no longer holds"
-    return list(said.values())
+            values[str(fact.place), _key(fact)] = f"{what}: the data set says {now} now; what {by} no longer holds"
+    return list(values.values())
 
 
 def _key(of: Base) -> str:
@@ -81,8 +81,8 @@ def row_of(session: Session, fact: AssertedFact) -> Base | None:
 def facts_about(session: Session, robot_id: str) -> list[AssertedFact]:
     """Return the facts that rows of a robot follow, the earliest first."""
     of_robot = AssertedFact.about_robot == robot_id
-    found = select(AssertedFact).where(of_robot, AssertedFact.place.is_not(None)).order_by(AssertedFact.time)
-    return list(session.scalars(found))
+    query = select(AssertedFact).where(of_robot, AssertedFact.place.is_not(None)).order_by(AssertedFact.time)
+    return list(session.scalars(query))
 
 
 def is_newer_than_twin(session: Session, robot_id: str, facts: Sequence[AssertedFact]) -> bool:

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.location import Location
 from irtwin.resources import Resources, resources_of
-from irtwin.storage import asserted, base_iri, engine, files, series_place, tariff
+from irtwin.storage import asserted, base_iri, engine, files, tariff
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
 from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
 from irtwin.storage.asserted_schema import AssertedFact
@@ -54,7 +54,6 @@ from irtwin.storage.schema import (
     relation_to,
 )
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
-from irtwin.storage.series_place import elsewhere
 from irtwin.storage.structure_schema import LinkShape
 
 Outcome = Literal["new", "unchanged", "replaced"]
@@ -73,8 +72,6 @@ _OWN = (*_FOLDERS, _DATABASE, LIVE, "graph", "reports", "alarms", "next_experime
 class Workspace:
     """A folder: `irtwin.db` (or a database elsewhere, by URL), `series/`, `twins/`, `meshes/`, `graph/` and `reports/`.
 
-    What would be in `series/` is in object storage where the workspace was told so (`series_place`).
-
     Every change is one transaction: files are written first, under the database's lock, rows that name
     them are committed last, and files that no row names are removed afterwards.
     """
@@ -85,18 +82,14 @@ class Workspace:
         url: str | None = None,
         resources: Resources | None = None,
         base: str | None = None,
-        series_url: str | None = None,
         graph_url: str | None = None,
     ) -> None:
         """Open a workspace, or make one. Raises InputError where the database cannot be opened.
 
         `resources` are those that hold for it; its own and those of installed packages if None. `base` is what the IRIs
-        of its individuals begin with, else what `plant.toml` says; it stays once a robot is there. `series_url` says
-        which object storage is to hold the series; it is remembered, and stays once there are any. `graph_url` is that
-        of the SPARQL server that keeps the graph, if not the folder does.
+        of its individuals begin with, else what `plant.toml` says; it stays once a robot is there. `graph_url`
+        is that of the SPARQL server that keeps the graph, if not the folder does.
         """
-        if series_url is not None:
-            series_place.look(series_url)
         self.location, self.folder = Location(folder, url, graph_url), folder
         self.resources = resources or resources_of(folder)
         try:
@@ -112,18 +105,12 @@ class Workspace:
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
         size = engine.check(self.engine)
-        tables = {*Base.metadata.tables, VERSION_TABLE}
-        engine.check_schema(self.engine, tables, is_current=False)
+        engine.check_schema(self.engine, {*Base.metadata.tables, VERSION_TABLE})
         self._make_tables()
-        engine.check_schema(self.engine, tables, is_current=True)
         if size <= _MOST_OF_ROWS:  # whoever wrote them: the folder may come from elsewhere
             with self.engine.connect() as connection:
                 check_rows(connection, engine.shown(self.engine.url))
         self.base = self._base(base)
-        if series_url is not None:
-            with self.reading() as session:
-                has_series = session.scalars(select(Series.series_id).limit(1)).first() is not None
-            series_place.choose(folder, series_url, has_series)
 
     @classmethod
     def is_there(cls, where: Location | Path) -> bool:
@@ -133,9 +120,9 @@ class Workspace:
         return location.database is not None or file.is_file() or file.is_symlink()  # opening says where a link leads
 
     @classmethod
-    def at(cls, location: Location, base: str | None = None, series_url: str | None = None) -> Self:
+    def at(cls, location: Location, base: str | None = None) -> Self:
         """Open a workspace, or make one, with its database and graph where a location says."""
-        return cls(location.folder, location.database, None, base, series_url, location.graph_url)
+        return cls(location.folder, location.database, None, base, location.graph_url)
 
     @classmethod
     def existing(cls, where: Location | Path) -> Self:
@@ -301,12 +288,12 @@ class Workspace:
     def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
         """Read a run's samples, or some columns of them. Raises InputError where there are none."""
         with self.reading() as session:
-            found = session.execute(
+            row = session.execute(
                 select(Series.path, Series.series_id).where(Series.run_id == run_id, Series.kind == kind)
             ).first()
-        if found is None:
+        if row is None:
             raise InputError(f"{self.folder}: run {run_id} has no {kind} series; ingest its data set first")
-        return read_series(self.folder, found.path, found.series_id, columns)
+        return read_series(self.folder, row.path, row.series_id, columns)
 
     def read_file(self, path: str, checksum: str) -> pa.Table:
         """Read a series by the path and checksum that the graph says of it. Raises InputError as `read_series`."""
@@ -323,9 +310,6 @@ class Workspace:
             for file in (file for folder in _FOLDERS for file in self._files(folder)):
                 if file.relative_to(self.folder).as_posix() not in named:
                     file.unlink()
-            storage = elsewhere(self.folder)
-            if storage is not None:
-                storage.remove(storage.paths(FOLDER) - named)
 
     def close(self) -> None:
         """Give the database's connections back."""
@@ -368,8 +352,10 @@ class Workspace:
         runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_not(None)))
         stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
         for table in part_tables():
-            found = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
-            stored |= {(table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in found}
+            rows_kept = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
+            stored |= {
+                (table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in rows_kept
+            }
         measured = select(Series.path, Series.series_id).join(Run)
         measured = measured.where(Run.robot_id == robot_id, Series.kind != MODELLED)
         named = [(row.path, row.series_id) for row in session.execute(measured)]
@@ -446,8 +432,6 @@ def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missi
     """Raise InputError where files lie in a workspace that only a database could have named."""
     if what.startswith(_DATABASE) and (folder / _DATABASE).exists():
         return
-    if series_place.are_elsewhere(folder):
-        raise InputError(f"{folder}: {what}, though {series_place.FILE} names series; {_FROM_A_BACKUP}")
     for name in ("graph", *_FOLDERS):
         if next((folder / name).glob("[!.]*"), None) is not None:
             raise InputError(f"{folder}: {what}, though {name}/ is full; {_FROM_A_BACKUP}")

@@ -19,7 +19,6 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage.read_only import connecting, may_only_be_read
 
 _LONGEST_VALUE = 100_000_000  # bytes of one text or blob in SQLite, so that no query fills the memory by one
-TRIGGERS = "irtwin_"  # what the names of an older irtwin's begin with: migration drops them
 MOST_LOOKED_THROUGH = 100_000_000  # bytes of an SQLite database at opening: some 0.2 s
 _DAMAGE = ("malformed", "not a database")
 _NO_UTF8 = ("ould not decode to UTF-8", "codec can't decode")  # SQLite's words of a value, Python's of a name
@@ -194,17 +193,16 @@ def check(engine: Engine, most_bytes: float = MOST_LOOKED_THROUGH) -> float:
         ).scalar_one()
         if size > most_bytes:
             return float(size)
-        found = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
-    if found != "ok":
-        raise WorkspaceFault(_damaged(engine.url, " ".join(str(found).split())))
+        answer = connection.exec_driver_sql("PRAGMA quick_check(1)").scalar()
+    if answer != "ok":
+        raise WorkspaceFault(_damaged(engine.url, " ".join(str(answer).split())))
     return float(size)
 
 
-def check_schema(engine: Engine, tables: Container[str], *, is_current: bool) -> None:
+def check_schema(engine: Engine, tables: Container[str]) -> None:
     """Raise WorkspaceFault where an SQLite database has a view in place of a table, or another's trigger on one.
 
-    Each is a query of somebody else's, which runs whenever the table is read or written, and may never end. Before it
-    `is_current`, triggers that are called as an older irtwin's may be there.
+    Each is a query of somebody else's, which runs whenever the table is read or written, and may never end.
     """
     if engine.dialect.name != "sqlite":
         return
@@ -213,8 +211,7 @@ def check_schema(engine: Engine, tables: Container[str], *, is_current: bool) ->
             "SELECT type, name, tbl_name FROM sqlite_master WHERE type IN ('view', 'trigger')"
         ).all()
     for kind, name, table in found:
-        is_old = kind == "trigger" and name.startswith(TRIGGERS) and not is_current
-        if table in tables and not is_old:
+        if table in tables:
             raise WorkspaceFault(
                 f"{engine.url.database}: holds the {kind} {name!r}, which irtwin did not make; drop it, or restore a "
                 "backup by `irtwin workspace restore ARCHIVE --workspace NEW`"
@@ -241,7 +238,9 @@ def _tell_of_server(url: URL, context: ExceptionContext) -> None:
     """Raise WorkspaceFault for what those who run a PostgreSQL server can mend."""
     error = context.original_exception
     state = str(getattr(error, "sqlstate", None) or "")
-    what = next((f"{said}; nothing was changed" for code, said in _OF_SERVER.items() if state.startswith(code)), None)
+    what = next(
+        (f"{meaning}; nothing was changed" for code, meaning in _OF_SERVER.items() if state.startswith(code)), None
+    )
     if context.is_disconnect and context.connection is not None:
         what = "the connection to the database was lost; do it again"
     if what is not None:

@@ -70,7 +70,7 @@ CLASSES = {table.name: _class(table) for table in TABLES if table is not DOCUMEN
 
 def __getattr__(name: str) -> Any:
     """Return the class of a table by its name."""
-    found = next((one for one in CLASSES.values() if one.__name__ == name), None)
-    if found is None:
+    kind = next((one for one in CLASSES.values() if one.__name__ == name), None)
+    if kind is None:
         raise AttributeError(f"no table of a diagnosis has the class {name}")
-    return found
+    return kind

@@ -69,8 +69,8 @@ class Journal:
 def read_journal(path: Path) -> tuple[Header, Rows]:
     """Read a journal; of a batch that a crash cut off, the whole rows before the cut. ValueError if it is none."""
     content = path.read_bytes()
-    line, found, data = content.partition(b"\n")
-    if not found:
+    line, separator, data = content.partition(b"\n")
+    if not separator:
         raise ValueError(f"{path}: ends within its header")
     try:
         header = _header(parse_json(line))
@@ -84,8 +84,8 @@ def read_journal(path: Path) -> tuple[Header, Rows]:
     return header, rows[: len(rows) if rising.all() else int(np.argmin(rising)) + 1]
 
 
-def _header(said: Any) -> Header:
-    header = Header(**{**said, "columns": tuple(said["columns"])})
+def _header(values: Any) -> Header:
+    header = Header(**{**values, "columns": tuple(values["columns"])})
     com = tuple(map(float, header.payload_com))
     if not header.run_id.startswith(f"{header.robot_id}."):
         raise ValueError

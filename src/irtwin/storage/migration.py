@@ -1,6 +1,6 @@
 """The tables of an older workspace are brought up to date when it is opened, by Alembic, in one transaction.
 
-A database says its revision in the table `alembic_version`. One that says none is of the first revision.
+A database says its revision in the table `alembic_version`.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ def newest() -> str:
 
 def known() -> set[str]:
     """Return all revisions that this irtwin knows."""
-    return {found[1] for file in (REVISIONS / "versions").iterdir() if (found := _FILE.fullmatch(file.name))}
+    return {match[1] for file in (REVISIONS / "versions").iterdir() if (match := _FILE.fullmatch(file.name))}
 
 
 def revision(connection: Connection) -> str | None:
     """Return the revision that a database says, None where it says none."""
     if not inspect(connection).has_table(VERSION_TABLE):
         return None
-    said = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar()
-    return None if said is None else str(said)
+    number = connection.execute(text(f"SELECT version_num FROM {VERSION_TABLE}")).scalar()
+    return None if number is None else str(number)
 
 
 def stamp(connection: Connection) -> None:
@@ -48,14 +48,19 @@ def stamp(connection: Connection) -> None:
 def migrate(engine: Engine) -> None:
     """Bring the tables of a database to the newest revision: all of it, or nothing where it fails or is killed.
 
-    A copy of an SQLite file is kept beside it first. Raises InputError where a newer irtwin made the tables, or another
-    program wrote what irtwin would not.
+    A copy of an SQLite file is kept beside it first. Raises InputError where a newer irtwin made the tables, or one
+    before 0.2, or another program wrote what irtwin would not.
     """
     with engine.connect() as connection:
         current = revision(connection)
     if current == newest():
         return
-    if current is not None and current not in known():
+    if current is None or current < min(known()):
+        raise InputError(
+            f"{engines.shown(engine.url)}: its tables are of an irtwin before 0.2; run its data sets into a new "
+            "workspace"
+        )
+    if current not in known():
         raise InputError(
             f"{engines.shown(engine.url)}: its tables are of revision {current}, this irtwin knows none after "
             f"{newest()}; install the irtwin that made them, or a newer one"
@@ -65,8 +70,7 @@ def migrate(engine: Engine) -> None:
             f"{engine.url.database}: its tables are of an older irtwin, and this user may only read it: "
             "who may write it brings them up to date by `irtwin workspace status`"
         )
-    if newest() != (current or min(known())):
-        _keep_copy(engine, current or min(known()))
+    _keep_copy(engine, current)
     with engines.writing(engine, restructuring=True) as session:
         connection = session.connection()
         if revision(connection) == current:  # else another process has done it meanwhile

@@ -26,13 +26,13 @@ def package_tables() -> tuple[Table, ...]:
             point.load()
         except InvalidRequestError as error:
             raise InputError(f"{point.value}: its tables do not go with those that are there: {error}") from error
-    found = []
+    tables = []
     for mapper in Base.registry.mappers:
         table, module = mapper.local_table, mapper.class_.__module__
         if isinstance(table, Table) and not module.startswith("irtwin."):
             _check(table, module)
-            found.append(table)
-    return tuple(found)
+            tables.append(table)
+    return tuple(tables)
 
 
 def _check(table: Table, module: str) -> None:

@@ -64,9 +64,9 @@ def _copied(file: Path) -> Connect | None:
 
 def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
     """Return size and time of change of a database's file and of its log, where that is there."""
-    found = {}
+    stamps = {}
     for part in (file, file.with_name(f"{file.name}-wal")):
         if part.exists():
             status = part.stat()
-            found[part] = status.st_size, status.st_mtime_ns
-    return found
+            stamps[part] = status.st_size, status.st_mtime_ns
+    return stamps

@@ -59,10 +59,10 @@ def values(row: Base) -> dict[str, Any]:
 
 def facts(row: Base) -> tuple[object, ...]:
     """Return a row's values, to compare; when and from which folder it was taken in is no fact of a data set."""
-    said = values(row) | ({"folder": ""} if isinstance(row, SourceFile) else {})
+    columns = values(row) | ({"folder": ""} if isinstance(row, SourceFile) else {})
     if isinstance(row, Run):
-        said["start_time"] = in_utc(row.start_time) if row.start_time and row.start_time_from == "log" else None
-    return (row.__tablename__, *said.values())
+        columns["start_time"] = in_utc(row.start_time) if row.start_time and row.start_time_from == "log" else None
+    return (row.__tablename__, *columns.values())
 
 
 def part_tables() -> list[Table]:
@@ -94,7 +94,7 @@ def insert_values(session: Session, rows: Rows) -> None:
 def recorded_rows(session: Session, robot_id: str) -> Rows:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
     return {
-        table.name: [dict(row) for row in session.execute(found).mappings()] for table, found in _recorded(robot_id)
+        table.name: [dict(row) for row in session.execute(query).mappings()] for table, query in _recorded(robot_id)
     }
 
 
@@ -109,12 +109,12 @@ def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
 
 def named_files(connection: Connection) -> list[NamedFile]:
     """Return the files of the workspace that the database names."""
-    found = []
+    files = []
     for table, columns in FILES.items():
         for file, checksum in columns:
             rows = connection.execute(select(Base.metadata.tables[table])).mappings()
-            found += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
-    return found
+            files += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
+    return files
 
 
 def files_of(rows: Rows) -> dict[str, str]:
@@ -172,12 +172,12 @@ def drop_run(session: Session, run_id: str, subject: str) -> None:
 def release_plans(session: Session, robot_id: str) -> None:
     """Let runs of a robot that carried out a plan which is gone say no plan, and slower plans no run that is gone."""
     there = aliased(Run)
-    for said, also in ((Run.performs, {}), (Run.time_scaling_of, {Run.time_scale: None})):
-        gone = ~exists().where(there.run_id == said)
+    for column, also in ((Run.performs, {}), (Run.time_scaling_of, {Run.time_scale: None})):
+        gone = ~exists().where(there.run_id == column)
         session.execute(
             update(Run)
-            .where(Run.robot_id == robot_id, said.is_not(None), gone)
-            .values({said: None, **also})
+            .where(Run.robot_id == robot_id, column.is_not(None), gone)
+            .values({column: None, **also})
             .execution_options(synchronize_session=False)
         )
 
@@ -197,8 +197,8 @@ def drop_activities(session: Session, activities: set[str]) -> None:
 
 def with_dependents(session: Session, activities: set[str]) -> set[str]:
     """Add the activities whose rows refer to rows of these activities, and theirs in turn."""
-    found = set(activities)
-    new = found
+    whole = set(activities)
+    new = whole
     while new:
         dependents: set[str] = set()
         for table in _made_tables():
@@ -213,9 +213,9 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
                             .distinct()
                         )
                     )
-        new = dependents - found
-        found = found | new
-    return found
+        new = dependents - whole
+        whole = whole | new
+    return whole
 
 
 def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
@@ -254,8 +254,8 @@ def _made_tables() -> list[Table]:
 
 def base_of(connection: Connection) -> str:
     """Return the base that a database keeps; the default where none was said."""
-    said: str | None = connection.scalar(select(Individuals.base_iri))
-    return said or base_iri.DEFAULT
+    base: str | None = connection.scalar(select(Individuals.base_iri))
+    return base or base_iri.DEFAULT
 
 
 def keep_base(connection: Connection, base: str) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from sqlalchemy import update
@@ -22,8 +21,7 @@ from irtwin.storage.rows import (
     release_plans,
 )
 from irtwin.storage.schema import Robot
-from irtwin.storage.series import FOLDER, fetch_series, is_series, is_whole
-from irtwin.storage.series_place import elsewhere
+from irtwin.storage.series import is_whole
 
 _PREFIX = ".staged-"
 
@@ -48,7 +46,7 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
             raise
         after = _rows(apart, robot_id)
         if after != before or whole != set(files_of(before)):
-            _put(apart, after, place, robot_id, whole)
+            _put(apart, after, place, robot_id)
             place.remove_orphans()
 
 
@@ -57,15 +55,15 @@ def _rows(place: Workspace, robot_id: str) -> Rows:
         return recorded_rows(session, robot_id)
 
 
-def _put(
-    source: Workspace, rows: Rows, target: Workspace, robot_id: str, had: AbstractSet[str] = frozenset()
-) -> set[str]:
+def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> set[str]:
     """Make the rows, and the files that they name, all that the target has of the robot but its live runs.
 
-    Returns the files that were whole; whoever needs another says so. `had` are those that the target had whole.
+    Returns the files that were whole; whoever needs another says so.
     """
     with engine.writing(target.engine) as session:
-        whole = _bring(source, target, files_of(rows), had)
+        whole = {path for path, sha256 in files_of(rows).items() if is_whole(source.folder, path, sha256)}
+        for path in whole:
+            _link(source, target, path)
         of_live = modelled_of_live_runs(session, robot_id)
         drop_recorded(session, robot_id)
         if session.get(Robot, robot_id) is None:
@@ -77,36 +75,6 @@ def _put(
             insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
         release_plans(session, robot_id)
     return whole
-
-
-def _bring(source: Workspace, target: Workspace, named: Mapping[str, str], had: AbstractSet[str]) -> set[str]:
-    """Give the target what is whole of the files that are named, by path and SHA-256; return their paths."""
-    fetched = _fetch(source, target, named)
-    whole = {
-        path for path, checksum in named.items() if path not in fetched and is_whole(source.folder, path, checksum)
-    }
-    storage = elsewhere(target.folder)
-    series = set() if storage is None else {path for path in whole if is_series(path)}
-    if storage is not None:
-        lacking = series - (had & storage.paths(FOLDER))
-        storage.put({path: source.file(path) for path in lacking})
-    for path in whole - series:
-        _link(source, target, path)
-    return whole | {path for path, is_good in fetched.items() if is_good}
-
-
-def _fetch(source: Workspace, target: Workspace, named: Mapping[str, str]) -> dict[str, bool]:
-    """Bring series out of object storage; return of each whether it was whole, nothing where a folder has them."""
-    storage = elsewhere(source.folder)
-    if storage is None:
-        return {}
-    series = {path for path in named if is_series(path)}
-    fetch_series(storage, target.folder, series & storage.paths(FOLDER))
-    found = {path: is_whole(target.folder, path, named[path]) for path in series}
-    for path, is_good in found.items():
-        if not is_good:
-            files.remove(target.file(path))
-    return found
 
 
 def _link(source: Workspace, target: Workspace, path: str) -> None:

@@ -40,22 +40,22 @@ def read_tariff(workspace: Path) -> Tariff:
     file = workspace / FILE
     if not file.exists():
         return Tariff()
-    said = read_toml(file)
-    for key in said:
+    values = read_toml(file)
+    for key in values:
         if key not in _KEYS:
             near = get_close_matches(key, _KEYS, n=1)
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(_KEYS)}"
             raise InputError(f"{file}: unknown key {key!r}: {hint}")
-    price, currency = _number(file, said, "price_per_kwh"), said.get("currency", "")
+    price, currency = _number(file, values, "price_per_kwh"), values.get("currency", "")
     if not isinstance(currency, str) or (currency and not _CURRENCY.fullmatch(currency)):
         raise InputError(f'{file}: currency is a code or a sign, as "EUR", not {currency!r}')
     if price is not None and not currency:
         raise InputError(f'{file}: price_per_kwh needs a currency, as currency = "EUR"')
-    hours = _number(file, said, "hours_a_year")
+    hours = _number(file, values, "hours_a_year")
     if hours is not None and hours > _YEAR:
         raise InputError(f"{file}: hours_a_year is {_YEAR} at most, not {hours:g}")
     return Tariff(
-        price, currency, _number(file, said, "co2_kg_per_kwh"), hours, _zone(file, said.get("time_zone", "UTC"))
+        price, currency, _number(file, values, "co2_kg_per_kwh"), hours, _zone(file, values.get("time_zone", "UTC"))
     )
 
 
@@ -66,8 +66,8 @@ def _zone(file: Path, name: Any) -> ZoneInfo:
         raise InputError(f'{file}: time_zone is a name as "Europe/Berlin", not {name!r}') from None
 
 
-def _number(file: Path, said: dict[str, Any], key: str) -> float | None:
-    value = said.get(key)
+def _number(file: Path, values: dict[str, Any], key: str) -> float | None:
+    value = values.get(key)
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value >= 0):

@@ -74,7 +74,7 @@ def read(
 
     Raises InputError, which says why, where a statement is nobody's to assert or to take back.
     """
-    found = Assertion()
+    assertion = Assertion()
     taken, given = _by_property(removed), _by_property(added)
     now = datetime.now(UTC)
     for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
@@ -82,15 +82,15 @@ def read(
         about = _robot(graph, session, subject)
         cell = _cell(graph, subject, predicate)
         if cell is not None:
-            _fill(found, graph, session, cell, (subject, predicate), new, (about, author, now))
+            _fill(assertion, graph, session, cell, (subject, predicate), new, (about, author, now))
             continue
         for quad in gone:
-            _withdraw(found, graph, session, quad)
+            _withdraw(assertion, graph, session, quad)
         for quad in new:
             _check_free(graph, quad)
-            found.facts.append(_free(quad, about, author, now))
-            found.added.add(quad)
-    return found
+            assertion.facts.append(_free(quad, about, author, now))
+            assertion.added.add(quad)
+    return assertion
 
 
 def quad_of(fact: AssertedFact) -> Quad:
@@ -112,12 +112,12 @@ def map_facts(graph: KnowledgeGraph, session: Session) -> None:
 
 
 def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
-    found: dict[tuple[NamedNode, NamedNode], set[Quad]] = {}
+    by_property: dict[tuple[NamedNode, NamedNode], set[Quad]] = {}
     for quad in quads:
         if any(isinstance(term, BlankNode | Triple) for term in (quad.subject, quad.object)):
             raise InputError("statements with blank nodes cannot be asserted or taken out: give each an IRI")
-        found.setdefault((quad.subject, quad.predicate), set()).add(quad)  # type: ignore[arg-type]
-    return found
+        by_property.setdefault((quad.subject, quad.predicate), set()).add(quad)  # type: ignore[arg-type]
+    return by_property
 
 
 def _cell(graph: KnowledgeGraph, subject: NamedNode, predicate: NamedNode) -> _Cell | None:
@@ -145,7 +145,7 @@ def _key(triples_map: TriplesMap, subject: NamedNode, base: str) -> dict[str, st
 
 
 def _fill(
-    found: Assertion,
+    assertion: Assertion,
     graph: KnowledgeGraph,
     session: Session,
     cell: _Cell,
@@ -157,13 +157,13 @@ def _fill(
     what = " ".join(show(term, graph.base) for term in about)
     if len({quad.object for quad in new}) > 1:
         raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
-    said = next(iter(new)).object if new else None
+    value = next(iter(new)).object if new else None
     fact = AssertedFact(
         fact_id=secrets.token_hex(12),
         about_robot=by[0],
         subject=about[0].value,
         predicate=about[1].value,
-        value=_text(cell.column, said, what),
+        value=_text(cell.column, value, what),
         kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
         graph=cell.graph.value,
         author=by[1],
@@ -183,24 +183,24 @@ def _fill(
     fact.replaced = written(getattr(row, cell.column.name))
     if fact.value == fact.replaced:
         return
-    found.facts.append(fact)
-    found.removed |= {quad for quad in graph.said(*about) if quad.graph_name == cell.graph}
+    assertion.facts.append(fact)
+    assertion.removed |= {quad for quad in graph.said(*about) if quad.graph_name == cell.graph}
     if fact.value is not None:
-        found.added.add(quad_of(fact))
+        assertion.added.add(quad_of(fact))
 
 
-def _text(column: Column[Any], said: object, what: str) -> str | None:
+def _text(column: Column[Any], value: object, what: str) -> str | None:
     """Return a value as facts write it, in the column's own form. InputError where the column can hold no such."""
-    if said is None:
+    if value is None:
         return None
     is_number = column.type.python_type is not str
-    datatype = said.datatype.value if isinstance(said, Literal) else ""
-    if not isinstance(said, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
-        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {said}; nothing changed")
+    datatype = value.datatype.value if isinstance(value, Literal) else ""
+    if not isinstance(value, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
+        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
     try:
-        return written(value_of(column, said.value))
+        return written(value_of(column, value.value))
     except ValueError:
-        raise InputError(f"{what}: cannot be {said.value!r}; nothing changed") from None
+        raise InputError(f"{what}: cannot be {value.value!r}; nothing changed") from None
 
 
 def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
@@ -210,7 +210,7 @@ def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str |
     return robot_id if robot_id and session.get(Robot, robot_id) is not None else None
 
 
-def _withdraw(found: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
+def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
     about = select(AssertedFact).where(AssertedFact.subject == getattr(quad.subject, "value", ""))
     free = session.scalars(about.where(AssertedFact.place.is_(None)))
     ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
@@ -218,8 +218,8 @@ def _withdraw(found: Assertion, graph: KnowledgeGraph, session: Session, quad: Q
     if not ids and name.startswith(GRAPH):
         why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
         raise InputError(f"{_show(quad, graph)}: cannot be taken out: {why}; nothing changed")
-    found.withdrawn += ids
-    found.removed.add(quad)
+    assertion.withdrawn += ids
+    assertion.removed.add(quad)
 
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:

@@ -90,10 +90,10 @@ class Explainer:
         if stated:
             return self._stated(triple, stated[0])
         for rule in all_rules(self._graph.resources):
-            found = premises(self._graph, rule, triple) if rule.graph in graphs else None
-            if found is not None:
+            grounds = premises(self._graph, rule, triple) if rule.graph in graphs else None
+            if grounds is not None:
                 by = f'the rule "{rule.label}", in {rule.language}'
-                return Explanation(what, by, tuple(map(self.triple, found)), rule.comment or None)
+                return Explanation(what, by, tuple(map(self.triple, grounds)), rule.comment or None)
         return self._inferred(tuple(triple))
 
     def individual(self, iri: str) -> Explanation:
@@ -133,9 +133,9 @@ class Explainer:
             activity = self._graph.iri(f"activity/{name.removeprefix(GRAPH_ACTIVITY)}")
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
             return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
-        said = provenance.asserted(self._graph, triple)
-        if said is not None:
-            return Explanation(what, said)
+        fact = provenance.asserted(self._graph, triple)
+        if fact is not None:
+            return Explanation(what, fact)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
             maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
@@ -155,9 +155,9 @@ class Explainer:
         for closure in self._growing(statement):
             derivation = closure.why(statement)
             if derivation is not None:
-                said = _without_helpers(closure, derivation.premises)
+                premises = _without_helpers(closure, derivation.premises)
                 return Explanation(
-                    self._show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, said))
+                    self._show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, premises))
                 )
         if self._is_of_hermit(statement):
             return Explanation(self._show(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
@@ -214,8 +214,8 @@ class Explainer:
             told = provenance.told_in(self._graph, triple.subject.value, triple.predicate.value)
             if told.file is not None:
                 return told
-        found = (provenance.file_of(self._graph, end) for end in ends)
-        return next((one for one in found if one.file is not None), provenance.File())
+        files = (provenance.file_of(self._graph, end) for end in ends)
+        return next((one for one in files if one.file is not None), provenance.File())
 
 
 def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[Statement]:
@@ -231,19 +231,19 @@ def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[
 
 
 def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
-    said = [found[0] for found in _TERM.finditer(pattern.removesuffix(" ."))]
-    if len(said) > 3:
+    parts = [match[0] for match in _TERM.finditer(pattern.removesuffix(" ."))]
+    if len(parts) > 3:
         raise InputError(f"{pattern}: is more than subject, predicate and object; put text in quotation marks")
-    numbers = {place: term for place, term in enumerate(said) if _NUMBER.fullmatch(term)}
+    numbers = {place: term for place, term in enumerate(parts) if _NUMBER.fullmatch(term)}
     terms = [
         f"?_{place}" if place in numbers else _sparql(term, f"?_{place}", graph.prefixes)
-        for place, term in enumerate(said)
+        for place, term in enumerate(parts)
     ]
     terms += [f"?_{place}" for place in range(len(terms), 3)]
     text = " ".join(terms)
     equal = " ".join(f"FILTER(?_{place} = {number})" for place, number in numbers.items())  # whatever its datatype
-    found = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} LIMIT {MOST_TRIPLES + 1}")
-    return list(cast(QueryTriples, found))
+    matching = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} LIMIT {MOST_TRIPLES + 1}")
+    return list(cast(QueryTriples, matching))
 
 
 def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:

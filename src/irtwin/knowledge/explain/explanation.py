@@ -32,10 +32,10 @@ def to_text(explanation: Explanation) -> str:
 def to_json(explanation: Explanation) -> dict[str, Any]:
     """Write an explanation as nested objects, for JSON; what it lacks is left out."""
     plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "folder", "checksum")}
-    found = {name: value for name, value in plain.items() if value is not None}
+    known = {name: value for name, value in plain.items() if value is not None}
     if explanation.because:
-        found["because"] = [to_json(each) for each in explanation.because]
-    return found
+        known["because"] = [to_json(each) for each in explanation.because]
+    return known
 
 
 def _lines(explanation: Explanation, margin: str) -> Iterator[str]:

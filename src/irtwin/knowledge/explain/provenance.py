@@ -138,8 +138,8 @@ def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
         leads_to = (row["next"] for node in nodes for row in graph.query(_NEXT, {"thing": node}))
         nodes = [node for node in dict.fromkeys(leads_to) if node.startswith(graph.base) and node not in seen]
         seen.update(nodes)
-        if found := [node for node in nodes if file_of(graph, node).file is not None]:
-            return found
+        if in_files := [node for node in nodes if file_of(graph, node).file is not None]:
+            return in_files
     return []
 
 

@@ -9,8 +9,6 @@ from pathlib import Path
 from irtwin.input_file import checksum
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.storage.files import inside
-from irtwin.storage.object_storage import ObjectStorage, StorageFault
-from irtwin.storage.series import storage_of
 
 WHOLE, CHANGED, MISSING, UNKNOWN = "whole", "changed", "missing", "cannot be checked"
 
@@ -35,10 +33,10 @@ class Verdict:
 
 def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
-    found = dict.fromkeys(
+    files = dict.fromkeys(
         (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
     )
-    return [_verdict(workspace, folder, file, known) for folder, file, known in found]
+    return [_verdict(workspace, folder, file, known) for folder, file, known in files]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:
@@ -52,9 +50,6 @@ def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) 
         return Verdict(file, UNKNOWN, "it is part of irtwin, which keeps no checksum of it")
     base = workspace if folder is None else Path(folder)
     path = inside(workspace, file) if folder is None else base / file
-    storage = storage_of(workspace, file) if folder is None else None
-    if storage is not None:
-        return _verdict_afar(storage, file, known)
     if not base.is_dir():
         what = "the workspace" if folder is None else "its data set"
         return Verdict(str(path), UNKNOWN, f"{what} is not at {base}; take it in again from where it is")
@@ -66,18 +61,4 @@ def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) 
         now = checksum(path)
     except OSError as error:
         return Verdict(str(path), UNKNOWN, f"it cannot be read: {error.strerror}")
-    return _compared(str(path), now, known)
-
-
-def _verdict_afar(storage: ObjectStorage, path: str, known: str) -> Verdict:
-    address = storage.address(path)
-    try:
-        storage.owner()  # a bucket that is gone is not a file that is missing
-        now = storage.checksum(path)
-    except StorageFault as error:
-        return Verdict(address, UNKNOWN, str(error))
-    return Verdict(address, MISSING) if now is None else _compared(address, now, known)
-
-
-def _compared(file: str, now: str, known: str) -> Verdict:
-    return Verdict(file, WHOLE) if now == known else Verdict(file, CHANGED, f"sha256 is now {now}")
+    return Verdict(str(path), WHOLE) if now == known else Verdict(str(path), CHANGED, f"sha256 is now {now}")

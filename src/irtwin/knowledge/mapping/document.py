@@ -85,7 +85,7 @@ class TriplesMap:
 
 
 @dataclass(frozen=True)
-class Document:
+class MappingDocument:
     """A mapping document; `base_iri` is the one it declares, if any."""
 
     base_iri: str | None

@@ -34,8 +34,8 @@ class Identifier:
         if self.delimited:
             return self.name if self.name in present else None
         forms = {self.name.upper(), self.name.lower()}
-        found = [name for name in present if name in forms or (not folded and name.lower() == self.name.lower())]
-        return found[0] if len(found) == 1 else None
+        matching = [name for name in present if name in forms or (not folded and name.lower() == self.name.lower())]
+        return matching[0] if len(matching) == 1 else None
 
 
 def parse_identifier(text: str) -> Identifier:

@@ -148,10 +148,10 @@ def _unknown(rows: Sequence[Row], entries: Entries, seen: npt.NDArray[np.bool_])
     known = entries["row"]
     at = np.searchsorted(known, hashes)
     within = at < len(known)
-    found = np.zeros(len(rows), dtype=bool)
-    found[within] = known[at[within]] == hashes[within]
-    seen[at[found]] = True
-    return {int(hashes[index]): rows[index] for index in np.flatnonzero(~found).tolist()}
+    unknown = np.zeros(len(rows), dtype=bool)
+    unknown[within] = known[at[within]] == hashes[within]
+    seen[at[unknown]] = True
+    return {int(hashes[index]): rows[index] for index in np.flatnonzero(~unknown).tolist()}
 
 
 def _row_hash(row: Row) -> bytes:

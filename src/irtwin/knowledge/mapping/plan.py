@@ -10,17 +10,17 @@ from sqlalchemy import Connection
 
 from irtwin.knowledge.mapping.document import (
     RR,
-    Document,
     Join,
     LogicalTable,
+    MappingDocument,
     PredicateObjectMap,
     TermMap,
     TermType,
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import Identifier, quoted
-from irtwin.knowledge.mapping.source import Source, describe
-from irtwin.knowledge.mapping.terms import Column, Row, TermMaker, absolute, term_maker
+from irtwin.knowledge.mapping.source import TableSource, describe
+from irtwin.knowledge.mapping.terms import Row, RowColumn, TermMaker, absolute, term_maker
 
 GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
@@ -30,7 +30,7 @@ _DEFAULT_GRAPH = NamedNode(f"{RR}defaultGraph")
 
 
 @dataclass(frozen=True)
-class Property:
+class PlannedProperty:
     """Predicates and objects to combine; in the subject's graphs where `graphs` is None."""
 
     predicates: tuple[TermMaker, ...]
@@ -53,7 +53,7 @@ class Statement:
     columns: tuple[str, ...]
     subject: TermMaker
     graphs: GraphMaker
-    properties: tuple[Property, ...]
+    properties: tuple[PlannedProperty, ...]
     predicates: frozenset[NamedNode] | None
     begins: str
 
@@ -63,13 +63,13 @@ class Statement:
         if subject is None:
             return []
         own = self.graphs(row)
-        found = []
+        templates = []
         for item in self.properties:
             graphs = own if item.graphs is None else item.graphs(row)
             predicates = [make(row) for make in item.predicates]
             objects = [make(row) for make in item.objects]
             # Document checks leave only an IRI or blank node as subject, and an IRI as predicate.
-            found += [
+            templates += [
                 Quad(subject, predicate, value, graph)  # type: ignore[arg-type]
                 for predicate in predicates
                 if predicate is not None
@@ -77,14 +77,14 @@ class Statement:
                 if value is not None
                 for graph in graphs
             ]
-        return found
+        return templates
 
 
-def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[Statement]:
+def plan(connection: Connection, document: MappingDocument, base_iri: str) -> Iterator[Statement]:
     """Yield a document's statements. Raises InputError where its tables or columns are not there."""
-    sources: dict[LogicalTable, Source] = {}
+    sources: dict[LogicalTable, TableSource] = {}
 
-    def source(table: LogicalTable) -> Source:
+    def source(table: LogicalTable) -> TableSource:
         if table not in sources:
             sources[table] = describe(connection, table)
         return sources[table]
@@ -105,7 +105,7 @@ def plan(connection: Connection, document: Document, base_iri: str) -> Iterator[
 class _Select:
     """A query under construction: it gathers the columns that term maps need, each once."""
 
-    def __init__(self, connection: Connection, sources: Mapping[str, Source], base_iri: str) -> None:
+    def __init__(self, connection: Connection, sources: Mapping[str, TableSource], base_iri: str) -> None:
         self.sources = sources
         self.base_iri = base_iri
         self.preparer = connection.dialect.identifier_preparer
@@ -135,11 +135,11 @@ class _Select:
         fixed = make(())
         return lambda row: fixed
 
-    def column(self, identifier: Identifier, where: str, side: str) -> Column:
+    def column(self, identifier: Identifier, where: str, side: str) -> RowColumn:
         source = self.sources[side]
         name = source.column(identifier, where)
         index = self.chosen.setdefault((side, name), len(self.chosen))
-        return Column(index, source.columns[name])
+        return RowColumn(index, source.columns[name])
 
     def join(self, join: Join) -> None:
         for child, parent in join.conditions:
@@ -162,11 +162,11 @@ class _Select:
         return f"SELECT {columns or '1'} FROM {tables}{condition}"
 
 
-def _plain(select: _Select, triples_map: TriplesMap, document: Document) -> Statement:
+def _plain(select: _Select, triples_map: TriplesMap, document: MappingDocument) -> Statement:
     """The statement of a logical table alone: classes, and all objects that need no join."""
     rdf_type = select.maker(_constant(_RDF_TYPE))
     predicates = [_constant(_RDF_TYPE)] if triples_map.classes else []
-    properties = [Property((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
+    properties = [PlannedProperty((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
     for item in triples_map.properties:
         objects = [
             document.triples_maps[value.parent].subject if isinstance(value, Join) else value
@@ -184,22 +184,22 @@ def _joined(
 ) -> Statement:
     """The statement of one join: the parent's subjects as objects."""
     select.join(join)
-    found = _property(select, triples_map, item, (select.maker(parent, "parent"),))
-    return _statement(select, triples_map, [found], item.predicates)
+    planned = _property(select, triples_map, item, (select.maker(parent, "parent"),))
+    return _statement(select, triples_map, [planned], item.predicates)
 
 
 def _property(
     select: _Select, triples_map: TriplesMap, item: PredicateObjectMap, objects: tuple[TermMaker, ...]
-) -> Property:
+) -> PlannedProperty:
     graphs = select.graphs([*triples_map.graphs, *item.graphs]) if item.graphs else None
-    return Property(select.makers(item.predicates), objects, graphs)
+    return PlannedProperty(select.makers(item.predicates), objects, graphs)
 
 
 def _statement(
-    select: _Select, triples_map: TriplesMap, properties: Sequence[Property], predicates: Iterable[TermMap]
+    select: _Select, triples_map: TriplesMap, properties: Sequence[PlannedProperty], predicates: Iterable[TermMap]
 ) -> Statement:
     subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
-    said = {term_map.constant for term_map in predicates}
+    constants = {term_map.constant for term_map in predicates}
     return Statement(
         where=triples_map.where,
         sql=select.sql,
@@ -208,7 +208,9 @@ def _statement(
         subject=subject,
         graphs=graphs,
         properties=tuple(properties),
-        predicates=frozenset(name for name in said if isinstance(name, NamedNode)) if None not in said else None,
+        predicates=frozenset(name for name in constants if isinstance(name, NamedNode))
+        if None not in constants
+        else None,
         begins=_beginning(triples_map.subject, select.base_iri),
     )
 

@@ -15,9 +15,9 @@ from pyoxigraph import BlankNode, Literal, NamedNode, RdfFormat, parse
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.document import (
     RR,
-    Document,
     Join,
     LogicalTable,
+    MappingDocument,
     Node,
     PredicateObjectMap,
     TermMap,
@@ -37,7 +37,7 @@ _SQL_VERSIONS = {
 _Parsed = TypeVar("_Parsed")
 
 
-def read_document(path: Path) -> Document:
+def read_document(path: Path) -> MappingDocument:
     """Read and check a mapping document in Turtle."""
     file_iri = path.resolve().as_uri()
     content = read_rdf(path, RdfFormat.TURTLE)
@@ -47,7 +47,7 @@ def read_document(path: Path) -> Document:
     except (SyntaxError, MemoryError) as error:
         refuse(path, error)
     declared = None if parser.base_iri == file_iri else parser.base_iri
-    return Document(declared, _Reader(path, graph).triples_maps())
+    return MappingDocument(declared, _Reader(path, graph).triples_maps())
 
 
 class _Graph:
@@ -129,13 +129,13 @@ class _Reader:
         return item, self.term_map(item, where, allowed, extra="class graph graphMap")
 
     def classes(self, node: Node | None, where: str) -> tuple[NamedNode, ...]:
-        found = [] if node is None else self.graph.objects(node, "class")
-        return tuple(self.iri(item, f"{where}, rr:class") for item in found)
+        classes = [] if node is None else self.graph.objects(node, "class")
+        return tuple(self.iri(item, f"{where}, rr:class") for item in classes)
 
     def graphs(self, node: Node | None, where: str) -> tuple[TermMap, ...]:
         where = f"{where}, graph map"
-        found = [] if node is None else self.maps(node, "graph", where)
-        return tuple(self.shortcut_or_map(kind, item, where) for kind, item in found)
+        maps = [] if node is None else self.maps(node, "graph", where)
+        return tuple(self.shortcut_or_map(kind, item, where) for kind, item in maps)
 
     def predicate_object_map(self, node: Node, where: str) -> PredicateObjectMap:
         allowed = "predicate predicateMap object objectMap graph graphMap"
@@ -202,14 +202,14 @@ class _Reader:
         )
 
     def term_type(self, node: Node, where: str, allowed: tuple[TermType, ...], literal: bool) -> TermType:
-        found = self.optional(node, "termType", where)
-        if found is None:
+        given = self.optional(node, "termType", where)
+        if given is None:
             return TermType.LITERAL if literal and TermType.LITERAL in allowed else TermType.IRI
         for kind in allowed:
-            if found == NamedNode(RR + kind.value):
+            if given == NamedNode(RR + kind.value):
                 return kind
         names = ", ".join(f"rr:{kind.value}" for kind in allowed)
-        self.fault(where, f"term type {_label(found)} is not allowed here; take one of {names}")
+        self.fault(where, f"term type {_label(given)} is not allowed here; take one of {names}")
 
     def language(self, node: Node, where: str) -> str | None:
         tag = self.text(node, "language", where)
@@ -218,8 +218,8 @@ class _Reader:
         return tag
 
     def datatype(self, node: Node, where: str) -> NamedNode | None:
-        found = self.optional(node, "datatype", where)
-        return None if found is None else self.iri(found, f"{where}, rr:datatype")
+        datatype = self.optional(node, "datatype", where)
+        return None if datatype is None else self.iri(datatype, f"{where}, rr:datatype")
 
     def constant(self, node: Node, where: str, required: TermType | None = None) -> TermMap:
         if isinstance(node, NamedNode):
@@ -241,22 +241,22 @@ class _Reader:
                 self.fault(where, f"{name} does not belong here; allowed are {', '.join(allowed.split())}")
 
     def one(self, node: Node, name: str, where: str) -> Node:
-        found = self.optional(node, name, where)
-        if found is None:
+        value = self.optional(node, name, where)
+        if value is None:
             self.fault(where, f"rr:{name} is missing")
-        return found
+        return value
 
     def optional(self, node: Node, name: str, where: str) -> Node | None:
-        found = self.graph.objects(node, name)
-        if len(found) > 1:
-            self.fault(where, f"{len(found)} values of rr:{name}; give one")
-        return found[0] if found else None
+        values = self.graph.objects(node, name)
+        if len(values) > 1:
+            self.fault(where, f"{len(values)} values of rr:{name}; give one")
+        return values[0] if values else None
 
     def text(self, node: Node, name: str, where: str) -> str | None:
-        found = self.optional(node, name, where)
-        if found is not None and not isinstance(found, Literal):
+        literal = self.optional(node, name, where)
+        if literal is not None and not isinstance(literal, Literal):
             self.fault(where, f"rr:{name} must be a string")
-        return None if found is None else found.value
+        return None if literal is None else literal.value
 
     def iri(self, node: Node, where: str) -> NamedNode:
         if not isinstance(node, NamedNode):
@@ -267,8 +267,8 @@ class _Reader:
         try:
             return parse(text)
         except ValueError as error:
-            said = str(error)
-            self.fault(where, said if len(said) < 200 else f"{said[:200]}...")
+            message = str(error)
+            self.fault(where, message if len(message) < 200 else f"{message[:200]}...")
 
     def fault(self, where: str, message: str) -> NoReturn:
         raise InputError(f"{where}: {message}")

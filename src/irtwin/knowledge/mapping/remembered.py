@@ -63,8 +63,8 @@ class RememberedRows:
     @property
     def version(self) -> str | None:
         """The name of the state that the rows are of, None where there is none."""
-        found = self._connection.execute("SELECT name FROM version").fetchone()
-        return None if found is None else str(found[0])
+        row = self._connection.execute("SELECT name FROM version").fetchone()
+        return None if row is None else str(row[0])
 
     @version.setter
     def version(self, name: str) -> None:
@@ -79,8 +79,8 @@ class RememberedRows:
 
     def entries(self, statement: int) -> Entries:
         """Return the entries of a statement's rows, (N,) of ENTRY, by rising hash."""
-        found = self._connection.execute("SELECT content, crc FROM entries WHERE number = ?", (statement,)).fetchone()
-        return np.frombuffer(b"" if found is None else _checked(*found), ENTRY)
+        row = self._connection.execute("SELECT content, crc FROM entries WHERE number = ?", (statement,)).fetchone()
+        return np.frombuffer(b"" if row is None else _checked(*row), ENTRY)
 
     def set_entries(self, statement: int, entries: Entries) -> None:
         """Keep a statement's entries in place of those it had, each row once."""
@@ -105,10 +105,10 @@ class RememberedRows:
     def rows(self, entries: Entries) -> Iterator[list[Any]]:
         """Yield the kept rows of these entries."""
         for number in entries["id"].tolist():
-            found = self._connection.execute(_KEPT_ROW, (number,)).fetchone()
-            if found is None:
+            row = self._connection.execute(_KEPT_ROW, (number,)).fetchone()
+            if row is None:
                 raise DamagedRows
-            content = json.loads(_checked(*found))
+            content = json.loads(_checked(*row))
             yield [_restored(value) if isinstance(value, dict) else value for value in content]
 
     def drop(self, entries: Entries) -> None:

@@ -29,7 +29,7 @@ _SQL_TOKEN = re.compile(r"""'(?:[^']|'')*'|"(?:[^"]|"")*"|--[^\n]*|/\*.*?\*/|[^'
 
 
 @dataclass(frozen=True)
-class Source:
+class TableSource:
     """A logical table in SQL, with its columns and how their values read.
 
     cast: the columns whose values only the database itself can write as strings;
@@ -92,7 +92,7 @@ def declarations(connection: Connection) -> tuple[str, ...] | None:
     return tuple(rows.scalars())
 
 
-def describe(connection: Connection, table: LogicalTable) -> Source:
+def describe(connection: Connection, table: LogicalTable) -> TableSource:
     """Find a logical table's columns. Raises InputError where it is not there or the query is not valid."""
     sql = _from_item(connection, table)
     result = run(connection, f"SELECT * FROM {sql} source WHERE 1 = 0", table.where)
@@ -108,7 +108,7 @@ def describe(connection: Connection, table: LogicalTable) -> Source:
     cast: frozenset[str] = frozenset()
     if connection.dialect.name == "postgresql":
         cast = frozenset(column[0] for column in description if column[1] not in _NATURAL_IN_POSTGRESQL)
-    return Source(table.where, sql, columns, cast, folded=table.query is None)
+    return TableSource(table.where, sql, columns, cast, folded=table.query is None)
 
 
 def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequence[Any]]]:

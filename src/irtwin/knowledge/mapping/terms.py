@@ -31,14 +31,14 @@ _RELATIVE = re.compile("[^:/?#]+/")  # no scheme can come any more
 
 
 @dataclass(frozen=True)
-class Column:
+class RowColumn:
     """Where a row holds a column, and how its values read."""
 
     index: int
     natural: Natural
 
 
-Columns = Mapping[Identifier, Column]
+Columns = Mapping[Identifier, RowColumn]
 
 
 def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
@@ -103,13 +103,13 @@ def _percent_encoded(match: re.Match[str]) -> str:
 
 def _iri_maker(term_map: TermMap, text: _Text, base_iri: str) -> TermMaker:
     def make(row: Row) -> NamedNode | None:
-        found = text(row)
-        if found is None:
+        lexical = text(row)
+        if lexical is None:
             return None
         try:
-            return NamedNode(found[0])
+            return NamedNode(lexical[0])
         except ValueError:  # not absolute: below the base, or no IRI at all
-            return _below(base_iri, found[0], term_map)
+            return _below(base_iri, lexical[0], term_map)
 
     return make
 
@@ -125,8 +125,8 @@ def _below(base_iri: str, value: str, term_map: TermMap) -> NamedNode:
 
 def _blank_node_maker(text: _Text) -> TermMaker:
     def make(row: Row) -> BlankNode | None:
-        found = text(row)
-        return None if found is None else BlankNode(f"b{found[0].encode().hex()}")
+        lexical = text(row)
+        return None if lexical is None else BlankNode(f"b{lexical[0].encode().hex()}")
 
     return make
 
@@ -135,20 +135,20 @@ def _literal_maker(term_map: TermMap, text: _Text) -> TermMaker:
     language, datatype = term_map.language, term_map.datatype
 
     def natural(row: Row) -> Literal | None:
-        found = text(row)
-        return None if found is None else Literal(found[0], datatype=found[1])
+        lexical = text(row)
+        return None if lexical is None else Literal(lexical[0], datatype=lexical[1])
 
     def tagged(row: Row) -> Literal | None:
-        found = text(row)
-        return None if found is None else Literal(found[0], language=language)
+        lexical = text(row)
+        return None if lexical is None else Literal(lexical[0], language=language)
 
     def typed(row: Row) -> Literal | None:
-        found = text(row)
-        if found is None:
+        lexical = text(row)
+        if lexical is None:
             return None
         assert datatype is not None
-        if found[1] != datatype and not is_lexical(found[0], datatype):
-            raise InputError(f"{term_map.where}: the value {found[0]!r} is no {datatype.value}")
-        return Literal(found[0], datatype=datatype)
+        if lexical[1] != datatype and not is_lexical(lexical[0], datatype):
+            raise InputError(f"{term_map.where}: the value {lexical[0]!r} is no {datatype.value}")
+        return Literal(lexical[0], datatype=datatype)
 
     return tagged if language else typed if datatype else natural

@@ -78,9 +78,9 @@ class Beside:
         own = range(self._first, len(forms))
         hidden = self._schema.hidden.union(number for number in own if is_hidden(forms[number][0]))
         kept: set[Triple] = set()
-        for key, found in self._known.items():
+        for key, facts in self._known.items():
             predicate, object = key if isinstance(key, tuple) else (key, None)
-            new = found - self._given.get(key, set())
+            new = facts - self._given.get(key, set())
             if not new or predicate in helpers or predicate in literals or object in hidden:
                 continue
             property = forms[predicate][0]
@@ -106,10 +106,10 @@ class Beside:
                 groups.setdefault(predicate, set()).add((subject, object))
         return groups
 
-    def _put(self, key: Key, found: AbstractSet[Any]) -> None:
+    def _put(self, key: Key, facts: AbstractSet[Any]) -> None:
         """Note facts that were found, and let those that are new be followed."""
         known = self._known.get(key)
-        new = found - self._schema.known(key) if known is None else found - known - self._schema.known(key)
+        new = facts - self._schema.known(key) if known is None else facts - known - self._schema.known(key)
         if not new:
             return
         if key == self._same and any(one != other for one, other in new):
@@ -117,18 +117,18 @@ class Beside:
         self._known.setdefault(key, set()).update(new)
         self._waiting.setdefault(key, set()).update(new)
 
-    def _put_pairs(self, predicate: Number, found: AbstractSet[tuple[Number, Number]]) -> None:
+    def _put_pairs(self, predicate: Number, pairs: AbstractSet[tuple[Number, Number]]) -> None:
         if predicate in self._schema.by_object:
-            for key, some in self._grouped((one, predicate, other) for one, other in found).items():
+            for key, some in self._grouped((one, predicate, other) for one, other in pairs).items():
                 self._put(key, some)
         else:
-            self._put(predicate, found)
+            self._put(predicate, pairs)
 
-    def _put_subjects(self, predicate: Number, object: Number, found: AbstractSet[Number]) -> None:
+    def _put_subjects(self, predicate: Number, object: Number, subjects: AbstractSet[Number]) -> None:
         if predicate in self._schema.by_object:
-            self._put((predicate, object), found)
+            self._put((predicate, object), subjects)
         else:
-            self._put(predicate, {(one, object) for one in found})
+            self._put(predicate, {(one, object) for one in subjects})
 
     def _saturate(self) -> None:
         while self._waiting:
@@ -169,9 +169,9 @@ class Beside:
     def _join(self) -> None:
         """Note what follows from several facts, of which some were followed since this was last asked."""
         followed, self._followed = self._followed, {}
-        for found in self._schema.conjunctions:
-            if found.concluded is not None and not followed.keys().isdisjoint(found.keys):
-                self._put_subjects(*found.concluded, self._of_all(found.keys))
+        for conjunction in self._schema.conjunctions:
+            if conjunction.concluded is not None and not followed.keys().isdisjoint(conjunction.keys):
+                self._put_subjects(*conjunction.concluded, self._of_all(conjunction.keys))
         for predicate, end in self._schema.single:
             if predicate in followed or predicate in self._schema.by_object:
                 self._refuse_several(predicate, end)
@@ -208,14 +208,14 @@ class Beside:
     def _looked_at(self, groups: Groups) -> Iterator[Fact]:
         """Yield the facts that loops look at."""
         looked_at = self._schema.looked_at
-        for key, found in groups.items():
+        for key, facts in groups.items():
             predicate, end = key if isinstance(key, tuple) else (key, None)
             objects = looked_at.get(predicate, set()) | looked_at.get(None, set())
             if end is not None:
                 if None in objects or end in objects:
-                    yield from ((one, predicate, end) for one in found)
+                    yield from ((one, predicate, end) for one in facts)
             elif objects:
-                yield from ((one, predicate, it) for one, it in found if None in objects or it in objects)
+                yield from ((one, predicate, it) for one, it in facts if None in objects or it in objects)
 
     def _type_values(self) -> None:
         """Say of each literal which datatypes contain it (dt-type2)."""
@@ -229,10 +229,12 @@ class Beside:
             raise not_of(self._use(self._terms.number(literal)), literal.datatype.value)
 
     def _refuse_contradictions(self) -> None:
-        for found in self._schema.conjunctions:
-            if found.concluded is None and any(key in self._known for key in found.keys):
-                for subject in self._of_all(found.keys):
-                    self._refuse(found.rule.name, [subject if it == SUBJECT else it for it in found.culprits])
+        for conjunction in self._schema.conjunctions:
+            if conjunction.concluded is None and any(key in self._known for key in conjunction.keys):
+                for subject in self._of_all(conjunction.keys):
+                    self._refuse(
+                        conjunction.rule.name, [subject if it == SUBJECT else it for it in conjunction.culprits]
+                    )
         for rule, join in self._schema.contradictions:
             for culprits in join(self._facts, self._new):
                 self._refuse(rule.name, culprits)
@@ -247,8 +249,8 @@ class Beside:
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
-        found = next(it for it in self._triples if self._terms.number(it.object) == number)
-        return " ".join(map(show, found))
+        triple = next(it for it in self._triples if self._terms.number(it.object) == number)
+        return " ".join(map(show, triple))
 
     def _iri(self, number: Number) -> str:
         return str(getattr(self._terms.forms[number][0], "value", "")) if number not in self._terms.literals else ""

@@ -14,7 +14,7 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number, Rule
+from irtwin.knowledge.owl_rl.rules import DatalogRule, Fact, Facts, Number
 from irtwin.knowledge.owl_rl.terms import Node, Terms
 from irtwin.knowledge.vocabulary import ID, OWL, RDFS, XSD, shorten
 
@@ -147,28 +147,28 @@ class Closure:
             return Derivation(rule.name, tuple(map(self._shown, premises)))
         return None
 
-    def _derivations(self, conclusion: Fact) -> Iterator[tuple[Rule, list[Fact]]]:
+    def _derivations(self, conclusion: Fact) -> Iterator[tuple[DatalogRule, list[Fact]]]:
         """Yield the rules that draw a conclusion from what was known before it, each with its premises."""
-        found = self._round[conclusion]
+        derived = self._round[conclusion]
         for rule, join, arguments in self._program.concluding(conclusion):
             for values in join(self._facts, self._facts, *arguments):
                 premises = self._program.premises(rule, values)
-                if all(self._round[premise] < found for premise in premises):
+                if all(self._round[premise] < derived for premise in premises):
                     yield rule, premises
 
     def _grounds(self, facts: Iterable[Fact]) -> set[Triple]:
         """Return the given triples that facts follow from, in all ways that they do."""
-        todo, seen, found = list(facts), set[Fact](), set[Triple]()
+        todo, seen, grounds = list(facts), set[Fact](), set[Triple]()
         while todo:
             fact = todo.pop()
             if fact in seen:
                 continue
             seen.add(fact)
             if fact in self._given:
-                found.update(self._triples.intersection(self._terms.triples(fact)))
+                grounds.update(self._triples.intersection(self._terms.triples(fact)))
             elif fact in self._round:
                 todo += (premise for _, premises in self._derivations(fact) for premise in premises)
-        return found
+        return grounds
 
     def _saturate(self, facts: Iterable[Fact]) -> None:
         fresh = self._unknown(facts)
@@ -183,7 +183,7 @@ class Closure:
 
     def _equal(self, fresh: list[Fact]) -> list[Fact]:
         """Return what follows of new equalities by symmetry and transitivity, by joining groups of equals."""
-        same, found = self._program.same, list[Fact]()
+        same, equal = self._program.same, list[Fact]()
         for one, predicate, other in fresh:
             if predicate != same or one == other:
                 continue
@@ -193,10 +193,10 @@ class Closure:
             steps = ([(other, one)], ((it, other) for it in ones), product(ones, others), product(others, ones))
             for step in steps:  # each from what the ones before it found
                 self._rounds += 1
-                found += self._unknown((left, same, right) for left, right in step if left != right)
+                equal += self._unknown((left, same, right) for left, right in step if left != right)
             ones |= others
             self._groups.update(dict.fromkeys(others, ones))
-        return found
+        return equal
 
     def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
         """Return those facts that are not known yet, and note the round that they are found in."""
@@ -264,11 +264,11 @@ class Closure:
             self._refuse(rule, list(dict.fromkeys(join(self._facts, self._facts))))
         self._refuse_other_datatypes(self._facts)
 
-    def _refuse(self, rule: Rule, found: list[tuple[Number, ...]]) -> None:
-        if found:
-            clashes = chain(*(self._program.clashes(rule, culprits, self._facts) for culprits in found))
+    def _refuse(self, rule: DatalogRule, bindings: list[tuple[Number, ...]]) -> None:
+        if bindings:
+            clashes = chain(*(self._program.clashes(rule, culprits, self._facts) for culprits in bindings))
             given = self._grounds(chain(*clashes))
-            raise contradiction(rule.name, ", ".join(map(self._name, found[0])), given)
+            raise contradiction(rule.name, ", ".join(map(self._name, bindings[0])), given)
 
     def _refuse_other_datatypes(self, facts: Facts) -> None:
         """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""

@@ -190,8 +190,8 @@ def _read_base64(text: str) -> Value:
 
 def _read_time(*, zoned: bool) -> Callable[[str], Value]:
     def read(text: str) -> Value:
-        found = _demand(_TIME, text)
-        year, month, day, hour, minute, second, zone = found.groups()
+        match = _demand(_TIME, text)
+        year, month, day, hour, minute, second, zone = match.groups()
         if zoned and zone is None:
             raise IllTyped(f"{text} has no time zone")
         return ("time", (_instant(text, year, month, day, hour, minute, second), _offset(text, zone)))
@@ -229,10 +229,10 @@ def _read_xml(text: str) -> Value:
 
 
 def _demand(form: re.Pattern[str], text: str) -> re.Match[str]:
-    found = form.fullmatch(text)
-    if found is None:
+    match = form.fullmatch(text)
+    if match is None:
         raise IllTyped(f"{text} is not in the form of its datatype")
-    return found
+    return match
 
 
 _READERS: dict[str, Callable[[str], Value]] = {

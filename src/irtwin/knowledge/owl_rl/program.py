@@ -8,7 +8,17 @@ from functools import cache
 from pyoxigraph import NamedNode
 
 from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.rules import Fact, Facts, Join, Number, Pattern, Rule, Term, compile_join, read_rules
+from irtwin.knowledge.owl_rl.rules import (
+    DatalogRule,
+    Fact,
+    Facts,
+    Join,
+    Number,
+    Pattern,
+    Term,
+    compile_join,
+    read_rules,
+)
 from irtwin.knowledge.owl_rl.terms import Terms
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import PREFIXES, XSD
@@ -72,7 +82,7 @@ class Program:
         """Return the number of a term of the rules."""
         return self.terms.number(_node(term))
 
-    def concluding(self, conclusion: Fact) -> Iterator[tuple[Rule, Join, list[Number]]]:
+    def concluding(self, conclusion: Fact) -> Iterator[tuple[DatalogRule, Join, list[Number]]]:
         """Return the rules that may draw a conclusion, and how to ask each for its premises."""
         for rule in self.rules:
             for pattern in rule.head:
@@ -80,12 +90,12 @@ class Program:
                 if bound is not None:
                     yield rule, self._backward(rule, tuple(bound)), list(bound.values())
 
-    def clashes(self, rule: Rule, culprits: Sequence[Number], facts: Facts) -> Iterator[list[Fact]]:
+    def clashes(self, rule: DatalogRule, culprits: Sequence[Number], facts: Facts) -> Iterator[list[Fact]]:
         """Yield what a rule that finds a contradiction finds it by, each time that it shows these culprits."""
         for values in self._backward(rule, rule.culprits)(facts, facts, *culprits):
             yield self.premises(rule, values)
 
-    def premises(self, rule: Rule, values: Sequence[Number]) -> list[Fact]:
+    def premises(self, rule: DatalogRule, values: Sequence[Number]) -> list[Fact]:
         """Return the body of a rule with numbers for its variables."""
         bound = dict(zip(rule.variables, values, strict=True))
         return [
@@ -103,7 +113,7 @@ class Program:
                 return None
         return bound
 
-    def _backward(self, rule: Rule, given: tuple[Term, ...]) -> Join:
+    def _backward(self, rule: DatalogRule, given: tuple[Term, ...]) -> Join:
         variables = [term for term in given if term.startswith("?")]
         return compile_join(rule, self.number, [rule.variables], given=variables)
 

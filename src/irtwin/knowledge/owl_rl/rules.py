@@ -25,7 +25,7 @@ _RULE = re.compile(
 
 
 @dataclass(frozen=True)
-class Rule:
+class DatalogRule:
     """A rule by its name. One that `head` is empty for finds a contradiction, shown by `culprits`."""
 
     name: str
@@ -40,14 +40,14 @@ class Rule:
         return tuple(dict.fromkeys(term for pattern in self.body for term in pattern if term.startswith("?")))
 
 
-def read_rules(file: Path) -> tuple[Rule, ...]:
+def read_rules(file: Path) -> tuple[DatalogRule, ...]:
     """Return the rules of a file, in its order."""
-    return tuple(_rule(found) for found in _RULE.finditer(file.read_text(encoding="utf-8")))
+    return tuple(_rule(match) for match in _RULE.finditer(file.read_text(encoding="utf-8")))
 
 
-def _rule(found: re.Match[str]) -> Rule:
-    name, _, head, culprits, body, condition = found.groups()
-    return Rule(
+def _rule(match: re.Match[str]) -> DatalogRule:
+    name, _, head, culprits, body, condition = match.groups()
+    return DatalogRule(
         name=name,
         head=_patterns(head or ""),
         culprits=tuple((culprits or "").split()),
@@ -84,17 +84,17 @@ class Facts:
 
     def __iter__(self) -> Iterator[Fact]:
         for predicate, objects in self.objects.items():
-            for subject, found in objects.items():
-                for object in found:
+            for subject, values in objects.items():
+                for object in values:
                     yield (subject, predicate, object)
 
     def add(self, fact: Fact) -> bool:
         """Add a triple; tell whether it is new."""
         subject, predicate, object = fact
-        found = self.objects.setdefault(predicate, {}).setdefault(subject, set())
-        if object in found:
+        values = self.objects.setdefault(predicate, {}).setdefault(subject, set())
+        if object in values:
             return False
-        found.add(object)
+        values.add(object)
         self.subjects.setdefault(predicate, {}).setdefault(object, set()).add(subject)
         return True
 
@@ -102,14 +102,14 @@ class Facts:
         """Return the same triples, to be added to apart with some predicates alone; with any where None is one."""
         other = Facts()
         for mine, its in ((self.objects, other.objects), (self.subjects, other.subjects)):
-            for predicate, found in mine.items():
+            for predicate, values in mine.items():
                 changes = None in changing or predicate in changing
-                its[predicate] = {key: set(some) for key, some in found.items()} if changes else found
+                its[predicate] = {key: set(some) for key, some in values.items()} if changes else values
         return other
 
 
 def compile_join(
-    rule: Rule,
+    rule: DatalogRule,
     number_of: Callable[[Term], Number],
     results: Sequence[Sequence[Term]],
     *,
@@ -132,7 +132,7 @@ def compile_join(
 class _Writer:
     """Writes a rule's body as nested loops, the pattern with the fewest open variables next."""
 
-    def __init__(self, rule: Rule, number_of: Callable[[Term], Number], new: int | None, given: Sequence[Term]):
+    def __init__(self, rule: DatalogRule, number_of: Callable[[Term], Number], new: int | None, given: Sequence[Term]):
         self._rule = rule
         self._number_of = number_of
         self._new = new

@@ -18,7 +18,7 @@ from pyoxigraph import Triple
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.closure import Closure, is_hidden
 from irtwin.knowledge.owl_rl.program import program
-from irtwin.knowledge.owl_rl.rules import Fact, Join, Number, Pattern, Rule, Term, compile_join
+from irtwin.knowledge.owl_rl.rules import DatalogRule, Fact, Join, Number, Pattern, Term, compile_join
 
 SUBJECT, OBJECT = -1, -2  # in a conclusion of the table: the ends of the fact that it follows from
 Key = Number | tuple[Number, Number]  # a predicate, or a predicate and an object
@@ -26,12 +26,12 @@ _NOTHING: frozenset[Any] = frozenset()
 
 
 @dataclass(frozen=True)
-class Conjunction:
+class SchemaConjunction:
     """What follows of a subject that has all of some predicates and objects: `concluded`, or where it finds a
     contradiction `culprits`, in which SUBJECT stands for the subject.
     """
 
-    rule: Rule
+    rule: DatalogRule
     keys: tuple[tuple[Number, Number], ...]
     concluded: tuple[Number, Number] | None
     culprits: tuple[Number, ...]
@@ -57,10 +57,10 @@ class Schema:
         forms = self.closure.terms.forms
         self.hidden = {number for number, terms in enumerate(forms) if terms and is_hidden(terms[0])}
         self.table: dict[Key, list[Fact]] = {}
-        self.conjunctions: list[Conjunction] = []
+        self.conjunctions: list[SchemaConjunction] = []
         self.single: set[tuple[Number, int]] = set()
         self.joins: list[Join] = []
-        self.contradictions: list[tuple[Rule, Join]] = []
+        self.contradictions: list[tuple[DatalogRule, Join]] = []
         self.looked_at: dict[Number | None, set[Number | None]] = {}
         self.reads_values = False
         self._pairs: dict[Number, frozenset[tuple[Number, Number]]] = {}
@@ -68,7 +68,7 @@ class Schema:
         for rule in self._program.rules:
             if not any(predicate == "owl:sameAs" for _, predicate, _ in rule.body):
                 self._take(rule)
-        keys = [*self.table, *(key for found in self.conjunctions for key in found.keys)]
+        keys = [*self.table, *(key for conjunction in self.conjunctions for key in conjunction.keys)]
         self.by_object = {key[0] for key in keys if isinstance(key, tuple)} | {self._program.type}
 
     def known(self, key: Key) -> AbstractSet[Any]:
@@ -78,7 +78,7 @@ class Schema:
             return facts.subjects.get(key[0], {}).get(key[1], _NOTHING)
         if key not in self._pairs:
             objects = facts.objects.get(key, {})
-            self._pairs[key] = frozenset((subject, one) for subject, found in objects.items() for one in found)
+            self._pairs[key] = frozenset((subject, one) for subject, values in objects.items() for one in values)
         return self._pairs[key]
 
     def _equalities(self) -> Iterator[str]:
@@ -88,7 +88,7 @@ class Schema:
             if same in fact and fact[0] != fact[2]:
                 yield self.closure.in_words(fact)
 
-    def _take(self, rule: Rule) -> None:
+    def _take(self, rule: DatalogRule) -> None:
         """Put what a rule concludes beside the ontology into a table, or its loops beside it."""
         of_facts = [index for index, pattern in enumerate(rule.body) if not self._program.is_of_models(pattern)]
         bindings = list(self._bindings(rule, of_facts)) if of_facts else []
@@ -96,9 +96,9 @@ class Schema:
             return
         patterns = [rule.body[index] for index in of_facts]
         if rule.head and len(of_facts) == 1:
-            found = [self._conclusions(rule, patterns[0], bound) for bound in bindings]
-            if None not in found:
-                for key, conclusions in filter(None, found):
+            concluded = [self._conclusions(rule, patterns[0], bound) for bound in bindings]
+            if None not in concluded:
+                for key, conclusions in filter(None, concluded):
                     self.table.setdefault(key, []).extend(conclusions)
                 return
         values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
@@ -121,16 +121,20 @@ class Schema:
         else:
             self.contradictions += [(rule, loop) for loop in loops]
 
-    def _bindings(self, rule: Rule, of_facts: list[int]) -> Iterator[dict[Term, Number]]:
+    def _bindings(self, rule: DatalogRule, of_facts: list[int]) -> Iterator[dict[Term, Number]]:
         """Yield the values that the ontology gives to variables of a rule."""
         patterns = tuple(pattern for index, pattern in enumerate(rule.body) if index not in of_facts)
         variables = {term for pattern in patterns for term in pattern}
-        asked = Rule(rule.name, (), (), patterns, tuple(pair for pair in rule.unequal if variables.issuperset(pair)))
+        asked = DatalogRule(
+            rule.name, (), (), patterns, tuple(pair for pair in rule.unequal if variables.issuperset(pair))
+        )
         facts = self.closure.facts
         for values in compile_join(asked, self._program.number, [asked.variables])(facts, facts):
             yield dict(zip(asked.variables, values, strict=True))
 
-    def _conclusions(self, rule: Rule, pattern: Pattern, bound: dict[Term, Number]) -> tuple[Key, list[Fact]] | None:
+    def _conclusions(
+        self, rule: DatalogRule, pattern: Pattern, bound: dict[Term, Number]
+    ) -> tuple[Key, list[Fact]] | None:
         """Return a key of the table, and what a rule concludes from a fact of it; None where it is no such rule."""
         subject, predicate, object = (self._value(term, bound) for term in pattern)
         decided = all(term in bound for pair in rule.unequal for term in pair)
@@ -141,12 +145,12 @@ class Schema:
             self.reads_values |= not all(self._is_datatype(self._value(head[2], bound)) for head in rule.head)
         values = {term: self._value(term, bound) for head in rule.head for term in head}
         numbers = {term: ends[value] if isinstance(value, str) else value for term, value in values.items()}
-        found = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
-        return (predicate if isinstance(object, str) else (predicate, object)), found
+        facts = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
+        return (predicate if isinstance(object, str) else (predicate, object)), facts
 
     def _conjunction(
-        self, rule: Rule, patterns: list[tuple[Number | Term, ...]], bound: dict[Term, Number]
-    ) -> Conjunction | None:
+        self, rule: DatalogRule, patterns: list[tuple[Number | Term, ...]], bound: dict[Term, Number]
+    ) -> SchemaConjunction | None:
         """Return what a rule concludes of a subject that fits all patterns; None where it is no such rule."""
         subjects = {pattern[0] for pattern in patterns}
         keys = tuple((p, o) for _, p, o in patterns if not isinstance(p, str) and not isinstance(o, str))
@@ -158,14 +162,14 @@ class Schema:
             return None
         if not rule.head:
             named = [self._value(term, bound) for term in rule.culprits]
-            return Conjunction(rule, keys, None, tuple(SUBJECT if isinstance(it, str) else it for it in named))
+            return SchemaConjunction(rule, keys, None, tuple(SUBJECT if isinstance(it, str) else it for it in named))
         s, p, o = (self._value(term, bound) for term in rule.head[0])
         if s != subject or isinstance(p, str) or isinstance(o, str):
             return None
-        return Conjunction(rule, keys, (p, o), ())
+        return SchemaConjunction(rule, keys, (p, o), ())
 
     def _one_value(
-        self, rule: Rule, patterns: list[Pattern], values: list[tuple[Number | Term, ...]]
+        self, rule: DatalogRule, patterns: list[Pattern], values: list[tuple[Number | Term, ...]]
     ) -> tuple[Number, int] | None:
         """Return the predicate of which a rule allows one object, or one subject; None where it is no such rule."""
         if len(patterns) != 2 or len(rule.head) != 1 or rule.head[0][1] != "owl:sameAs":

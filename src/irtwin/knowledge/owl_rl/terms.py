@@ -38,10 +38,10 @@ class Terms:
 
     def number(self, term: Node) -> Number:
         """Return the term's number, a new one where it has none yet."""
-        found = self._numbers.get(term)
-        if found is None:
-            found = self._numbers[term] = self._literal(term) if isinstance(term, Literal) else self._add(term)
-        return found
+        number = self._numbers.get(term)
+        if number is None:
+            number = self._numbers[term] = self._literal(term) if isinstance(term, Literal) else self._add(term)
+        return number
 
     def reserve(self, name: NamedNode, value: Value | None) -> None:
         """Give a number to a value that nobody has written yet, and a name for rules to call it by."""

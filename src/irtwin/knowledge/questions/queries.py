@@ -75,18 +75,18 @@ def robot_named(graph: KnowledgeGraph, name: str | None) -> str:
     Raises InputError where there is none of the name, with the nearest one, or where there are others.
     """
     rows = graph.query("SELECT ?arm ?name { ?arm irt:has_Information / irt:IR_Name ?name } ORDER BY ?name")
-    found = {row["name"]: row["arm"] for row in rows}
-    known = ", ".join(list(found)[:10]) + (", ..." if len(found) > 10 else "")
-    if name is None and len(found) == 1:
-        return str(*found.values())
+    arms = {row["name"]: row["arm"] for row in rows}
+    known = ", ".join(list(arms)[:10]) + (", ..." if len(arms) > 10 else "")
+    if name is None and len(arms) == 1:
+        return str(*arms.values())
     if name is None:
-        raise InputError(f"say which robot by --robot; known are {known}" if found else "the graph knows no robot")
-    if name not in found:
-        near = get_close_matches(name, found, n=1)
+        raise InputError(f"say which robot by --robot; known are {known}" if arms else "the graph knows no robot")
+    if name not in arms:
+        near = get_close_matches(name, arms, n=1)
         raise InputError(
             f"there is no robot {name!r}: " + (f"did you mean {near[0]}?" if near else f"known are {known}")
         )
-    return str(found[name])
+    return str(arms[name])
 
 
 def to_json(table: Table) -> str:

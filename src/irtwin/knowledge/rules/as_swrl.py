@@ -87,14 +87,14 @@ def _imps(rule: Rule, model: _Model) -> Iterator[set[Triple]]:
 
     SWRL lets a rule conclude several things, but Openllet then draws one of them.
     """
-    said = conjunction(rule.construct)
-    own = joined_to(rdflib.Variable("this"), said.patterns)
-    rows = model.values([it for it in said.patterns if it not in own])
+    parts = conjunction(rule.construct)
+    own = joined_to(rdflib.Variable("this"), parts.patterns)
+    rows = model.values([it for it in parts.patterns if it not in own])
     if not rows or len(rows) > MOST_VALUES:
         raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
-    for row, conclusion in product(rows, said.template):
+    for row, conclusion in product(rows, parts.template):
         imp = _Imp(model)
-        body = imp.body(_bound(own, row), _bound(said.comparisons, row))
+        body = imp.body(_bound(own, row), _bound(parts.comparisons, row))
         yield imp.written(rule, body, imp.head(*_bound([conclusion], row)))
 
 
@@ -213,10 +213,10 @@ class _Imp:
             rest = cell
         return rest
 
-    def _node(self, kind: str, said: dict[str, Any]) -> BlankNode:
+    def _node(self, kind: str, properties: dict[str, Any]) -> BlankNode:
         node = BlankNode()
         self._say(node, RDF.type, NamedNode(NAMESPACE + kind))
-        for name, value in said.items():
+        for name, value in properties.items():
             self._made.add(Triple(node, NamedNode(NAMESPACE + name), value))
         return node
 

@@ -37,8 +37,8 @@ class Rule:
 
 def start_of_body(construct: str) -> int | None:
     """Return where that begins which stands within a CONSTRUCT's WHERE { }; None where it is no CONSTRUCT."""
-    found = _BODY.search(masked(construct))
-    return None if found is None else found.end()
+    match = _BODY.search(masked(construct))
+    return None if match is None else match.end()
 
 
 def group_of(rule: Rule) -> tuple[str, str]:

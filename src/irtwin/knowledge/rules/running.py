@@ -25,7 +25,7 @@ MOST_ROUNDS = 100
 def conclusions(
     triples: Iterable[Triple],
     rules: Iterable[Rule],
-    close: Callable[[set[Triple]], Iterable[Triple]] = lambda found: (),
+    close: Callable[[set[Triple]], Iterable[Triple]] = lambda seen: (),
 ) -> dict[str, set[Triple]]:
     """Run rules until nothing is new; return what each concludes, be it known already or not, by its named graph.
 
@@ -49,13 +49,13 @@ def _run(
     """Run rules of one order until nothing is new."""
     for _ in range(MOST_ROUNDS):
         before = len(store)
-        found = [(rule, _construct(store, rule)) for rule in rules]
-        for rule, some in found:
+        concluded = [(rule, _construct(store, rule)) for rule in rules]
+        for rule, some in concluded:
             made.setdefault(rule.graph, set()).update(some)
             store.extend(in_graph(some))
         if len(store) == before:
             return
-        store.extend(in_graph(close(set().union(*(some for _, some in found)))))
+        store.extend(in_graph(close(set().union(*(some for _, some in concluded)))))
     raise InputError(
         f"the rules still find something new after {MOST_ROUNDS} rounds; check whether they create blank nodes"
     )

@@ -50,14 +50,14 @@ def _rule(shapes: Shapes, shape: Node, rule: Node) -> Rule:
 
 
 def _targets(shapes: Shapes, shape: Node) -> list[str]:
-    found = [form.format(value) for name, form in _TARGETS.items() for value in shapes.values(shape, name)]
+    targets = [form.format(value) for name, form in _TARGETS.items() for value in shapes.values(shape, name)]
     if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(shapes.values(shape, RDF + "type")):
-        found.append(_TARGETS["targetClass"].format(shape))
-    if not found or shapes.values(shape, "target"):
+        targets.append(_TARGETS["targetClass"].format(shape))
+    if not targets or shapes.values(shape, "target"):
         raise shapes.fault(
             shape, "its rule needs sh:targetClass, sh:targetNode, sh:targetSubjectsOf or sh:targetObjectsOf"
         )
-    return found
+    return targets
 
 
 def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
@@ -81,10 +81,10 @@ def _number(shapes: Shapes, node: Node) -> Decimal:
 
 
 def _text(shapes: Shapes, node: Node, name: str) -> str:
-    found = shapes.value(node, RDFS + name)
-    return found.value if isinstance(found, Literal) else ""
+    literal = shapes.value(node, RDFS + name)
+    return literal.value if isinstance(literal, Literal) else ""
 
 
 def _value(shapes: Shapes, node: Node, name: str) -> str:
-    found = shapes.value(node, name)
-    return found.value if isinstance(found, NamedNode | Literal) else ""
+    value = shapes.value(node, name)
+    return value.value if isinstance(value, NamedNode | Literal) else ""

@@ -33,15 +33,15 @@ def rules_of(triples: Iterable[Triple], source: str) -> Iterator[Rule]:
 
     Class atoms name a class, or a restriction to values; built-ins compare, add, subtract, multiply or divide.
     """
-    said: dict[Any, _Node] = {}
+    nodes: dict[Any, _Node] = {}
     for triple in triples:
-        said.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
-    for node, of in said.items():
+        nodes.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
+    for node, of in nodes.items():
         if of.get(RDF + "type") == NamedNode(NAMESPACE + "Imp"):
             label, comment = (getattr(of.get(RDFS + name), "value", "") for name in ("label", "comment"))
             if not label:
                 raise InputError(f"{source}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
-            construct = _Imp(said, f"{source}: the rule {label!r}").construct(of)
+            construct = _Imp(nodes, f"{source}: the rule {label!r}").construct(of)
             name = node.value if isinstance(node, NamedNode) else label
             yield Rule(name, label, comment, (Decimal(0), Decimal(0)), construct, SWRL)
 
@@ -108,10 +108,10 @@ class _Imp:
         if isinstance(of_property, NamedNode) and value is not None:
             return [f"{subject} {of_property} {self._term(value)} ."]
         if isinstance(of_property, NamedNode) and some is not None:
-            found = f"?value{len(self._names)}"
-            self._names[found] = found[1:]
-            within = [] if some == NamedNode(RDFS + "Literal") else self._range(found, some)
-            return [f"{subject} {of_property} {found} .", *within]
+            variable = f"?value{len(self._names)}"
+            self._names[variable] = variable[1:]
+            within = [] if some == NamedNode(RDFS + "Literal") else self._range(variable, some)
+            return [f"{subject} {of_property} {variable} .", *within]
         raise self._fault("has a class expression that irtwin does not run; name a class for it in ontology/")
 
     def _range(self, value: str, kind: Any) -> list[str]:

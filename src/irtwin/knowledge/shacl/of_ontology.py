@@ -29,15 +29,15 @@ def with_ontology(by_hand: Iterable[Triple], ontology: Iterable[Triple]) -> set[
     Among them stands which classes are below unions of classes; a SHACL engine looks for that in the data.
     """
     written = set(by_hand)
-    said = _Ontology(Shapes(ontology, "the ontology"), Shapes(written, "rules/shapes.ttl"))
+    terms = _Ontology(Shapes(ontology, "the ontology"), Shapes(written, "rules/shapes.ttl"))
     closed = {
-        triple: set(_one_of(triple.subject, said.catalogues[triple.object.value]))
+        triple: set(_one_of(triple.subject, terms.catalogues[triple.object.value]))
         for triple in written
         if triple.predicate.value == SH + "class"
         and isinstance(triple.object, NamedNode)
-        and triple.object.value in said.catalogues
+        and triple.object.value in terms.catalogues
     }
-    return (written - closed.keys()).union(said.domains(), said.ranges(), said.members(), *closed.values())
+    return (written - closed.keys()).union(terms.domains(), terms.ranges(), terms.members(), *closed.values())
 
 
 class _Ontology:
@@ -46,7 +46,9 @@ class _Ontology:
     def __init__(self, said: Shapes, by_hand: Shapes):
         self._said, self._by_hand = said, by_hand
         self._classes = {one for one in said.having(_TYPE, OWL + "Class") if self._is_own(one)}
-        self.catalogues = {one.value: found for one in self._classes if (found := self._individuals(one.value))}
+        self.catalogues = {
+            one.value: individuals for one in self._classes if (individuals := self._individuals(one.value))
+        }
 
     def domains(self) -> Iterator[Triple]:
         """Yield that what has a property is said to be of its domain."""
@@ -77,11 +79,11 @@ class _Ontology:
 
     def members(self) -> Iterator[Triple]:
         """Yield that a catalogue has no individuals but those of the ontology."""
-        for name, found in self.catalogues.items():
+        for name, individuals in self.catalogues.items():
             shape = _shape("catalogue", name)
             yield from _is(shape, f"is not in the ontology, which lists every {self._label(name)} ({shorten(name)})")
             yield _triple(shape, "targetClass", NamedNode(name))
-            yield from _one_of(shape, found)
+            yield from _one_of(shape, individuals)
 
     def _properties(self, end: str) -> list[str]:
         return sorted(one.value for one in self._said.having(RDFS + end) if self._is_own(one))
@@ -94,14 +96,14 @@ class _Ontology:
 
     def _classes_of(self, name: str, end: str) -> Classes:
         """Return the classes that a property's domain or range is, or is the union of."""
-        said = self._said.value(NamedNode(name), RDFS + end)
-        if isinstance(said, NamedNode):
-            return (said.value,)
-        found, cell = list[str](), self._said.value(said, OWL + "unionOf")
+        cell_or_class = self._said.value(NamedNode(name), RDFS + end)
+        if isinstance(cell_or_class, NamedNode):
+            return (cell_or_class.value,)
+        classes, cell = list[str](), self._said.value(cell_or_class, OWL + "unionOf")
         while isinstance(first := self._said.value(cell, RDF + "first"), NamedNode):
-            found.append(first.value)
+            classes.append(first.value)
             cell = self._said.value(cell, RDF + "rest")
-        return tuple(found)
+        return tuple(classes)
 
     def _is_asked_by_hand(self, name: str) -> bool:
         """Whether shapes by hand ask for the class of a property's values, of all that may have the property."""
@@ -117,13 +119,13 @@ class _Ontology:
 
     def _above(self, one: object) -> set[object]:
         """Return a class with those that it is below of."""
-        found, todo = set[object](), [one]
+        above, todo = set[object](), [one]
         while todo:
             each = todo.pop()
-            if each not in found:
-                found.add(each)
+            if each not in above:
+                above.add(each)
                 todo += self._said.values(each, SUB_CLASS_OF.value)
-        return found
+        return above
 
     def _individuals(self, name: str) -> list[str]:
         """Return the individuals that the ontology says of a class; of classes below as well where it says any."""

@@ -25,8 +25,8 @@ class Shapes:
         """Return the nodes that have a property, by its whole IRI; with that value, an IRI, if one is given."""
         return [
             subject  # type: ignore[misc]
-            for subject, found in self._objects.items()
-            if name in found and (value is None or NamedNode(value) in found[name])
+            for subject, objects in self._objects.items()
+            if name in objects and (value is None or NamedNode(value) in objects[name])
         ]
 
     def all(self) -> list[Node]:

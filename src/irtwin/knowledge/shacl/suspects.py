@@ -83,13 +83,13 @@ class _Writer:
 
     def _of_kind(self, variable: str, kind: Node) -> str:
         """Return what is true of a variable that is a class, or below it."""
-        found, todo = {kind}, [kind]
+        kinds, todo = {kind}, [kind]
         while todo:
-            new = self._below.get(todo.pop(), set()) - found
-            found |= new
+            new = self._below.get(todo.pop(), set()) - kinds
+            kinds |= new
             todo += new
-        if all(isinstance(one, NamedNode) for one in found):
-            names = sorted(map(str, found))
+        if all(isinstance(one, NamedNode) for one in kinds):
+            names = sorted(map(str, kinds))
             if variable == _KIND:  # its individuals are looked up
                 return f"VALUES {variable} {{ {' '.join(names)} }}"
             return f"FILTER({variable} IN ({', '.join(names)}))"
@@ -182,15 +182,15 @@ class _Writer:
         return f"{node} IN ({', '.join(map(str, items))})"
 
     def _list(self, cell: Node | None) -> list[Node]:
-        found = []
+        members = []
         while (first := self._shapes.value(cell, RDF + "first")) is not None:
-            found.append(first)
+            members.append(first)
             cell = self._shapes.value(cell, RDF + "rest")
-        return found
+        return members
 
     def _text(self, node: Node, name: str) -> str:
-        found = self._shapes.value(node, name)
-        return found.value if isinstance(found, Literal) else ""
+        literal = self._shapes.value(node, name)
+        return literal.value if isinstance(literal, Literal) else ""
 
     def _name(self) -> str:
         return f"?_v{next(self._numbers)}"

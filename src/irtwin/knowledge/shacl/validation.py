@@ -56,10 +56,10 @@ class Violation:
 
     def __str__(self) -> str:
         """Return one line: what is wrong, with which node, of which robot."""
-        said = "has several values" if self.several else f"is {self.value or 'absent'}"
-        found = "" if self.property is None else f" ({shorten(self.property)} {said})"
+        fault = "has several values" if self.several else f"is {self.value or 'absent'}"
+        of_property = "" if self.property is None else f" ({shorten(self.property)} {fault})"
         of = "" if self.robot is None else f"{shorten(self.robot)}: "
-        return f"{of}{shorten(self.node)}: {self.message}{found}"
+        return f"{of}{shorten(self.node)}: {self.message}{of_property}"
 
 
 @seldom_collected()
@@ -103,8 +103,8 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
         checked = each_part.of_these(ontology, regions, partial(_results_anew, report))
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
     with closing(checked):
-        for result, said in checked:
-            report += said
+        for result, of_robot in checked:
+            report += of_robot
             report.add((head, SH.result, result))
     report.set((head, SH.conforms, rdflib.Literal((head, SH.result, None) not in report)))
     return report
@@ -125,9 +125,9 @@ def _results(ontology: Ontology, regions: list[Region]) -> Results:
         raise Joined("a node without a name")
     if region.nodes and not region.asserted:
         return
-    found = _report(ontology.triples | region.asserted, ontology, ontology.resources.of("shapes"))
-    if found is not None:
-        yield from ((one, found.cbd(one)) for one in _about(found, region.nodes or ontology.terms))
+    report = _report(ontology.triples | region.asserted, ontology, ontology.resources.of("shapes"))
+    if report is not None:
+        yield from ((one, report.cbd(one)) for one in _about(report, region.nodes or ontology.terms))
 
 
 def _about(report: rdflib.Graph, nodes: Iterable[object]) -> list[rdflib.term.Node]:
@@ -155,19 +155,19 @@ class _Robots:
         if node not in self._known:
             region = parts.around(self._graph, self._ontology, [NamedNode(node)])
             robots = [] if region is None else parts.robots(self._ontology, region.asserted)
-            found = robots[0].value if len(robots) == 1 else None
-            self._known |= dict.fromkeys([node, *(one.value for one in (region.nodes if region else ()))], found)
+            robot = robots[0].value if len(robots) == 1 else None
+            self._known |= dict.fromkeys([node, *(one.value for one in (region.nodes if region else ()))], robot)
         return self._known[node]
 
 
-def _report(said: set[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
+def _report(statements: set[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
     """Return what pySHACL finds; None without asking it where nothing is suspected."""
     shapes = _shapes(frozenset(ontology.triples), files)
-    store, asked = shapes.store_of(said)
+    store, asked = shapes.store_of(statements)
     if not any_suspect(store, asked):
         return None
     report: rdflib.Graph
-    _, report, _ = pyshacl.validate(_as_rdflib(shapes.unions | said), shacl_graph=shapes.graph)
+    _, report, _ = pyshacl.validate(_as_rdflib(shapes.unions | statements), shacl_graph=shapes.graph)
     return report
 
 
@@ -204,11 +204,11 @@ def _as_rdflib(triples: Iterable[Triple]) -> rdflib.Graph:
 
 
 def _violation(report: rdflib.Graph, result: rdflib.term.Node, robots: _Robots) -> Violation:
-    said = {name: report.value(result, SH[name]) for name in ("focusNode", "resultMessage", "resultPath", "value")}
-    focus, path, value = said["focusNode"], said["resultPath"], said["value"]
+    values = {name: report.value(result, SH[name]) for name in ("focusNode", "resultMessage", "resultPath", "value")}
+    focus, path, value = values["focusNode"], values["resultPath"], values["value"]
     return Violation(
         node=str(focus),
-        message=str(said["resultMessage"]),
+        message=str(values["resultMessage"]),
         property=str(path) if isinstance(path, rdflib.URIRef) else None,
         value=None if value is None else str(value),
         robot=robots.of(str(focus)) if isinstance(focus, rdflib.URIRef) else None,

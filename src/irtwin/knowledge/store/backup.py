@@ -38,10 +38,9 @@ from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import NamedFile, named_files
 from irtwin.storage.schema import LIVE, Base, Moment, Robot
-from irtwin.storage.series import FOLDER, fetch_series, moved_out
-from irtwin.storage.series_place import asked, elsewhere, look
+from irtwin.storage.series import FOLDER
 from irtwin.storage.tariff import FILE as PLANT_FILE
-from irtwin.trust import trust, withdraw
+from irtwin.trust import withdraw
 
 _FOLDERS = (FOLDER, TWINS, DIAGNOSES, MESHES, LIVE, "reports")
 _GRAPH = "graph.nq"
@@ -64,9 +63,6 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
     engine.check(place.engine, math.inf)  # a large one was not looked through at opening
     reads_only = engine.is_read_only(place.engine)
     with files.working_folder(archive.absolute().parent if reads_only else place.folder, ".backup-") as held:
-        storage = elsewhere(place.folder)
-        if storage is not None:  # before writers have to wait: the network may be slow
-            fetch_series(storage, held, storage.paths(FOLDER))
         with place.engine.connect() as connection:
             connection.execution_options(**snapshot_options(place.engine))
             with connection.begin():
@@ -90,19 +86,17 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
             raise InputError(_incomplete(place.folder, lost, "altered", "nothing was written"))
 
 
-def restore(archive: Path, where: Location | Path, series_url: str | None = None) -> None:
+def restore(archive: Path, where: Location | Path) -> None:
     """Make a workspace of an archive, whole or not at all, where there is none.
 
     Rows go to the location's database, into tables that must be empty, and the graph to its server, where there are
-    such; with `series_url` the series go to object storage, which must hold no other workspace's.
+    such.
     Raises InputError where the archive is damaged or not ours, or where there is something already.
     """
     location = Location.of(where)
     folder = location.folder
     if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise InputError(f"{folder}: already exists; restore into a new folder")
-    if series_url is not None:
-        look(series_url)
     folder.absolute().parent.mkdir(parents=True, exist_ok=True)
     with files.working_folder(folder.absolute().parent, ".irtwin-restore-") as working:
         held = working / "workspace"
@@ -129,22 +123,19 @@ def restore(archive: Path, where: Location | Path, series_url: str | None = None
                     names = (str(quad.graph_name) for quad in _read_quads(archive, held / _GRAPH))
                     if robots and not any(name.startswith(f"<{GRAPH_SOURCE}") for name in names):
                         raise InputError(f"{archive}: incomplete: its graph knows no robot; use another backup")
-                    with moved_out(held, series_url):
-                        graph.replace(_read_quads(archive, held / _GRAPH), "")
+                    graph.replace(_read_quads(archive, held / _GRAPH), "")
         shutil.rmtree(held / "rows", ignore_errors=True)
         (held / _GRAPH).unlink(missing_ok=True)
-        _put_in_place(held, folder, series_url)
+        _put_in_place(held, folder)
 
 
-def _put_in_place(held: Path, folder: Path, series_url: str | None) -> None:
+def _put_in_place(held: Path, folder: Path) -> None:
     """Give a workspace its place. What an earlier one there was trusted with is not this one's."""
     withdraw(held)
     withdraw(folder)
     if folder.exists():
         folder.rmdir()
     held.rename(folder)
-    if series_url is not None:
-        trust(folder, [asked(series_url)])
 
 
 def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) -> str:
@@ -157,11 +148,6 @@ def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) ->
 
 def _linked(folder: Path, held: Path) -> Iterator[tuple[str, Path]]:
     """Link a workspace's files into a folder; those that still grow are copied."""
-    storage = elsewhere(folder)
-    if storage is not None:
-        there = storage.paths(FOLDER)
-        fetch_series(storage, held, there)
-        yield from ((path, held / path) for path in sorted(there))
     for name in _FOLDERS:
         (held / name).mkdir(exist_ok=True)
         for file in filter(Path.is_file, sorted((folder / name).glob("[!.]*"))):

@@ -53,6 +53,6 @@ def same(some: set[Triple], others: set[Triple]) -> bool:
 
 
 def _canonical(triples: Iterable[Triple]) -> Dataset:
-    found = Dataset(Quad(triple.subject, triple.predicate, triple.object) for triple in triples)
-    found.canonicalize(CanonicalizationAlgorithm.RDFC_1_0)
-    return found
+    dataset = Dataset(Quad(triple.subject, triple.predicate, triple.object) for triple in triples)
+    dataset.canonicalize(CanonicalizationAlgorithm.RDFC_1_0)
+    return dataset

@@ -142,8 +142,8 @@ class KnowledgeGraph:
     def base(self) -> str:
         """What the IRIs of its individuals begin with."""
         if self._base is None:
-            said = cast(QuerySolutions, self._store.query(_ASK_BASE))
-            self._base = next((row["base"].value for row in said), ID)
+            solutions = cast(QuerySolutions, self._store.query(_ASK_BASE))
+            self._base = next((row["base"].value for row in solutions), ID)
         return self._base
 
     @property
@@ -160,9 +160,9 @@ class KnowledgeGraph:
 
     def load_ontology(self) -> None:
         """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says."""
-        said = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
+        triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
         tariff = () if self._workspace is None else tariff_of(self._workspace)
-        self.replace(in_graph(chain(said, tariff), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+        self.replace(in_graph(chain(triples, tariff), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
 
     @property
     @telling
@@ -444,13 +444,13 @@ class KnowledgeGraph:
         named, others = _by_name(nodes)
         without = ", ".join(f"<{name}>" for name in apart)
         form = "SELECT DISTINCT ?s {{ VALUES ?o {{ {} }} GRAPH ?g {{ ?s ?p ?o }} FILTER(?g NOT IN ({})) }}"
-        found = {
+        linked = {
             row[0] for some in named for row in cast(QuerySolutions, self._store.query(form.format(some, without)))
         }
         apart = set(apart)
         quads = (quad for node in others for quad in self.about(node) if quad.object == node)
-        found.update(quad.subject for quad in quads if getattr(quad.graph_name, "value", "") not in apart)
-        return found
+        linked.update(quad.subject for quad in quads if getattr(quad.graph_name, "value", "") not in apart)
+        return linked
 
     @telling
     def subjects(self, predicate: NamedNode, object: NamedNode) -> set[NamedNode | BlankNode]:
@@ -504,10 +504,10 @@ def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Qua
 
 def _by_name(nodes: Iterable[NamedNode | BlankNode]) -> tuple[list[str], list[BlankNode]]:
     """Return the IRIs among nodes, some thousand at a time, and the others, which no query can name."""
-    said = list(nodes)
-    named = [str(node) for node in said if isinstance(node, NamedNode)]
+    terms = list(nodes)
+    named = [str(node) for node in terms if isinstance(node, NamedNode)]
     batches = [" ".join(named[at : at + _NAMED_AT_ONCE]) for at in range(0, len(named), _NAMED_AT_ONCE)]
-    return batches, [node for node in said if isinstance(node, BlankNode)]
+    return batches, [node for node in terms if isinstance(node, BlankNode)]
 
 
 def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:

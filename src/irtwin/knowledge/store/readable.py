@@ -31,6 +31,6 @@ def is_readable(text: str, base: str | None) -> bool:
     """Whether reading a query comes to an end, be it an error."""
     if len(text) <= _SHORT:
         return True
-    said = json.dumps([text, base, PREFIXES])
-    done = subprocess.run([sys.executable, "-c", _READ], input=said, text=True, capture_output=True, check=False)
+    key = json.dumps([text, base, PREFIXES])
+    done = subprocess.run([sys.executable, "-c", _READ], input=key, text=True, capture_output=True, check=False)
     return done.returncode >= 0

@@ -31,10 +31,10 @@ class KeptAnswers:
     def get(self, text: str, *beside: Hashable) -> Any:
         """Return the answer to a query, asked in some way; None where none is kept."""
         with self._lock:
-            found = self._answers.pop((text, *beside), None)
-            if found is not None:
-                self._answers[(text, *beside)] = found
-            return found
+            kept = self._answers.pop((text, *beside), None)
+            if kept is not None:
+                self._answers[(text, *beside)] = kept
+            return kept
 
     def keep(self, answer: Any, text: str, *beside: Hashable) -> None:
         """Keep an answer, if the query's text alone says what it is."""

@@ -62,14 +62,14 @@ class _Asker:
 
         def call(*arguments: Term) -> Literal | None:
             try:
-                found = self._ask(name, arguments)
+                value = self._ask(name, arguments)
             except InputError as error:
                 if len(self._faults) < _MOST_FAULTS:
                     self._faults[f"series:{name}: {error}"] = None
                 return None
-            if isinstance(found, list):
-                return Literal(json.dumps(found), datatype=_JSON)
-            return None if found is None else Literal(found)
+            if isinstance(value, list):
+                return Literal(json.dumps(value), datatype=_JSON)
+            return None if value is None else Literal(value)
 
         return call
 

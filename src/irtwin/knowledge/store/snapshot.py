@@ -35,9 +35,9 @@ T = TypeVar("T")
 @contextmanager
 def view(folder: Path) -> Iterator[Path | None]:
     """Give a folder that shows a graph as it is now, for who has it open to write; None where no links can be made."""
-    held, found = _whole(lambda: folder, lambda source, held: _links(source, held, _WRITTEN_ON))
+    held, copy = _whole(lambda: folder, lambda source, held: _links(source, held, _WRITTEN_ON))
     with held:
-        yield found
+        yield copy
 
 
 @contextmanager
@@ -46,7 +46,7 @@ def kept(folder: Path) -> Iterator[None]:
 
     Where no links can be made they see each transaction.
     """
-    with view(folder) as found, nullcontext() if found is None else published(found):
+    with view(folder) as copy, nullcontext() if copy is None else published(copy):
         yield
 
 
@@ -142,7 +142,7 @@ def _belonging(folder: Path) -> Stamp:
 
 def _stamp(folder: Path, pattern: str = "*") -> Stamp:
     """Return name, size and time of change of the files that hold data."""
-    found = []
+    stamps = []
     for file in sorted(folder.glob(pattern)):
         if file.name.startswith(_NO_DATA):
             continue
@@ -150,5 +150,5 @@ def _stamp(folder: Path, pattern: str = "*") -> Stamp:
             status = file.stat()
         except FileNotFoundError:
             continue
-        found.append((file.name, status.st_size, status.st_mtime_ns))
-    return tuple(found)
+        stamps.append((file.name, status.st_size, status.st_mtime_ns))
+    return tuple(stamps)

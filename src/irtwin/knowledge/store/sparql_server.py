@@ -146,10 +146,10 @@ class SparqlServer:
             request = Request(url, text.encode(), headers, method="POST")
             return cast("HTTPResponse", urlopen(request, timeout=TIMEOUT))
         except HTTPError as error:
-            said = " ".join(error.read(1000).decode(errors="replace").split())[:300]
+            reply = " ".join(error.read(1000).decode(errors="replace").split())[:300]
             if error.code == 400:
-                raise SyntaxError(said) from None
-            refused = f"{error.code} {error.reason}. {said}"
+                raise SyntaxError(reply) from None
+            refused = f"{error.code} {error.reason}. {reply}"
             raise ServerFault(f"{self.shown}: the server refuses the {kind}: {refused}") from None
         except (URLError, HTTPException, OSError) as error:
             reason = error.reason if isinstance(error, URLError) else error
@@ -192,5 +192,5 @@ def _credentials(address: SplitResult) -> dict[str, str]:
 
 
 def _with_prologue(text: str, base: str | None, prefixes: Mapping[str, str] | None) -> str:
-    said = [f"BASE <{base}> "] if base else []
-    return "".join([*said, *(f"PREFIX {name}: <{iri}> " for name, iri in (prefixes or {}).items()), text])
+    lines = [f"BASE <{base}> "] if base else []
+    return "".join([*lines, *(f"PREFIX {name}: <{iri}> " for name, iri in (prefixes or {}).items()), text])

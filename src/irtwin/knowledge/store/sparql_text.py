@@ -22,9 +22,9 @@ _OUTERMOST_GROUP = re.compile(r"\b(?:SELECT|ASK)\b[^{]*\{|\bWHERE\s*\{", re.IGNO
 
 def after_prologue(text: str) -> int:
     """Return where a text's BASE and PREFIX, and the comments around them, have ended."""
-    found = _PROLOGUE.match(text)
-    assert found is not None
-    return found.end()
+    match = _PROLOGUE.match(text)
+    assert match is not None
+    return match.end()
 
 
 def masked(text: str) -> str:

@@ -34,13 +34,13 @@ Sums = dict[str, list[int]]  # name -> CRC-32, modification time in ns
 
 def fault(folder: Path) -> str | None:
     """Return what is wrong with a store's files; None where nothing is, or its manifest is for RocksDB to judge."""
-    found = None
+    damage = None
     for _ in range(_TRIES):
         before = _manifest(folder)
-        found = _fault(folder)
-        if found is None or before == _manifest(folder):  # else another process changed the files meanwhile
-            return found
-    return found
+        damage = _fault(folder)
+        if damage is None or before == _manifest(folder):  # else another process changed the files meanwhile
+            return damage
+    return damage
 
 
 def note_sums(folder: Path) -> None:
@@ -49,8 +49,8 @@ def note_sums(folder: Path) -> None:
     known, sums = _sums(before), Sums()
     for name in _tables(folder) or {}:
         with suppress(FileNotFoundError):  # the store has merged it into another meanwhile
-            found, noted = _sum(folder / name, known.get(name)), known.get(name)
-            sums[name] = noted if noted and noted[0] != found[0] else found  # altered: told at the next opening
+            summed, noted = _sum(folder / name, known.get(name)), known.get(name)
+            sums[name] = noted if noted and noted[0] != summed[0] else summed  # altered: told at the next opening
     manifest = _manifest(folder)
     now = {"read": sums, "manifest": [_manifest_name(folder), len(manifest), crc32(manifest)]}
     if now != before:
@@ -79,17 +79,17 @@ def _fault(folder: Path) -> str | None:
 
 def _noted(folder: Path) -> dict[str, Any]:
     try:
-        said = parse_json(read_text(folder / _SUMS, _MOST_BYTES))
+        noted = parse_json(read_text(folder / _SUMS, _MOST_BYTES))
     except (InputError, ValueError):
         return {}
-    return said if isinstance(said, dict) else {}
+    return noted if isinstance(noted, dict) else {}
 
 
 def _sums(noted: dict[str, Any]) -> Sums:
     read = noted.get("read")
     if not isinstance(read, dict):
         return {}
-    return {name: said for name, said in read.items() if isinstance(said, list) and len(said) == 2}
+    return {name: value for name, value in read.items() if isinstance(value, list) and len(value) == 2}
 
 
 def _sum(table: Path, known: list[int] | None) -> list[int]:

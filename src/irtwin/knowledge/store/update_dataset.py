@@ -36,23 +36,23 @@ def using(text: str, default_graphs: Sequence[str], named_graphs: Sequence[str],
         raise InputError(f"not a SPARQL update: {in_words(error, text)}") from error
     if fault_without(text, ("using", "with"), parse_update, base) is not None:
         raise InputError("the update has USING or WITH and the request has using-graph-uri; use only one")
-    places = [found.start() for found in _WHERE.finditer(text)]
+    places = [match.start() for match in _WHERE.finditer(text)]
     if len(places) > MOST_PLACES:
         raise InputError(f"an update with using-graph-uri says WHERE at most {MOST_PLACES} times")
-    said = f" {' '.join(clauses)} "
+    clause_text = f" {' '.join(clauses)} "
     for place in reversed(places):  # so that those before stay where they are
         before, after = text[:place], text[place:]
-        if _is_clause(before, said, after, base):
-            text = f"{before}{said}{after}"
-        elif _is_clause(before, "{ }" + said, after, base):
-            text = f"{before}{_pattern(text, place, base)}{said}{after}"
+        if _is_clause(before, clause_text, after, base):
+            text = f"{before}{clause_text}{after}"
+        elif _is_clause(before, "{ }" + clause_text, after, base):
+            text = f"{before}{_pattern(text, place, base)}{clause_text}{after}"
     return text
 
 
-def _is_clause(before: str, said: str, after: str, base: str | None) -> bool:
+def _is_clause(before: str, clause: str, after: str, base: str | None) -> bool:
     """Whether USING may stand at a place as a clause, which it does not within a string or a comment."""
-    return is_update(before + said + after, base) and not is_update(
-        before + said.replace("USING", "US_NG") + after, base
+    return is_update(before + clause + after, base) and not is_update(
+        before + clause.replace("USING", "US_NG") + after, base
     )
 
 
@@ -60,7 +60,7 @@ def _pattern(text: str, place: int, base: str | None) -> str:
     """Return the group after a DELETE WHERE: up to the first brace that makes it whole."""
     start = place + len("WHERE")
     prologue = text[: after_prologue(text)]
-    ends = (found.end() for found in re.compile("}").finditer(text, start))
+    ends = (match.end() for match in re.compile("}").finditer(text, start))
     for end in _first(ends):
         if is_update(f"{prologue}DELETE WHERE {text[start:end]}", base):
             return text[start:end]

@@ -86,12 +86,12 @@ def by_doing(
             return done(without, (*empty, missing[1]))
         return set(store)
 
-    found = done()
-    union = {quad.triple for quad in found if quad.graph_name == DefaultGraph()}
+    result = done()
+    union = {quad.triple for quad in result if quad.graph_name == DefaultGraph()}
     old = {quad.triple for quad in before}
     # What the default graph lost goes from every named graph, but for those that the update itself puts it into.
-    lost = {quad for quad in before & found if quad.triple not in union}
-    named = {quad for quad in found if quad.graph_name != DefaultGraph()} - lost
+    lost = {quad for quad in before & result if quad.triple not in union}
+    named = {quad for quad in result if quad.graph_name != DefaultGraph()} - lost
     named |= lost & done(lost) if lost else set()
     new = union - old - {quad.triple for quad in named}
     after = named | set(_in_graph(new))

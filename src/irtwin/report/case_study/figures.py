@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from itertools import cycle
 
 import numpy as np
 
 from irtwin.report.colours import HELD_OUT, MEASURED, MODELLED, PALETTE, RESIDUAL
-from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.explorer import Columns
 from irtwin.report.questions import Row
+from irtwin.report.traces import Figure, axis, plain, trace
 from irtwin.signals.channels import CHANNELS
 
 _TIME = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
@@ -29,7 +29,7 @@ def figures(plan: Columns, run: Columns, joints: Sequence[Row]) -> dict[str, Fig
 def _motion(series: Columns, joints: Sequence[Row]) -> Figure:
     """Draw joint positions over time, rotations in degrees."""
     data = []
-    for colour, row in zip(_cycled(len(joints)), joints, strict=True):
+    for colour, row in zip(cycle(PALETTE), joints, strict=False):
         slides = row["kind"] == "prismatic"
         values = series[CHANNELS["q"].column(row["joint"])]
         drawn = values if slides else np.degrees(values)
@@ -45,22 +45,12 @@ def _compared(plan: Columns, run: Columns, name: str, title: str, unit: str) -> 
         _line("measured less modelled", run, run[name] - run[f"{name}_model"], unit, RESIDUAL),
         _line("planned, before it moved", plan, plan[f"{name}_model"], unit, HELD_OUT, dash="dot"),
     ]
-    axis = {"title": {"text": f"{title}, {unit}"}, "rangemode": "tozero"}
-    return {"data": data, "layout": {"xaxis": _TIME, "yaxis": axis}}
+    return {"data": data, "layout": {"xaxis": _TIME, "yaxis": axis(title, unit)}}
 
 
-def _line(
-    name: str, series: Columns, values: np.ndarray, unit: str, colour: str, dash: str = "solid"
-) -> dict[str, Any]:
+def _line(name: str, series: Columns, values: np.ndarray, unit: str, colour: str, dash: str = "solid") -> Figure:
     time = series["time"] - series["time"][0]
     known = np.isfinite(values)
-    return {
-        "type": "scatter", "mode": "lines", "name": name,
-        "x": [round(float(at), 4) for at in time[known]], "y": [float(f"{value:.5g}") for value in values[known]],
-        "line": {"color": colour, "width": 2, "dash": dash},
-        "hovertemplate": f"{name}: %{{y:.4~g}} {unit}<extra></extra>",
-    }  # fmt: skip
-
-
-def _cycled(count: int) -> list[str]:
-    return [PALETTE[index % len(PALETTE)] for index in range(count)]
+    x = [round(float(at), 4) for at in time[known]]
+    y = [float(f"{value:.5g}") for value in values[known]]
+    return trace(name, x, y, unit, line={"color": colour, "width": 2, "dash": dash})

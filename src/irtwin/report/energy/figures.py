@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import html
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from irtwin.report import wording
-from irtwin.report.colours import LIMIT, MEASURED, MODELLED, PALETTE, effect_colour
+from irtwin.report.colours import MEASURED, MODELLED, PALETTE, effect_colour
 from irtwin.report.limits import limits
 from irtwin.report.questions import Answer, Answers, Row
-
-Figure = dict[str, Any]  # {"data": [...], "layout": {...}}
+from irtwin.report.traces import Figure, axis, bars, beside, level, plain
 
 ROBOT_WIDE = "whole robot"
 
@@ -36,8 +34,8 @@ def energy_per_day(answer: Answer) -> Figure | None:
     if len(rows) < 2:
         return None
     size, unit = wording.energy_unit(row["energy_j"] for row in rows)
-    bars = _bars("energy", _column(rows, "day"), _scaled(_column(rows, "energy_j"), size), unit, PALETTE[0])
-    return {"data": [bars], "layout": {"xaxis": {"type": "category"}, "yaxis": _axis("energy", unit)}}
+    days = bars("energy", _column(rows, "day"), _scaled(_column(rows, "energy_j"), size), unit, PALETTE[0])
+    return {"data": [days], "layout": {"xaxis": {"type": "category"}, "yaxis": axis("energy", unit)}}
 
 
 def energy_per_run(answer: Answer) -> Figure | None:
@@ -47,10 +45,10 @@ def energy_per_run(answer: Answer) -> Figure | None:
         return None
     size, unit = wording.energy_unit(row[key] for row in rows for key in ("measured_j", "modelled_j"))
     runs = _labels(rows, "run_name")
-    data = [_bars("modelled by the twin", runs, _scaled(_column(rows, "modelled_j"), size), unit, MODELLED)]
+    data = [bars("modelled by the twin", runs, _scaled(_column(rows, "modelled_j"), size), unit, MODELLED)]
     if any(row["measured_j"] is not None for row in rows):
-        data.insert(0, _bars("measured", runs, _scaled(_column(rows, "measured_j"), size), unit, MEASURED))
-    return {"data": data, "layout": {"barmode": "group", "yaxis": _axis("energy", unit)}}
+        data.insert(0, bars("measured", runs, _scaled(_column(rows, "measured_j"), size), unit, MEASURED))
+    return {"data": data, "layout": {"barmode": "group", "yaxis": axis("energy", unit)}}
 
 
 def energy_error(answer: Answer, seed_error: float) -> Figure | None:
@@ -66,17 +64,13 @@ def energy_error(answer: Answer, seed_error: float) -> Figure | None:
     for name, is_held_out, marker in kinds:
         of_part = [row for row in rows if (row["part"] in ("held_out", "both")) is is_held_out]
         if of_part:
-            bars = _bars(name, _labels(of_part, "run_name"), _column(of_part, "error_percent"), "%", "")
-            data.append({**bars, "marker": marker})
+            drawn = bars(name, _labels(of_part, "run_name"), _column(of_part, "error_percent"), "%", "")
+            data.append({**drawn, "marker": marker})
     order = {"categoryorder": "array", "categoryarray": _labels(rows, "run_name")}
-    lines = [_level(seed_error), _level(-seed_error)]
+    lines = [level(seed_error), level(-seed_error)]
     lines = lines if any(row["error_percent"] < 0 for row in rows) else lines[:1]
-    seed = {
-        "x": 0.005, "xref": "paper", "xanchor": "left", "y": seed_error, "yanchor": "bottom", "showarrow": False,
-        "text": f"seed paper: {seed_error} %", "font": {"color": LIMIT},
-    }  # fmt: skip
-    layout = {"barmode": "overlay", "xaxis": order, "yaxis": _axis("energy error", "%"),
-              "shapes": lines, "annotations": [seed]}  # fmt: skip
+    layout = {"barmode": "overlay", "xaxis": order, "yaxis": axis("energy error", "%"),
+              "shapes": lines, "annotations": [beside(seed_error, f"seed paper: {seed_error} %")]}  # fmt: skip
     return {"data": data, "layout": layout}
 
 
@@ -104,11 +98,6 @@ def _one_run(answer: Answer) -> bool:
     return len({row["run_name"] for row in answer.rows}) < 2
 
 
-def plain(text: str) -> str:
-    """Return a name as Plotly must see it, which takes `<` for markup."""
-    return html.escape(text, quote=False)
-
-
 _HATCHED = {
     "color": "#FFFFFF",
     "line": {"color": PALETTE[0], "width": 1},
@@ -128,25 +117,9 @@ def _stack(rows: Sequence[Row], category: str, series: Callable[[Row], str], col
     for name in (name for name in colours if name in present):
         of_series = [row for row in rows if series(row) == name]
         values = _scaled(_column(of_series, "energy_j"), size)
-        data.append(_bars(plain(name), _labels(of_series, category), values, unit, colours[name]))
+        data.append(bars(plain(name), _labels(of_series, category), values, unit, colours[name]))
     order = {"categoryorder": "array", "categoryarray": list(dict.fromkeys(_labels(rows, category)))}
-    return {"data": data, "layout": {"barmode": "relative", "xaxis": order, "yaxis": _axis("energy", unit)}}
-
-
-def _bars(name: str, x: Sequence[Any], y: Sequence[Any], unit: str, colour: str) -> dict[str, Any]:
-    return {
-        "type": "bar", "name": name, "x": list(x), "y": list(y), "marker": {"color": colour},
-        "hovertemplate": f"%{{x}}<br>{name}: %{{y:.4~g}} {unit}<extra></extra>",
-    }  # fmt: skip
-
-
-def _level(value: float) -> dict[str, Any]:
-    line = {"color": LIMIT, "width": 1.5, "dash": "dash"}
-    return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value, "line": line}
-
-
-def _axis(quantity: str, unit: str) -> dict[str, Any]:
-    return {"title": {"text": f"{quantity}, {unit}"}, "rangemode": "tozero"}
+    return {"data": data, "layout": {"barmode": "relative", "xaxis": order, "yaxis": axis("energy", unit)}}
 
 
 def _column(rows: Iterable[Row], name: str) -> list[Any]:

@@ -29,10 +29,10 @@ def taken(answers: Answers) -> str:
         return f"This robot's energy has no sum over {runs}: of {some} only mechanical work is known, by its twin."
     by = "measured" if totals["runs_with_power"] == totals["runs_with_energy"] else "in part by its twin"
     by = by if totals["runs_with_power"] else "by its twin, as no power was measured"
-    said = f"This robot took {wording.energy(totals['energy_j'])} in {runs}, {by}"
+    sentence = f"This robot took {wording.energy(totals['energy_j'])} in {runs}, {by}"
     if totals["runs_with_energy"] == totals["runs"] and totals["duration_s"]:
         hour = totals["energy_j"] / totals["duration_s"] * _HOUR
-        said += f": {wording.energy(hour)} for each hour of such work"
+        sentence += f": {wording.energy(hour)} for each hour of such work"
     days = answers["energy_per_day"].rows
     logged = sum(day["duration_s"] for day in days)
     if (
@@ -41,8 +41,8 @@ def taken(answers: Answers) -> str:
         and all(day["day_from"] == "log" for day in days)
     ):
         mean = sum(day["energy_j"] for day in days) / len(days)
-        said += f", {wording.energy(mean)} on a day with runs"
-    return f"{said}."
+        sentence += f", {wording.energy(mean)} on a day with runs"
+    return f"{sentence}."
 
 
 def could_save(answers: Answers) -> str | None:
@@ -79,7 +79,7 @@ def retimed(answers: Answers) -> str | None:
 
 def made(answers: Answers) -> list[str]:
     """Return in words what a piece of each product took, and a cycle; electrical and mechanical energy apart."""
-    said = []
+    sentences = []
     for row in answers["made"].rows:
         what = {"measured": "measured", "modelled": "by the twin"}.get(
             row["energy_from"], "of mechanical work, by the twin"
@@ -88,22 +88,22 @@ def made(answers: Answers) -> list[str]:
         for one, many, joules in (("piece", row["pieces"], row["pieces_j"]), ("cycle", row["cycles"], row["cycles_j"])):
             if many:
                 each = product if product and one == "piece" else f"{one} of {product}" if product else one
-                said.append(
+                sentences.append(
                     f"Each {each} took {wording.energy(joules / many)}, {what}: the mean of {wording.decimals(many)} "
                     f"{one}{'s' * (many != 1)}, waiting within the runs included."
                 )
-    return said
+    return sentences
 
 
 def trust(answers: Answers) -> str:
     """Return how far the twin can be trusted, beside a constant power."""
-    said = verdict.sentence(answers)
+    sentence = verdict.sentence(answers)
     constant = constant_power(answers)
     if constant is None:
-        return said
+        return sentence
     return (
-        f"{said} A constant power, the mean of the runs that the twin was fitted to, would miss the energy of the same "
-        f"runs by {wording.percent(constant['error_percent'])}."
+        f"{sentence} A constant power, the mean of the runs that the twin was fitted to, would miss the energy of the "
+        f"same runs by {wording.percent(constant['error_percent'])}."
     )
 
 

@@ -15,11 +15,12 @@ from irtwin.errors import InputError
 from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report import colours
 from irtwin.report.energy import lead, tables, verdict
-from irtwin.report.energy.figures import Figure, figures
+from irtwin.report.energy.figures import figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.limits import limits
 from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.report.templates import style, written
+from irtwin.report.traces import Figure
 from irtwin.resources import Resources, folder, shipped
 from irtwin.storage.files import InsidePath, write
 

@@ -17,7 +17,7 @@ Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate an
 
 
 @dataclass(frozen=True)
-class Cell:
+class ParameterCell:
     """A parameter's value and 95 % interval as text; `unsure` where it is known to no better than half its value.
 
     scaled: the interval that holds the scale of torque, too, where that is to be seen.
@@ -30,14 +30,14 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Line:
+class ParameterLine:
     """A parameter of one effect: `cells` by joint, or the one `cell` of a parameter of no joint."""
 
     label: str
     name: str
     unit: str | None
-    cells: dict[str, Cell]
-    cell: Cell | None = None
+    cells: dict[str, ParameterCell]
+    cell: ParameterCell | None = None
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Parameters:
     """Parameters of joints, one line each; the others as (effect's label, lines)."""
 
     joints: tuple[str, ...]
-    per_joint: tuple[Line, ...]
-    others: tuple[tuple[str, tuple[Line, ...]], ...]
+    per_joint: tuple[ParameterLine, ...]
+    others: tuple[tuple[str, tuple[ParameterLine, ...]], ...]
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ _MATRIX_NAMES = 4
 
 def parameters(rows: Sequence[Row], joints: Sequence[Row]) -> Parameters:
     """Arrange a twin's parameters: one line for each that joints have, lists for the rest."""
-    per_joint: list[Line] = []
-    others: list[tuple[str, tuple[Line, ...]]] = []
+    per_joint: list[ParameterLine] = []
+    others: list[tuple[str, tuple[ParameterLine, ...]]] = []
     for _, group in groupby(rows, key=lambda row: row["effect"]):
         of_effect = list(group)
         names = {row["name"] for row in of_effect}
@@ -133,24 +133,24 @@ def _label(row: Row) -> str:
     return row["label"] or wording.local_name(row["effect"]).replace("_", " ")
 
 
-def _line(rows: Sequence[Row]) -> Line:
+def _line(rows: Sequence[Row]) -> ParameterLine:
     first = rows[0]
-    return Line(_label(first), first["name"], first["unit"], {row["joint"]: _cell(row) for row in rows})
+    return ParameterLine(_label(first), first["name"], first["unit"], {row["joint"]: _cell(row) for row in rows})
 
 
-def _single(row: Row) -> Line:
+def _single(row: Row) -> ParameterLine:
     name = f"{row['name']} of {row['joint']}" if row["joint"] else row["name"]
-    return Line(_label(row), name, row["unit"], {}, _cell(row))
+    return ParameterLine(_label(row), name, row["unit"], {}, _cell(row))
 
 
-def _cell(row: Row) -> Cell:
+def _cell(row: Row) -> ParameterCell:
     lower: Any = row["lower"]
     upper: Any = row["upper"]
     if lower is None or upper is None:
-        return Cell(wording.number(row["value"]), None, True)
+        return ParameterCell(wording.number(row["value"]), None, True)
     value, interval = wording.interval(row["value"], lower, upper)
     scaled = scaled_interval(row)
-    return Cell(value, interval, is_unsure(row["value"], lower, upper), None if scaled == interval else scaled)
+    return ParameterCell(value, interval, is_unsure(row["value"], lower, upper), None if scaled == interval else scaled)
 
 
 def scaled_interval(row: Row) -> str | None:

@@ -87,13 +87,13 @@ def _kind(kind: str) -> str:
 def _settings(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """Return what to enter at the controller, joints of one setting together."""
     pose = [f"{row['joint']} {wording.given(row['value'], row['unit'])}" for row in rows if row["kind"] == "pose"]
-    said = [("Pose", ", ".join(pose))] if pose else []
+    settings = [("Pose", ", ".join(pose))] if pose else []
     for kind, text in _SETTINGS.items():
         alike: dict[str, list[str]] = {}
         for joint, numbers in _by_joint(rows, kind).items():
             alike.setdefault(numbers, []).append(joint)
-        said += [(text.format(wording.listed(joints)), numbers) for numbers, joints in alike.items()]
-    return said + [(f"Angles of {joint}", numbers) for joint, numbers in _by_joint(rows, "held_pose").items()]
+        settings += [(text.format(wording.listed(joints)), numbers) for numbers, joints in alike.items()]
+    return settings + [(f"Angles of {joint}", numbers) for joint, numbers in _by_joint(rows, "held_pose").items()]
 
 
 def _by_joint(rows: Sequence[Row], kind: str) -> dict[str, str]:

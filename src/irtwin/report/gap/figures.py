@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from irtwin.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
-from irtwin.report.energy.figures import Figure, plain
 from irtwin.report.gap.verdict import effect_name, matters
 from irtwin.report.questions import Answers, Row
+from irtwin.report.traces import Figure, axis, band, bars, beside, level, plain, trace
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], LIMIT
 _SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
@@ -120,13 +119,13 @@ def follows(curve: Followed, unit: str, names: Mapping[str, str]) -> Figure:
     """Draw the residual, of this unit, against the variable that it follows, and the effect's curve on it."""
     data = [
         *band(curve.x, curve.low, curve.high, f"rgba(95,109,122,{_BANDED})", name="spread", showlegend=True),
-        _trace("residual", curve.x, curve.residual, unit, mode="markers", marker={"color": MEASURED, "size": 5}),
+        trace("residual", curve.x, curve.residual, unit, mode="markers", marker={"color": MEASURED, "size": 5}),
     ]
     if curve.fitted is not None:
         effect = curve.effect or "fitted_curve"
         name = plain(names.get(effect, effect.replace("_", " ")))
         line = {"color": effect_colour(effect), "width": 2.5}
-        data.append(_trace(name, curve.x, curve.fitted, unit, line=line))
+        data.append(trace(name, curve.x, curve.fitted, unit, line=line))
     variable = curve.variable.replace("_", " ")
     unit_of_x = wording.unit_symbol(curve.unit)
     title = f"{variable}, {unit_of_x}" if unit_of_x else variable
@@ -141,14 +140,13 @@ def runs(rows: Sequence[Row]) -> Figure | None:
     unit = rows[0]["unit"]
     names = _numbered([plain(row["run_name"]) for row in rows])
     data = [
-        _bars("before", names, [row["before"] for row in rows], unit, BEFORE),
-        _bars("with the causes added", names, [row["after"] for row in rows], unit, AFTER),
+        bars("before", names, [row["before"] for row in rows], unit, BEFORE),
+        bars("with the causes added", names, [row["after"] for row in rows], unit, AFTER),
     ]
     if any(row["floor"] is not None for row in rows):
         marker = {"symbol": "line-ew", "size": 34, "line": {"color": FLOOR, "width": 2}}
-        data.append(_trace("noise floor", names, [row["floor"] for row in rows], unit, mode="markers", marker=marker))
-    yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
-    return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis}}
+        data.append(trace("noise floor", names, [row["floor"] for row in rows], unit, mode="markers", marker=marker))
+    return {"data": data, "layout": {"barmode": "group", "yaxis": axis("RMSE", unit)}}
 
 
 def horizons(rows: Sequence[Row]) -> Figure | None:
@@ -158,12 +156,11 @@ def horizons(rows: Sequence[Row]) -> Figure | None:
     unit = rows[0]["unit"]
     seconds = [row["seconds"] for row in rows]
     data = [
-        _trace(name, seconds, [row[part] for row in rows], unit, "lines+markers", line={"color": colour, "width": 2.5})
+        trace(name, seconds, [row[part] for row in rows], unit, "lines+markers", line={"color": colour, "width": 2.5})
         for name, part, colour in (("simulator", "before", BEFORE), ("with the robot’s numbers", "after", AFTER))
     ]
-    xaxis = {"type": "linear", "title": {"text": "time since begun anew, s"}, "rangemode": "tozero"}
-    yaxis = {"title": {"text": f"tracking error, {unit}"}, "rangemode": "tozero"}
-    return {"data": data, "layout": {"xaxis": xaxis, "yaxis": yaxis}}
+    xaxis = {"type": "linear", **axis("time since begun anew", "s")}
+    return {"data": data, "layout": {"xaxis": xaxis, "yaxis": axis("tracking error", unit)}}
 
 
 def by_cause(answers: Answers) -> Figure | None:
@@ -182,16 +179,11 @@ def by_cause(answers: Answers) -> Figure | None:
     for name, part, colour in (("cause alone", "alone", AFTER), ("all causes but this one", "without", PALETTE[4])):
         of_part = [row for row in rows if row["part"] == part]
         causes = [plain(f"{place_of[row['cause']]}. {row['label']}") for row in of_part]
-        data.append(_bars(name, causes, [row["after"] for row in of_part], unit, colour))
-    line = {"color": BEFORE, "width": 1.5, "dash": "dash"}
+        data.append(bars(name, causes, [row["after"] for row in of_part], unit, colour))
     before = rows[0]["before"]
-    shape = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": before, "y1": before, "line": line}
-    note = {
-        "x": 0.995, "xref": "paper", "xanchor": "right", "y": before, "yanchor": "bottom", "showarrow": False,
-        "text": "before", "font": {"color": BEFORE},
-    }  # fmt: skip
-    yaxis = {"title": {"text": f"RMSE, {unit}"}, "rangemode": "tozero"}
-    return {"data": data, "layout": {"barmode": "group", "yaxis": yaxis, "shapes": [shape], "annotations": [note]}}
+    line, note = level(before, BEFORE), beside(before, "before", BEFORE, "right")
+    layout = {"barmode": "group", "yaxis": axis("RMSE", unit), "shapes": [line], "annotations": [note]}
+    return {"data": data, "layout": layout}
 
 
 def budget(answers: Answers) -> Figure | None:
@@ -229,7 +221,7 @@ def experiment(curve: PlannedMotion) -> Figure:
     """Draw the positions that the proposed experiment commands."""
     drawn = list(zip(curve.joints, curve.units, curve.q, strict=True))[:_JOINTS_DRAWN]
     lines = [
-        _trace(plain(joint), curve.time, q, unit, line={"width": 1.5, "color": PALETTE[place % len(PALETTE)]})
+        trace(plain(joint), curve.time, q, unit, line={"width": 1.5, "color": PALETTE[place % len(PALETTE)]})
         for place, (joint, unit, q) in enumerate(drawn)
     ]
     xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
@@ -237,37 +229,14 @@ def experiment(curve: PlannedMotion) -> Figure:
     return {"data": lines, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"position, {units}"}}}}
 
 
-def band(x: Sequence[Any], low: Sequence[Any], high: Sequence[Any], colour: str, **more: Any) -> list[Figure]:
-    """Return the traces of the area between two curves."""
-    edge = {
-        "type": "scatter", "mode": "lines", "x": list(x), "line": {"width": 0}, "hoverinfo": "skip",
-        "showlegend": False,
-    }  # fmt: skip
-    return [{**edge, "y": list(low)}, {**edge, "y": list(high), "fill": "tonexty", "fillcolor": colour, **more}]
-
-
-def _trace(name: str, x: Sequence[Any], y: Sequence[Any], unit: str, mode: str = "lines", **look: Any) -> Figure:
-    return {
-        "type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), **look,
-        "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
-    }  # fmt: skip
-
-
-def _bars(name: str, x: Sequence[str], y: Sequence[Any], unit: str, colour: str) -> Figure:
-    return {
-        "type": "bar", "name": name, "x": x, "y": y, "marker": {"color": colour},
-        "hovertemplate": f"{name} %{{y:.3~g}} {unit}<extra></extra>",
-    }  # fmt: skip
-
-
 def _numbered(names: Sequence[str]) -> list[str]:
     """Return names with a number where one stands more than once: the stretches of a run."""
     total, count = Counter(names), Counter[str]()
-    found = []
+    numbered = []
     for name in names:
         count[name] += 1
-        found.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
-    return found
+        numbered.append(f"{name}, part {count[name]}" if total[name] > 1 else name)
+    return numbered
 
 
 def _cell(value: float | None) -> str:

@@ -14,7 +14,7 @@ Alternative = tuple[str, float]  # what an effect is called, and its confidence
 
 
 @dataclass(frozen=True)
-class Finding:
+class ToldFinding:
     """A finding as it is told: `members`, for each of its causes, the cause and what the data cannot tell from it.
 
     against: what it is held against: "twin", "reference" or "simulated" runs, or "both" of these. share, interval: of
@@ -99,7 +99,7 @@ NOT_REPEATING = {
 
 def sentence(
     verdict: str,
-    findings: Sequence[Finding],
+    findings: Sequence[ToldFinding],
     where: str,
     closes: str | None,
     because: str | None = None,
@@ -129,23 +129,23 @@ def sentence(
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
     rest = [one for one in findings if one not in told]
-    said, guessed = "; ".join(one.sentence for one in told), not any(one.likely for one in told)
+    words, guessed = "; ".join(one.sentence for one in told), not any(one.likely for one in told)
     beside = f" Not named here: {counted(rest)}." if rest else ""
     if verdict == "unexplained" and because != "unsure":
-        part = "" if not told else f" Part of it is {said}." if guessed else f" Part of it is closed: {said}."
+        part = "" if not told else f" Part of it is {words}." if guessed else f" Part of it is closed: {words}."
         return f"{_left(because, where, differ)}{part}{beside}"
     if verdict == "unexplained":
-        said = f"there is a gap{where}{', and no cause that was found is sure' if guessed else ''}: {said}"
+        words = f"there is a gap{where}{', and no cause that was found is sure' if guessed else ''}: {words}"
     elif guessed:
-        said = f"several effects explain the gap{where}, and none of them is sure: {said}"
+        words = f"several effects explain the gap{where}, and none of them is sure: {words}"
     if closes is None:
         closes = "".join(_closes(one, len(told)) for one in told[:1])
     differing = f" Besides, runs of one motion differ by {differ}, which no effect explains." if differ else ""
     unsure = " How much of the gap that makes is not sure." if verdict == "unexplained" and not guessed else ""
-    return f"{said[:1].upper()}{said[1:]}.{unsure}{closes}{differing}{beside}"
+    return f"{words[:1].upper()}{words[1:]}.{unsure}{closes}{differing}{beside}"
 
 
-def _told(findings: Sequence[Finding]) -> list[Finding]:
+def _told(findings: Sequence[ToldFinding]) -> list[ToldFinding]:
     """Return the findings that are named, in their order: of those that matter the likely ones, then guesses."""
     those = sorted((one for one in findings if one.matters), key=lambda one: not one.likely)[:_NAMED]
     return [one for one in findings if one in those]
@@ -160,7 +160,7 @@ def _left(because: str | None, where: str, differ: str) -> str:
     return f"There is a gap{where}, and no effect in the catalogue closes it."
 
 
-def _closes(one: Finding, count: int) -> str:
+def _closes(one: ToldFinding, count: int) -> str:
     """Say what the first of so many findings closes by itself."""
     what = "That" if count == 1 else "The first of these"
     of = "gap in" if one.of.startswith("the gap") else "mean square of"
@@ -176,11 +176,11 @@ def within(interval: Sequence[float]) -> str:
 def folded(count: int, channel: str, share: float) -> str:
     """Say how many findings there are that are not told by themselves, and what they close together."""
     closed = wording.part(share) if share > 0 else "nothing"
-    found = "1 finding closes" if count == 1 else f"{count} findings together close"
-    return f"{found} {closed} of the gap in {channel}"
+    words = "1 finding closes" if count == 1 else f"{count} findings together close"
+    return f"{words} {closed} of the gap in {channel}"
 
 
-def counted(findings: Sequence[Finding]) -> str:
+def counted(findings: Sequence[ToldFinding]) -> str:
     """Count findings, by channel, with what they close together; empty where there are none."""
     of_channel: dict[str, list[float]] = {}
     for one in findings:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from irtwin.document.curves import FrictionCurve
 from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE
-from irtwin.report.energy.figures import Figure, plain
-from irtwin.report.energy.tables import Cell, Line, is_unsure
-from irtwin.report.gap.figures import band
+from irtwin.report.energy.tables import ParameterCell, ParameterLine, is_unsure
+from irtwin.report.traces import Figure, band, plain, trace
 
 _BANDED = "33"  # how opaque a band is, in hexadecimal
 
@@ -21,22 +19,22 @@ def figures(curves: Sequence[FrictionCurve]) -> dict[str, Figure]:
     return {joint: _figure([one for one in curves if one.joint == joint]) for joint in reversed(joints)}
 
 
-def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[Line, ...]:
+def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[ParameterLine, ...]:
     """Return a line for each number of friction and side, with a cell a joint; `names`: of effects, by their ids."""
-    cells: dict[tuple[str, str, str, str], dict[str, Cell]] = {}
+    cells: dict[tuple[str, str, str, str], dict[str, ParameterCell]] = {}
     for curve in curves:
         for one in curve.numbers:
             value, interval = wording.interval(one.value, one.lower, one.upper)
-            cell = Cell(value, interval, is_unsure(one.value, one.lower, one.upper))
+            cell = ParameterCell(value, interval, is_unsure(one.value, one.lower, one.upper))
             cells.setdefault((one.effect, one.name, one.unit, curve.role), {})[curve.joint] = cell
     effects = list(dict.fromkeys(effect for effect, *_ in cells))
     several = len({curve.role for curve in curves}) > 1
-    found = []
+    lines = []
     for key in sorted(cells, key=lambda key: (effects.index(key[0]), key[1])):
         effect, name, unit, role = key
         label = names.get(effect, effect.replace("_", " "))
-        found.append(Line(f"{label}, {role}" if several else label, name, unit, cells[key]))
-    return tuple(found)
+        lines.append(ParameterLine(f"{label}, {role}" if several else label, name, unit, cells[key]))
+    return tuple(lines)
 
 
 def _figure(sides: Sequence[FrictionCurve]) -> Figure:
@@ -54,17 +52,14 @@ def _figure(sides: Sequence[FrictionCurve]) -> Figure:
     return {"data": data, "layout": layout}
 
 
-def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[dict[str, Any]]:
+def _side(curve: FrictionCurve, colour: str, of_points: str) -> list[Figure]:
     """Return the traces of one side: the band, the curve in it, and what was measured."""
-    x = list(curve.speed)
     at = f"%{{y:.3~g}} {curve.unit} at %{{x:.3~g}} {curve.speed_unit}<extra></extra>"
-    traces: list[dict[str, Any]] = [
-        *band(x, curve.low, curve.high, colour + _BANDED),
-        {
-            "type": "scatter", "mode": "lines", "name": curve.role, "x": x, "y": list(curve.torque),
-            "line": {"color": colour, "width": 2}, "hovertemplate": f"twin {at}",
-        },
-    ]  # fmt: skip
+    line = trace(curve.role, curve.speed, curve.torque, "", line={"color": colour, "width": 2})
+    traces = [
+        *band(curve.speed, curve.low, curve.high, colour + _BANDED),
+        {**line, "hovertemplate": f"twin {at}"},
+    ]
     if (points := curve.measured) is not None:
         spread = {
             "type": "data", "symmetric": False, "thickness": 1, "width": 0,

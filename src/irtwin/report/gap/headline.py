@@ -13,7 +13,7 @@ def line(diagnosis: Document, against: str | None) -> str:
     told = [_told(one, against) for one in diagnosis.findings]
     place = next(iter(diagnosis.locations), None)
     closed, tracking = diagnosis.shrink.closed_fraction, diagnosis.shrink.position_rmse
-    said = findings.sentence(
+    sentence = findings.sentence(
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
@@ -26,12 +26,12 @@ def line(diagnosis: Document, against: str | None) -> str:
         against,
         None if tracking is None else misses(tracking.before),
     )
-    return f"{diagnosis.verdict}: {said}".replace("\N{NO-BREAK SPACE}", " ")
+    return f"{diagnosis.verdict}: {sentence}".replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _told(one: Finding, against: str | None) -> findings.Finding:
+def _told(one: Finding, against: str | None) -> findings.ToldFinding:
     members = [[member for member in one.members if member.cause == cause] for cause in one.causes]
-    return findings.Finding(
+    return findings.ToldFinding(
         family=one.family,
         joints=one.joints,
         against="twin" if one.scope == "missing" else against or "reference",

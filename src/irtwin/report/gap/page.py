@@ -47,12 +47,12 @@ def render_gap(
     """
     resources = resources or shipped()
     questions = questions_of(resources, "gap")
-    found = ask(graph, {"diagnosis": questions["diagnosis"]}, {"robot": robot})["diagnosis"].first
-    if found is None:
+    diagnosis = ask(graph, {"diagnosis": questions["diagnosis"]}, {"robot": robot})["diagnosis"].first
+    if diagnosis is None:
         raise InputError(f"{robot}: no diagnosis in the graph; run `irtwin diagnose` with this workspace first")
-    bindings = {"robot": robot, "diagnosis": found["diagnosis"]}
+    bindings = {"robot": robot, "diagnosis": diagnosis["diagnosis"]}
     answers = ask(graph, questions, bindings)
-    curves = Curves.from_json(parse_json(read_document(found["evidence_file"], found["evidence_checksum"])))
+    curves = Curves.from_json(parse_json(read_document(diagnosis["evidence_file"], diagnosis["evidence_checksum"])))
     write(out, _page(resources, answers, bindings, curves).encode())
 
 
@@ -75,7 +75,7 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
     friction = gap_friction.figures(curves.friction or ())
     effect_names = gap_figures.effect_names(answers)
-    found = gap_verdict.told(answers)
+    verdict = gap_verdict.told(answers)
     scripts = figure_scripts()
     return written(
         resources,
@@ -85,8 +85,8 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
         bindings=bindings,
         rows={name: answer.rows for name, answer in answers.items()},
         verdict=gap_verdict.sentence(answers),
-        findings=[one for one in found if one.matters],
-        counted=counted([one for one in found if not one.matters]),
+        findings=[one for one in verdict if one.matters],
+        counted=counted([one for one in verdict if not one.matters]),
         causes=[_cause(row, answers) for row in answers["causes"].rows],
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,

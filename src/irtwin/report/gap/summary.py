@@ -115,8 +115,8 @@ def next_steps(diagnosis: Document) -> list[str]:
     """
     is_open = diagnosis.verdict in ("ambiguous", "unexplained")
     motions = diagnosis.next_experiment.motions if diagnosis.next_experiment and is_open else ()
-    said = [f"To log next: {motion}" for motion in motions[:_STEPS]]
-    return said + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
+    steps = [f"To log next: {motion}" for motion in motions[:_STEPS]]
+    return steps + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
 
 
 def _short(value: float) -> float:

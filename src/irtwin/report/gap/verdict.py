@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from irtwin.report import wording
 from irtwin.report.gap import findings
-from irtwin.report.gap.findings import Finding
+from irtwin.report.gap.findings import ToldFinding
 from irtwin.report.questions import Answers, Row
 
 _MOSTLY = 0.5  # share of a gap
@@ -33,7 +33,7 @@ def sentence(answers: Answers) -> str:
     )  # fmt: skip
 
 
-def told(answers: Answers) -> list[Finding]:
+def told(answers: Answers) -> list[ToldFinding]:
     """Return the findings, the largest first."""
     return [_finding(row, answers) for row in answers["findings"].rows]
 
@@ -44,13 +44,13 @@ def matters(cause: str, answers: Answers) -> bool:
     return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
 
 
-def _finding(row: Row, answers: Answers) -> Finding:
+def _finding(row: Row, answers: Answers) -> ToldFinding:
     name = row["finding"]
     members: dict[str, list[tuple[str, float]]] = {}
     for one in answers["finding_members"].rows:
         if one["finding"] == name:
             members.setdefault(one["cause"], []).append((effect_name(one), one["confidence"]))
-    return Finding(
+    return ToldFinding(
         family=row["family_label"] or wording.local_name(row["family"]),
         joints=tuple(one["joint"] for one in answers["finding_joints"].rows if one["finding"] == name),
         against="twin" if row["scope"] == "missing" else _against(answers["diagnosis"].rows[0]),
@@ -83,8 +83,8 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
         return ""
     kind, channel, joint = unexplained[0]
     more = len(unexplained) - 1
-    said = f"{findings.NOT_REPEATING[kind]}{where(channel, joint)}"
-    return said if not more else f"{said}, and by {more} thing{'s' if more > 1 else ''} more"
+    words = f"{findings.NOT_REPEATING[kind]}{where(channel, joint)}"
+    return words if not more else f"{words}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
 def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:

@@ -15,7 +15,6 @@ from pyoxigraph import NamedNode, RdfFormat, Store, parse
 from irtwin.knowledge.store.table import to_python
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
 from irtwin.report.energy.page import content_policy
-from irtwin.report.ontology.class_tree import Node, class_tree
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resource, Resources, folder, shipped
 from irtwin.storage.files import check_place, write
@@ -50,7 +49,7 @@ _ALIGNED = {  # vocabularies that only the alignment speaks of
 
 
 @dataclass
-class Term:
+class DocumentedTerm:
     """A class, property or individual, with what the page says of it; links lead to IRIs."""
 
     iri: str
@@ -87,7 +86,17 @@ class Module:
     name: str
     origin: str
     header: Mapping[str, Any]
-    terms: Mapping[str, list[Term]]
+    terms: Mapping[str, list[DocumentedTerm]]
+
+
+@dataclass(frozen=True)
+class Node:
+    """A class in the tree: its label, the anchor that it leads to, its superclasses elsewhere, the classes below it."""
+
+    label: str
+    anchor: str
+    beside: list[str]
+    below: list[Node]
 
 
 def write_page(out: Path, known: Resources | None = None) -> None:
@@ -117,8 +126,8 @@ def _module_iri(file: Resource) -> str:
     name = _stem(file)
     if not file.is_extension or file.replaces:
         return ONTOLOGY if name == "irtwin" else f"{ONTOLOGY}/{name}"
-    said = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
-    return next((it.value for it in said if isinstance(it, NamedNode)), f"urn:module:{name}")
+    ontologies = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
+    return next((it.value for it in ontologies if isinstance(it, NamedNode)), f"urn:module:{name}")
 
 
 def _stem(file: Resource) -> str:
@@ -134,7 +143,7 @@ def page(modules: list[Module]) -> str:
     return templates.get_template("ontology/page.html.jinja").render(
         modules=modules,
         kinds=KINDS,
-        tree=Markup(class_tree(_forests(modules, known))),
+        forests=_forests(modules, known),
         count=sum(term.own for term in known.values()),
         policy=content_policy([]),
         style=style(shipped()),
@@ -150,25 +159,25 @@ def short(iri: str) -> str:
     return shorten(iri)
 
 
-def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[str, list[Term]]]:
-    found: dict[str, dict[str, list[Term]]] = {}
-    known: dict[str, Term] = {}
+def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[str, list[DocumentedTerm]]]:
+    terms: dict[str, dict[str, list[DocumentedTerm]]] = {}
+    known: dict[str, DocumentedTerm] = {}
     for row in _ask(store, "terms"):
         kind, extension = row["kind"].removeprefix(OWL), extensions.get(row["module"])
-        term = Term(
+        term = DocumentedTerm(
             row["term"], kind, row["label"], row["definition"], row["example"], row["source"], row["unit"],
             row["symbol"], row["beside"], None if extension is None else _stem(extension),
         )  # fmt: skip
         known[term.iri] = term
-        found.setdefault(row["module"], {}).setdefault(kind, []).append(term)
+        terms.setdefault(row["module"], {}).setdefault(kind, []).append(term)
     _add_links(known, _ask(store, "links"))
     for row in _ask(store, "values"):
         if row["term"] in known:
             known[row["term"]].values[row["property"]].append(row["value"])
-    return found
+    return terms
 
 
-def _add_links(known: Mapping[str, Term], rows: Iterable[Mapping[str, Any]]) -> None:
+def _add_links(known: Mapping[str, DocumentedTerm], rows: Iterable[Mapping[str, Any]]) -> None:
     for row in rows:
         term, link, other = known.get(row["term"]), row["link"], row["other"]
         if term is None:
@@ -197,7 +206,7 @@ def _imported(store: Store) -> list[str]:
     return sorted(imports, key=text.index)
 
 
-def _forests(modules: list[Module], known: Mapping[str, Term]) -> dict[str, list[Node]]:
+def _forests(modules: list[Module], known: Mapping[str, DocumentedTerm]) -> dict[str, list[Node]]:
     """Return the trees of each module's classes; superclasses that are not of the module stand beside a class."""
     forests = {}
     for module in modules:
@@ -207,7 +216,7 @@ def _forests(modules: list[Module], known: Mapping[str, Term]) -> dict[str, list
     return forests
 
 
-def _nodes(classes: list[Term], above: str | None, known: Mapping[str, Term]) -> Iterator[Node]:
+def _nodes(classes: list[DocumentedTerm], above: str | None, known: Mapping[str, DocumentedTerm]) -> Iterator[Node]:
     names = {term.iri for term in classes}
     for term in classes:
         inside = [parent for parent in term.links["subclass of"] if parent in names]
@@ -217,7 +226,7 @@ def _nodes(classes: list[Term], above: str | None, known: Mapping[str, Term]) ->
             yield Node(term.label, term.anchor, beside, list(_nodes(classes, term.iri, known)))
 
 
-def _link(iri: Any, known: Mapping[str, Term]) -> Markup:
+def _link(iri: Any, known: Mapping[str, DocumentedTerm]) -> Markup:
     """Return a link to a term's place on the page, or its short name where it has none."""
     term = known.get(iri) if isinstance(iri, str) else None
     if term is None:

@@ -52,14 +52,14 @@ def write_page(out: Path, known: Resources | None = None, graph: KnowledgeGraph 
 
 def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
     """Return the page."""
-    found = list(competencies(known, graph))
+    competencies_found = list(competencies(known, graph))
     return (
         environment(shipped())
         .get_template("ontology/questions.html.jinja")
         .render(
-            themes={theme: [one for one in found if one.asked.theme == theme] for theme in THEMES},
+            themes={theme: [one for one in competencies_found if one.asked.theme == theme] for theme in THEMES},
             asked_by=ASKED_BY,
-            count=len(found),
+            count=len(competencies_found),
             answered=graph is not None,
             policy=content_policy([]),
             style=style(shipped()),

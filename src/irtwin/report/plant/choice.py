@@ -8,7 +8,7 @@ from datetime import date
 from urllib.parse import urlencode
 
 from irtwin.errors import InputError
-from irtwin.report.questions import Question
+from irtwin.report.questions import PageQuestion
 
 GROUPS = ("cell", "line", "type", "manufacturer")  # cell and line as the data sets' notes say them
 SORTS = {  # of a line, by what a form calls it; the greatest first
@@ -19,7 +19,7 @@ _OF_DAYS = ("energy", "days", "standstill", "made")  # questions that days narro
 
 
 @dataclass(frozen=True)
-class Choice:
+class Selection:
     """What is asked for; empty texts ask for all, in the order that the page has by itself."""
 
     first: str = ""
@@ -38,7 +38,7 @@ class Choice:
         """Whether one of the texts holds what is looked for."""
         return any(self.find.lower() in (text or "").lower() for text in texts)
 
-    def of_days(self, questions: Mapping[str, Question]) -> dict[str, Question]:
+    def of_days(self, questions: Mapping[str, PageQuestion]) -> dict[str, PageQuestion]:
         """Return a page's questions, those of energy narrowed to the runs that began on the days."""
         if not (self.first or self.last):
             return dict(questions)
@@ -51,13 +51,13 @@ class Choice:
         }
 
 
-ALL = Choice()
+ALL = Selection()
 
 
-def choice(asked: Mapping[str, str]) -> Choice:
+def choice(asked: Mapping[str, str]) -> Selection:
     """Read what a form says; what it does not know is passed over. InputError where a day is none."""
     group, sort = asked.get("group", ""), asked.get("sort", "")
-    return Choice(
+    return Selection(
         first=day(asked.get("from", "")),
         last=day(asked.get("to", "")),
         find=asked.get("find", "").strip(),

@@ -10,7 +10,7 @@ from pyoxigraph import Literal
 
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant.choice import day
-from irtwin.report.plant.energies import Kind, kind, share
+from irtwin.report.plant.energies import EnergyKind, kind, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
 
@@ -33,7 +33,7 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Pair:
+class ComparedPair:
     """A quantity on both sides; `digits` as significant ones. There is no difference where one side lacks it."""
 
     name: str
@@ -63,9 +63,9 @@ class Pair:
 class Comparison:
     """Pairs that may be held against each other: of both sides, and for each kind of energy by itself."""
 
-    pairs: tuple[Pair, ...]
-    kinds: tuple[tuple[Kind, tuple[Pair, ...]], ...]
-    joints: tuple[Pair, ...]
+    pairs: tuple[ComparedPair, ...]
+    kinds: tuple[tuple[EnergyKind, tuple[ComparedPair, ...]], ...]
+    joints: tuple[ComparedPair, ...]
     apart: bool  # the two sides have no kind of energy in common
 
 
@@ -97,50 +97,50 @@ def comparison(before: Answers, after: Answers) -> Comparison:
     )
 
 
-def to_sheet(found: Comparison) -> Sheet:
+def to_sheet(compared: Comparison) -> Sheet:
     """Return a comparison as a table."""
-    rows = [("", pair) for pair in found.pairs]
-    rows += [(of.name, pair) for of, pairs in found.kinds for pair in pairs]
-    rows += [("by the twin", pair) for pair in found.joints]
+    rows = [("", pair) for pair in compared.pairs]
+    rows += [(of.name, pair) for of, pairs in compared.kinds for pair in pairs]
+    rows += [("by the twin", pair) for pair in compared.joints]
     columns = ("known_from", "quantity", "unit", "before", "after", "difference", "difference_percent")
     return Sheet(
         columns, [(of, one.name, one.unit, one.before, one.after, one.difference, one.percent) for of, one in rows]
     )
 
 
-def _common(before: Row | None, after: Row | None) -> list[Pair]:
+def _common(before: Row | None, after: Row | None) -> list[ComparedPair]:
     def both(name: str) -> tuple[Any, Any]:
         return tuple(row[name] if row else None for row in (before, after))  # type: ignore[return-value]
 
     standing = [share(row["idle_s"], row["known_s"]) if row else None for row in (before, after)]
     return [
-        Pair("runs", "", *both("runs")),
-        Pair("time", "s", *both("time_s")),
-        Pair("stands still, of time", "%", *(_percent(value) for value in standing)),
+        ComparedPair("runs", "", *both("runs")),
+        ComparedPair("time", "s", *both("time_s")),
+        ComparedPair("stands still, of time", "%", *(_percent(value) for value in standing)),
     ]
 
 
-def _energy(of: Kind, before: Row | None, after: Row | None) -> list[Pair]:
+def _energy(of: EnergyKind, before: Row | None, after: Row | None) -> list[ComparedPair]:
     def both(value: Any) -> tuple[Any, Any]:
         return tuple(value(row) if row else None for row in (before, after))  # type: ignore[return-value]
 
     pairs = [
-        Pair("runs with it", "", *both(lambda row: row["runs"])),
-        Pair("energy", "J", *both(lambda row: row["energy_j"])),
-        Pair("mean power", "W", *both(lambda row: share(row["energy_j"], row["time_s"]))),
-        Pair("peak power", "W", *both(lambda row: row["peak_w"])),
-        Pair("given back by braking joints", "J", *both(lambda row: row["returned_j"])),
+        ComparedPair("runs with it", "", *both(lambda row: row["runs"])),
+        ComparedPair("energy", "J", *both(lambda row: row["energy_j"])),
+        ComparedPair("mean power", "W", *both(lambda row: share(row["energy_j"], row["time_s"]))),
+        ComparedPair("peak power", "W", *both(lambda row: row["peak_w"])),
+        ComparedPair("given back by braking joints", "J", *both(lambda row: row["returned_j"])),
     ]
     if of.electrical:
         standby = both(lambda row: _percent(share(row["standby_j"], row["modelled_j"])))
-        pairs.append(Pair("standby, of what the twin models", "%", *standby))
+        pairs.append(ComparedPair("standby, of what the twin models", "%", *standby))
     return pairs
 
 
-def _joints(before: tuple[Row, ...], after: tuple[Row, ...]) -> list[Pair]:
+def _joints(before: tuple[Row, ...], after: tuple[Row, ...]) -> list[ComparedPair]:
     """Return the mean power of each joint, by the twin."""
     sides = [{row["joint_name"]: share(row["energy_j"], row["time_s"]) for row in rows} for rows in (before, after)]
-    return [Pair(name, "W", *(of.get(name) for of in sides)) for name in dict.fromkeys([*sides[0], *sides[1]])]
+    return [ComparedPair(name, "W", *(of.get(name) for of in sides)) for name in dict.fromkeys([*sides[0], *sides[1]])]
 
 
 def _kinds(answers: Answers) -> set[str]:

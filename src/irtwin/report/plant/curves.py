@@ -21,7 +21,7 @@ _SPANS = ("standing", "held_out")  # columns of yes and no, drawn as shades
 
 
 @dataclass(frozen=True)
-class Line:
+class CurveLine:
     """A curve: `channel` of the series `kind` of a run, told by its place; `joint` is empty of the whole robot."""
 
     run: int
@@ -39,7 +39,7 @@ class Panel:
     title: str
     unit: str
     scale: float
-    lines: list[Line] = field(default_factory=list)
+    lines: list[CurveLine] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def curves(runs: Sequence[Drawn], joints: Iterable[Row]) -> dict[str, Any] | Non
     }
 
 
-def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Iterable[tuple[Line, str, Channel]]:
+def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Iterable[tuple[CurveLine, str, Channel]]:
     """Yield the lines of a run in the order of their panels: measured, then what only the twin's series has."""
     has = {kind: set[str]() for kind in (MEASURED, MODELLED)}
     for row in run.series:
@@ -98,13 +98,13 @@ def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Itera
             continue
         for joint in joints if channel.per_joint else ("",):
             column = channel.column(joint)
-            said = joint or run.name if not alone else joint or MEASURED
+            label = joint or run.name if not alone else joint or MEASURED
             kind = next((kind for kind in (MEASURED, *has) if column in has[kind]), None)
             if kind is not None:
-                yield Line(number, kind, column, joint, said, name == "command"), name, channel
+                yield CurveLine(number, kind, column, joint, label, name == "command"), name, channel
             if alone and f"{column}{_MODEL}" in has[MODELLED]:
-                said = f"{joint}, by the twin" if joint else "by the twin"
-                yield Line(number, MODELLED, f"{column}{_MODEL}", joint, said, True), name, channel
+                label = f"{joint}, by the twin" if joint else "by the twin"
+                yield CurveLine(number, MODELLED, f"{column}{_MODEL}", joint, label, True), name, channel
 
 
 def _columns(row: Row) -> list[str]:

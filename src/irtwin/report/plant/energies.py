@@ -10,7 +10,7 @@ from irtwin.report.questions import Row
 
 
 @dataclass(frozen=True)
-class Kind:
+class EnergyKind:
     """What an energy is known from, as `irt:Energy_From` says it; only an electrical one has a price."""
 
     name: str
@@ -19,11 +19,11 @@ class Kind:
     electrical: bool = True
 
 
-MEASURED = Kind("measured", "Electrical energy, measured", "From logged power.")
-MODELLED = Kind(
+MEASURED = EnergyKind("measured", "Electrical energy, measured", "From logged power.")
+MODELLED = EnergyKind(
     "modelled", "Electrical energy by the twin", "No power was logged: this is what the twin says it takes."
 )
-MECHANICAL = Kind(
+MECHANICAL = EnergyKind(
     "mechanical",
     "Mechanical energy by the twin",
     "Work of the joints alone, without losses of motors and drives and without standby. It is not what the meter "
@@ -59,9 +59,9 @@ class Days:
         return max(self.bars, key=lambda bar: bar.energy_j)
 
 
-def kind(name: str | None) -> Kind:
+def kind(name: str | None) -> EnergyKind:
     """Return a kind by its name; one that the project does not know stands by itself, without a price."""
-    return KINDS.get(name or "") or Kind(name or "unknown", "Energy of unknown origin", "", electrical=False)
+    return KINDS.get(name or "") or EnergyKind(name or "unknown", "Energy of unknown origin", "", electrical=False)
 
 
 def share(part: float | None, whole: float | None) -> float | None:
@@ -80,11 +80,11 @@ def days(energies: Mapping[str, float], most: int) -> Days | None:
 
 def by_day(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, float]]:
     """Gather the answers to `days.rq`: robot and kind to the energy (J) of each day."""
-    found: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
+    daily: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
     for row in rows:
         if row["energy_j"] is not None:
-            found[row["robot"], row["energy_from"]][row["day"]] = row["energy_j"]
-    return found
+            daily[row["robot"], row["energy_from"]][row["day"]] = row["energy_j"]
+    return daily
 
 
 def added_up(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:

@@ -38,7 +38,7 @@ class Value:
 
 
 @dataclass
-class Property:
+class ShownProperty:
     """A property with its values, of which the first are shown."""
 
     iri: str
@@ -52,33 +52,33 @@ class Property:
 
 
 @dataclass(frozen=True)
-class Individual:
+class ShownIndividual:
     """An individual as its page shows it; `whole` where nothing was left out."""
 
     iri: str
     name: str
-    types: list[Property]
-    said: list[Property]
-    incoming: list[Property]
+    types: list[ShownProperty]
+    said: list[ShownProperty]
+    incoming: list[ShownProperty]
     whole: bool
 
 
-def individual(iri: str, answers: Answers, base: str = ID) -> Individual:
+def individual(iri: str, answers: Answers, base: str = ID) -> ShownIndividual:
     """Make what a page shows of the answers to `reports/plant/individual/*.rq`."""
-    said = _said(answers["said"].rows, base)
+    properties = _said(answers["said"].rows, base)
     named = answers["name"].first
-    return Individual(
+    return ShownIndividual(
         iri=iri,
         name=str(named["name"]) if named else wording.local_name(iri),
-        types=[one for one in said if one.iri == TYPE],
-        said=[one for one in said if one.iri != TYPE],
+        types=[one for one in properties if one.iri == TYPE],
+        said=[one for one in properties if one.iri != TYPE],
         incoming=_incoming(answers["incoming"].rows, base),
         whole=len(answers["said"].rows) < MOST[0] and len(answers["incoming"].rows) < MOST[1],
     )
 
 
-def _said(rows: Iterable[Row], base: str) -> list[Property]:
-    found: dict[str, Property] = {}
+def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
+    properties: dict[str, ShownProperty] = {}
     graphs: dict[tuple[str, str, bool], set[str]] = defaultdict(set)
     kept: dict[tuple[str, str, bool], Row] = {}
     for row in rows:
@@ -86,8 +86,8 @@ def _said(rows: Iterable[Row], base: str) -> list[Property]:
         graphs[key].add(row["graph"])
         kept.setdefault(key, row)
     for key, row in sorted(kept.items(), key=lambda pair: pair[0]):
-        of = found.setdefault(
-            row["property"], Property(row["property"], row["property_label"] or shorten(row["property"]))
+        of = properties.setdefault(
+            row["property"], ShownProperty(row["property"], row["property_label"] or shorten(row["property"]))
         )
         of.values.append(
             Value(
@@ -96,15 +96,15 @@ def _said(rows: Iterable[Row], base: str) -> list[Property]:
                 tuple(_by(graph, base) for graph in sorted(graphs[key])),
             )
         )
-    return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
+    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
-def _incoming(rows: Iterable[Row], base: str) -> list[Property]:
-    found: dict[str, Property] = {}
+def _incoming(rows: Iterable[Row], base: str) -> list[ShownProperty]:
+    properties: dict[str, ShownProperty] = {}
     for subject, row in sorted({(row["property"], row["subject"]): row for row in rows}.items()):
-        of = found.setdefault(subject[0], Property(subject[0], row["property_label"] or shorten(subject[0])))
+        of = properties.setdefault(subject[0], ShownProperty(subject[0], row["property_label"] or shorten(subject[0])))
         of.values.append(Value(str(row["subject_label"] or shorten(subject[1], base)), subject[1], ()))
-    return sorted(found.values(), key=lambda one: (one.label.lower(), one.iri))
+    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
 def _text(row: Row, base: str) -> str:

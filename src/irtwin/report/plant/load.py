@@ -16,7 +16,7 @@ _HOUR = timedelta(hours=1)
 
 
 @dataclass(frozen=True)
-class Cell:
+class HourOfWeek:
     """The hours of one weekday and time of day: their mean energy (J), None where none was logged; `height` 0 to 1."""
 
     weekday: str
@@ -38,25 +38,25 @@ class Shift:
 class Load:
     """When energy was taken: `week` a row a weekday, 24 cells each; the shifts in which something was logged."""
 
-    week: tuple[tuple[Cell, ...], ...]
+    week: tuple[tuple[HourOfWeek, ...], ...]
     shifts: tuple[Shift, ...]
 
     @property
-    def greatest(self) -> Cell:
+    def greatest(self) -> HourOfWeek:
         """The weekday and hour with the greatest mean energy."""
         return max((cell for row in self.week for cell in row), key=lambda cell: cell.energy_j or 0.0)
 
 
 def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
     """Add up the hours that `load.rq` answers; None where it answers none."""
-    found: dict[tuple[int, int], list[float]] = defaultdict(list)
+    powers: dict[tuple[int, int], list[float]] = defaultdict(list)
     for row in rows:
         for number, joules in enumerate(map(float, row["by_hour"].split(","))):
             moment = (row["first_hour"] + number * _HOUR).astimezone(zone)
-            found[moment.weekday(), moment.hour].append(joules)
-    if not found:
+            powers[moment.weekday(), moment.hour].append(joules)
+    if not powers:
         return None
-    means = {at: sum(energies) / len(energies) for at, energies in found.items()}
+    means = {at: sum(energies) / len(energies) for at, energies in powers.items()}
     greatest = max(means.values())
     week = tuple(
         tuple(_cell(weekday, hour, means.get((weekday, hour)), greatest) for hour in range(24)) for weekday in range(7)
@@ -64,14 +64,14 @@ def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
     shifts = (
         Shift(name, sum(map(len, hours)), sum(map(sum, hours)))
         for name in (EARLY, LATE, NIGHT, WEEKEND)
-        if (hours := [energies for at, energies in found.items() if _shift(*at) == name])
+        if (hours := [energies for at, energies in powers.items() if _shift(*at) == name])
     )
     return Load(week, tuple(shifts))
 
 
-def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> Cell:
+def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> HourOfWeek:
     height = max(energy or 0.0, 0.0) / greatest if greatest > 0 else 0.0
-    return Cell(WEEKDAYS[weekday], hour, energy, height)
+    return HourOfWeek(WEEKDAYS[weekday], hour, energy, height)
 
 
 def _shift(weekday: int, hour: int) -> str:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from irtwin.report.plant.choice import ALL, GROUPS, Choice
-from irtwin.report.plant.energies import KINDS, Days, Kind, added_up, by_day, days, kind, kwh, share
+from irtwin.report.plant.choice import ALL, GROUPS, Selection
+from irtwin.report.plant.energies import KINDS, Days, EnergyKind, added_up, by_day, days, kind, kwh, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
 
@@ -19,7 +19,7 @@ MOST_ALARMS = 20  # shown of the newest
 
 
 @dataclass(frozen=True)
-class State:
+class RobotState:
     """What a robot does, in words; `live` is "flowing" or "stale" where it is watched just now."""
 
     words: str
@@ -28,14 +28,14 @@ class State:
 
 
 @dataclass(frozen=True)
-class Line:
+class RobotLine:
     """A robot's energy of one kind, with all that is known of the robot beside it."""
 
     robot: str
     name: str
     measured_at: str | None
     simulated: bool
-    state: State
+    state: RobotState
     runs: int
     time_s: float | None
     energy_j: float | None
@@ -55,8 +55,8 @@ class Line:
 class Group:
     """Energies of one kind, the largest first; `kind` is None for robots that have none."""
 
-    kind: Kind | None
-    lines: tuple[Line, ...]
+    kind: EnergyKind | None
+    lines: tuple[RobotLine, ...]
 
     def total(self, name: str) -> float | None:
         """Add up a column that can be added up."""
@@ -80,7 +80,7 @@ class Overview:
     """What the page of a plant says."""
 
     groups: tuple[Group, ...]
-    trends: tuple[tuple[Kind, Days], ...]
+    trends: tuple[tuple[EnergyKind, Days], ...]
     alarms: Sequence[Row]
     active: int
     robots: int
@@ -92,7 +92,7 @@ class Overview:
     tariff: Row
 
 
-def overview(answers: Answers, asked: Choice = ALL) -> Overview:
+def overview(answers: Answers, asked: Selection = ALL) -> Overview:
     """Make the overview of the answers to `reports/plant/*.rq`, of what is asked for."""
     energies = answers["energy"].rows
     groups = tuple(_groups(answers, asked))
@@ -117,14 +117,14 @@ def overview(answers: Answers, asked: Choice = ALL) -> Overview:
     )
 
 
-def states(answers: Answers) -> dict[str, State]:
+def states(answers: Answers) -> dict[str, RobotState]:
     """Return what each robot that is watched just now does, by its IRI."""
     return {row["robot"]: _watched(row) for row in answers["live"].rows}
 
 
-def sheet(found: Overview) -> Sheet:
+def sheet(plant: Overview) -> Sheet:
     """Return the table of robots, a row for each kind of energy of each."""
-    tariff = found.tariff
+    tariff = plant.tariff
     columns = [
         "robot", "iri", "state", "energy_from", "measured_at", "runs", "run_time_s", "energy_kWh",
         *([f"cost_{tariff['currency']}"] if tariff["price"] is not None else []),
@@ -143,7 +143,7 @@ def sheet(found: Overview) -> Sheet:
             line.gap["closed"] if line.gap else None,
             *(_saving(line) if tariff["hours"] is not None else []),
         )
-        for group in found.groups for line in group.lines
+        for group in plant.groups for line in group.lines
     ]  # fmt: skip
     return Sheet(tuple(columns), rows)
 
@@ -163,13 +163,13 @@ def made_sheet(answers: Answers) -> Sheet:
     )  # fmt: skip
 
 
-def _groups(answers: Answers, asked: Choice) -> list[Group]:
+def _groups(answers: Answers, asked: Selection) -> list[Group]:
     known: dict[str, list[Row]] = {}
     for row in answers["energy"].rows:
         known.setdefault(row["robot"], []).append(row)
     daily = by_day(answers["days"].rows)
     beside = _Beside(answers)
-    lines: dict[Kind | None, list[Line]] = {}
+    lines: dict[EnergyKind | None, list[RobotLine]] = {}
     for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
         if not asked.finds(robot["name"], *(robot[name] for name in GROUPS)):
             continue
@@ -184,7 +184,7 @@ def _groups(answers: Answers, asked: Choice) -> list[Group]:
     ]  # fmt: skip
 
 
-def _place(line: Line, by: str) -> tuple[Any, ...]:
+def _place(line: RobotLine, by: str) -> tuple[Any, ...]:
     """Return what a line is sorted by: its group; then what is asked for, else what it could save; then its energy."""
     saving = line.saving["energy_j"] if line.saving is not None else None
     first = {"standby": line.standby, "standing": line.standing, "alarms": line.alarms, "runs": line.runs,
@@ -204,11 +204,13 @@ class _Beside:
         self.states = states(answers)
 
 
-def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, beside: _Beside, of_group: str) -> Line:
+def _line(
+    robot: Row, energy: Row | None, of: EnergyKind | None, trend: Days | None, beside: _Beside, of_group: str
+) -> RobotLine:
     iri = robot["robot"]
     joules = energy["energy_j"] if energy is not None else None
     electrical = energy if of is not None and of.electrical else None
-    return Line(
+    return RobotLine(
         robot=iri,
         name=robot["name"],
         measured_at=robot["measured_at"],
@@ -233,20 +235,20 @@ def _line(robot: Row, energy: Row | None, of: Kind | None, trend: Days | None, b
 _STATES = {"moving": "moving", "standstill": "standing still"}
 
 
-def _watched(row: Row) -> State:
+def _watched(row: Row) -> RobotState:
     if row["stream"] == "stale":
-        return State(f"no news: {row['why']}" if row["why"] else "no news", "stale", row["began"])
-    return State(_STATES.get(row["state"], "watched"), "flowing", row["began"])
+        return RobotState(f"no news: {row['why']}" if row["why"] else "no news", "stale", row["began"])
+    return RobotState(_STATES.get(row["state"], "watched"), "flowing", row["began"])
 
 
-def _left(robot: Row) -> State:
+def _left(robot: Row) -> RobotState:
     """Return what a robot did at the end of its last run."""
     if robot["last_began"] is None:
-        return State("no run yet" if not robot["runs"] else "not known")
-    return State(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
+        return RobotState("no run yet" if not robot["runs"] else "not known")
+    return RobotState(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
 
 
-def _saving(line: Line) -> list[float | None]:
+def _saving(line: RobotLine) -> list[float | None]:
     ends = ("energy_j", "lower_j", "upper_j")
     return [None if line.saving is None else kwh(line.saving[end]) for end in ends]
 

@@ -12,14 +12,14 @@ from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import choice, links, paging
 from irtwin.report.plant.energies import kwh
-from irtwin.report.questions import Answers, Question, read_questions
+from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
 FOLDER = resources.folder("reports") / "plant"
 
 
 @cache
-def questions(page: str = "") -> Mapping[str, Question]:
+def questions(page: str = "") -> Mapping[str, PageQuestion]:
     """Return the questions of a page, of the plant's own without a name."""
     return read_questions((FOLDER / page).glob("*.rq"))
 
@@ -32,9 +32,9 @@ def style() -> str:
     )
 
 
-def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any) -> str:
+def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: Any) -> str:
     """Return a page; `answers` and `bindings` are shown as the questions behind it, links are those of `base`."""
-    template = _templates(said.get("base", ID)).get_template(f"plant/{name}")
+    template = _templates(values.get("base", ID)).get_template(f"plant/{name}")
     rows = {question: answer.rows for question, answer in answers.items()}
     return template.render(
         answers=answers,
@@ -48,7 +48,7 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **said: Any
             "asked": choice.ALL,
             "groups": choice.GROUPS,
             "sorts": choice.SORTS,
-            **said,
+            **values,
         },
     )
 

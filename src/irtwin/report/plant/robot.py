@@ -8,11 +8,11 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from irtwin.report.plant import page
-from irtwin.report.plant.energies import Days, Kind, by_day, days, kind, share
+from irtwin.report.plant.energies import Days, EnergyKind, by_day, days, kind, share
 from irtwin.report.plant.load import load
 from irtwin.report.plant.overview import PLANT_TREND, states
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.questions import Answers, Question, Row
+from irtwin.report.questions import Answers, PageQuestion, Row
 
 _LITTLE = 1e-4  # of all energies of a run's ledger, by size: less is not shown by itself
 MOST_RUNS = 5000  # that runs.rq answers
@@ -30,14 +30,14 @@ _LEDGER = {
 }  # fmt: skip
 
 
-def questions() -> Mapping[str, Question]:
+def questions() -> Mapping[str, PageQuestion]:
     """Return the questions of a robot's page."""
     of_the_plant = page.questions()
     beside = {name: replace(of_the_plant[name], bind=("robot",)) for name in _OF_THE_PLANT}
     return {**page.questions("robot"), **beside, "tariff": of_the_plant["tariff"]}
 
 
-def all_runs() -> Question:
+def all_runs() -> PageQuestion:
     """Return the question of a robot's runs without the bound that its page has."""
     runs = page.questions("robot")["runs"]
     return replace(runs, text=runs.text.removesuffix(f"LIMIT {MOST_RUNS}"))
@@ -85,7 +85,7 @@ def ledger_sheet(answers: Answers) -> Sheet:
     return _sheet(answers["ledger"].rows, _LEDGER)
 
 
-def _energy(row: Row, daily: Mapping[str, Mapping[str, float]]) -> tuple[Kind, Row, Days | None]:
+def _energy(row: Row, daily: Mapping[str, Mapping[str, float]]) -> tuple[EnergyKind, Row, Days | None]:
     return kind(row["energy_from"]), row, days(daily.get(row["energy_from"], {}), PLANT_TREND)
 
 

@@ -53,11 +53,11 @@ class BagFile:
     @property
     def topics(self) -> list[Topic]:
         """The topics that may hold a run's channels, in the order of their names."""
-        found: dict[tuple[str, str], int] = {}
+        counts: dict[tuple[str, str], int] = {}
         for connection in self._wanted():
             key = (connection.topic, connection.msgtype)
-            found[key] = found.get(key, 0) + connection.msgcount
-        return [Topic(*key, count) for key, count in sorted(found.items())]
+            counts[key] = counts.get(key, 0) + connection.msgcount
+        return [Topic(*key, count) for key, count in sorted(counts.items())]
 
     def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
         """Yield topic, time of recording (ns since 1970) and message of what the topics hold, in that order of time."""
@@ -96,8 +96,8 @@ def open_bag(path: Path) -> Iterator[BagFile]:
         with counted(unpacking), kind(path) as reader:
             yield BagFile(path, reader)
     except (ReaderError1, ReaderError2, SerdeError, apsw.Error, *_DAMAGE) as error:
-        said = f"{type(error).__name__}: {error}".strip().partition("\n")[0][:200]
-        raise InputError(f"{path}: not a readable bag, or damaged ({said}); record or convert it again") from error
+        message = f"{type(error).__name__}: {error}".strip().partition("\n")[0][:200]
+        raise InputError(f"{path}: not a readable bag, or damaged ({message}); record or convert it again") from error
 
 
 def _size(path: Path) -> int:

@@ -50,9 +50,9 @@ class BagSource(Source):
 
     def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
         """Return some of the columns; joint states of a time at which another topic is silent are left out."""
-        table, said = self._run
+        table, notes = self._run
         self.check_size(table.num_rows, len(columns))
-        return table.select(columns), said
+        return table.select(columns), notes
 
     @cached_property
     def _run(self) -> tuple[pa.Table, list[str]]:
@@ -64,46 +64,46 @@ class BagSource(Source):
             joints, others = self._messages(bag, states, tuple(numbers.values()))
         table = joints.table()
         known = np.ones(len(joints.recorded), dtype=bool)
-        said = []
+        notes = []
         for column, topic in numbers.items():
             table[column], heard = others[topic].at(np.array(joints.recorded, dtype=np.int64))
             known &= heard
         if not known.all():
-            said = [f"{self.path}: {int((~known).sum())} joint states left out, at which another topic is silent"]
-        return pa.table({name: values[known] for name, values in table.items()}), said
+            notes = [f"{self.path}: {int((~known).sum())} joint states left out, at which another topic is silent"]
+        return pa.table({name: values[known] for name, values in table.items()}), notes
 
     def _states_topic(self, topics: Sequence[Topic]) -> str:
-        found = [topic.name for topic in topics if topic.kind == JOINT_STATE and topic.count]
+        names = [topic.name for topic in topics if topic.kind == JOINT_STATE and topic.count]
         if (named := self.topics.get("joint_states")) is not None:
-            if named not in found:
-                raise InputError(f"{self.path}: {named} of [topics] holds no joint states; {_there(found)}")
+            if named not in names:
+                raise InputError(f"{self.path}: {named} of [topics] holds no joint states; {_there(names)}")
             return named
-        if not found:
+        if not names:
             raise InputError(f"{self.path}: holds no joint states (sensor_msgs/JointState); record /joint_states")
-        if len(found) > 1:
+        if len(names) > 1:
             raise InputError(
-                f"{self.path}: several topics hold joint states: {', '.join(found)}; "
-                f'say which in dataset.toml: [topics] joint_states = "{found[0]}"'
+                f"{self.path}: several topics hold joint states: {', '.join(names)}; "
+                f'say which in dataset.toml: [topics] joint_states = "{names[0]}"'
             )
-        return found[0]
+        return names[0]
 
     def _number_topics(self, topics: Sequence[Topic]) -> dict[str, str]:
         """Return the topic of each column that is one of numbers."""
         numbers = [topic.name for topic in topics if topic.kind in NUMBERS and topic.count]
         result: dict[str, str] = {}
         for column, name in number_topics(self.robot).items():
-            found = [topic for topic in numbers if topic.rpartition("/")[2] in (column, name)]
+            matching = [topic for topic in numbers if topic.rpartition("/")[2] in (column, name)]
             if (named := self.topics.get(column)) is not None:
                 if named not in numbers:
                     raise InputError(f"{self.path}: {named} of [topics] holds no numbers; {_there(numbers)}")
-                found = [named]
-            if len(found) > 1:
+                matching = [named]
+            if len(matching) > 1:
                 raise InputError(
-                    f"{self.path}: several topics could be {column}: {', '.join(found)}; "
-                    f'say which in dataset.toml: [topics] {column} = "{found[0]}"'
+                    f"{self.path}: several topics could be {column}: {', '.join(matching)}; "
+                    f'say which in dataset.toml: [topics] {column} = "{matching[0]}"'
                 )
-            if found:
-                result[column] = found[0]
+            if matching:
+                result[column] = matching[0]
         return result
 
     def _check_count(self, topics: Sequence[Topic]) -> None:
@@ -193,11 +193,11 @@ class _JointStates:
 
     def _order(self, names: tuple[str, ...]) -> list[int] | None:
         """Return the place in a message of each joint, by its own name or by ROS'; None where one is missing."""
-        found = [
+        places = [
             names.index(one) if one in names else names.index(two) if two in names else None
             for one, two in self._names.items()
         ]
-        return None if None in found else [place for place in found if place is not None]
+        return None if None in places else [place for place in places if place is not None]
 
 
 class _Numbers:

@@ -38,13 +38,13 @@ def sources() -> dict[str, type[Source]]:
     An installed package adds its own: an entry point of the group `irtwin.sources` that names a class. ValueError where
     two take the same files.
     """
-    found: dict[str, type[Source]] = {}
+    by_ending: dict[str, type[Source]] = {}
     for kind in (*_OWN, *_registered()):
         for suffix in kind.suffixes:
-            if suffix in found:
-                raise ValueError(f"two sources take {suffix} files: {found[suffix]} and {kind}")
-            found[suffix] = kind
-    return found
+            if suffix in by_ending:
+                raise ValueError(f"two sources take {suffix} files: {by_ending[suffix]} and {kind}")
+            by_ending[suffix] = kind
+    return by_ending
 
 
 def registered() -> set[str]:

@@ -49,8 +49,8 @@ class CsvSource(Source):
             )
         self.check_size(table.num_rows, len(columns))
         shown = ", ".join(str(line) for line, _ in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
-        said = f"{self.path}: {len(wrong)} samples dropped, wrong number of values: line {shown}"
-        return table.select(columns), [said] if wrong else []
+        note = f"{self.path}: {len(wrong)} samples dropped, wrong number of values: line {shown}"
+        return table.select(columns), [note] if wrong else []
 
     @cached_property
     def _parsed(self) -> _Parsed:
