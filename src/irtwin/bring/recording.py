@@ -76,9 +76,12 @@ class Recording:
 def read_recording(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
     """Read a log in whatever form it is. Raises InputError where it cannot be read."""
     from irtwin.bring.delimited_text import read_text
+    from irtwin.bring.sage import is_motion, read_motion
     from irtwin.bring.spreadsheet import read_sheet
 
     suffix = path.suffix.lower()
+    if is_motion(path):
+        return read_motion(path, robot)
     if path.is_dir() or suffix in BAGS:
         return _bag(path, robot, topics)
     if suffix in SHEETS:

@@ -71,10 +71,10 @@ def import_(
     """Make a data set of logs in other formats, a run a file, or an empty one; or take back an edited OWL file.
 
     FILE is a ROS bag (1, 2, MCAP), a recording of RTDE by Universal Robots, a CSV file of PlotJuggler or of anybody, a
-    Parquet or an Excel file. Without --robot it is a meter's: time, and power or energy. Units are told by names and by
-    checks against other columns, and shown. What cannot be told is asked on a terminal; elsewhere the command stops and
-    says what to give. What was written is checked, as by `irtwin check`: where something must be cured first, the exit
-    status is 2.
+    Parquet or an Excel file, or a folder of SAGE (control.csv and state_motor.csv). Without --robot it is a meter's:
+    time, and power or energy. Units are told by names and by checks against other columns, and shown. What cannot be
+    told is asked on a terminal; elsewhere the command stops and says what to give. What was written is checked, as by
+    `irtwin check`: where something must be cured first, the exit status is 2.
 
     Without FILE the data set is empty: a folder whose dataset.toml explains each key, to fill in.
 

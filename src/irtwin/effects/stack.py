@@ -189,20 +189,23 @@ class Stack:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
         if self.coupled:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
-        return self._sum(motion, values, [place for place in self._torque_places if place[0].channel == "torque"])
+        return self.torque_of([effect for effect in self._torque if effect.channel == "torque"], motion, values)
+
+    def torque_of(self, effects: Sequence[Effect], motion: Motion, values: np.ndarray) -> np.ndarray:
+        """Return what some of the effects add to torque, (N, n) N m, by the (K,) torque coefficients of all."""
+        total = values + self.shift(motion)
+        below = self._torques(motion, values).below if self.coupled else {}
+        torque = np.zeros(motion.dq.shape)
+        for effect, own in self._torque_places:
+            if effect in effects:
+                torque += self._contribution(effect, motion, total[own], below.get(effect.stage))
+        return torque
 
     def shown_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
         """Return what a log shows by the (K,) torque coefficients, (N, n) N m; what others are built on as expected."""
         if self.coupled:
             return np.asarray(self.torque_columns(motion) @ (values + self.shift(motion)))
-        return self._sum(motion, values, self._torque_places)
-
-    def _sum(self, motion: Motion, values: np.ndarray, places: Sequence[tuple[Effect, slice]]) -> np.ndarray:
-        total = values + self.shift(motion)
-        torque = np.zeros(motion.dq.shape)
-        for effect, own in places:
-            torque += self._contribution(effect, motion, total[own], None)
-        return torque
+        return self.torque_of(self._torque, motion, values)
 
     def predicted_power_columns(
         self,
@@ -237,10 +240,7 @@ class Stack:
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
-        parts = [
-            np.broadcast_to(effect.shift(self.robot, motion), (own.stop - own.start,))
-            for effect, own in self._torque_places
-        ]
+        parts = [np.full(own.stop - own.start, effect.shift(self.robot, motion)) for effect, own in self._torque_places]
         return np.concatenate([np.zeros(0), *parts])
 
     def _expected(self, terms: Sequence[tuple[Effect, Term]]) -> np.ndarray:

@@ -106,23 +106,28 @@ def read_model(path: Path, robot: Robot) -> Model:
     """
     file = read_mjcf(path)
     compiled, delays = _compiled(file)
-    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= 2}
-    lacking = [name for name in robot.joint_names if name not in own]
-    if lacking:
-        raise InputError(
-            f"{path}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: give a model whose "
-            "joints have the names of the robot's"
-        )
-    places = [own[name] for name in robot.joint_names]
+    places, others = joints_of(compiled, robot.joint_names, str(path))
     return Model(
         file,
         compiled,
         tuple(robot.joint_names),
         compiled.jnt_qposadr[places],
         compiled.jnt_dofadr[places],
-        tuple(name for name in own if name not in robot.joint_names),
+        others,
         delays,
     )
+
+
+def joints_of(compiled: mujoco.MjModel, names: Sequence[str], source: str) -> tuple[list[int], tuple[str, ...]]:
+    """Return the places of joints by name, and the names of others. Raises InputError where one is lacking."""
+    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= 2}
+    lacking = [name for name in names if name not in own]
+    if lacking:
+        raise InputError(
+            f"{source}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: give a model "
+            "whose joints have the names of the robot's"
+        )
+    return [own[name] for name in names], tuple(name for name in own if name not in names)
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ def tilted(compiled: mujoco.MjModel, angles: Sequence[float]) -> np.ndarray:
 
 def has_servos(model: Model) -> bool:
     """Return whether each joint of the robot is driven by one position servo."""
-    return all(_servo(model, joint) is not None for joint in model.joints)
+    return all(_servo(model.compiled, joint) is not None for joint in model.joints)
 
 
 def servos(model: Model) -> Servos:
@@ -213,14 +213,8 @@ def servos(model: Model) -> Servos:
     import mujoco
 
     compiled = model.compiled
-    found = {joint: _servo(model, joint) for joint in model.joints}
-    for joint, one in found.items():
-        if one is None:
-            raise InputError(
-                f"{model.file.path}: joint {joint} is not driven by one position servo; its commands need one to be "
-                f'played: <position joint="{joint}" kp="..."/>'
-            )
-    at, dof = np.array(list(found.values())), model.speeds
+    at = np.array([drive_of(compiled, joint, str(model.file.path)) for joint in model.joints])
+    dof = model.speeds
     stiffness = compiled.actuator_gainprm[at, 0]
     own = np.vstack(
         [
@@ -246,11 +240,22 @@ def servos(model: Model) -> Servos:
     return Servos(model, at, own, scale)
 
 
-def _servo(model: Model, joint: str) -> int | None:
+def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
+    """Return a joint's position servo. Raises InputError, naming `source`, where it is not driven by one alone."""
+    found = _servo(compiled, joint)
+    if found is None:
+        raise InputError(
+            f"{source}: joint {joint} is not driven by one position servo; its commands need one to be "
+            f'played: <position joint="{joint}" kp="..."/>'
+        )
+    return found
+
+
+def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:
     """Return the actuator that alone drives a joint, if it is a position servo."""
     import mujoco
 
-    compiled, place = model.compiled, model.compiled.joint(joint).id
+    place = compiled.joint(joint).id
     own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
     (drives,) = np.nonzero(own)
     return int(drives[0]) if len(drives) == 1 and _follows_position(compiled, int(drives[0])) else None
