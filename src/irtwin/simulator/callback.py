@@ -68,7 +68,7 @@ def apply(model: mujoco.MjModel, file: Path | str) -> Rest:
 
 def _of_twin(model: mujoco.MjModel, twin: Twin) -> tuple[Rest, Added]:
     real = [effect for effect in twin.standing if effect.channel == "torque"]
-    known = [effect for effect in real if not (effect.memory or effect.requires or effect.disturbance)]
+    known = [one for one in real if not (one.memory or one.requires or one.disturbance or one.within_bodies)]
     rest = [effect for effect in known if not (effect.bodies or effect.in_mjcf)]
     left_out = tuple(dict.fromkeys(effect.id for effect in real if effect not in known))
     return Rest(tuple(dict.fromkeys(effect.id for effect in rest)), left_out), _Torque(model, twin, known, rest)
