@@ -10,7 +10,7 @@ from tests.synthetic import arm, measure, swing
 
 from irtwin.twin.files import from_json, load, to_json
 from irtwin.twin.identify import identify
-from irtwin.twin.price import price
+from irtwin.twin.price import price, saving, with_standing
 
 ROBOT = arm(2)
 
@@ -83,3 +83,24 @@ def test_what_effects_leave_of_power_is_in_the_interval():
     off = [replace(one, power=one.power + by) for one, by in zip(motions, (9, -7, 4, -8, 6, -4), strict=True)]
     steady, varying = (price(identify(ROBOT, of), [swing(ROBOT, 7)]).energy.half_width for of in (motions, off))
     assert varying > 3 * steady
+
+
+def test_a_motion_stands_longer_where_it_stood_last():
+    motion = swing(ROBOT, 7)
+    speeds = motion.dq.copy()
+    speeds[300:340] = 0.0
+    longer = with_standing(replace(motion, dq=speeds), motion.time[-1] + 1.0)
+    stood = slice(340, 340 + round(motion.rate))
+    assert longer.time[-1] == pytest.approx(motion.time[-1] + 1.0, abs=1 / motion.rate)
+    assert (longer.q[stood] == motion.q[339]).all() and not longer.dq[stood].any()
+    assert (longer.dq[-1] == speeds[-1]).all()
+
+
+def test_what_a_pause_leaves_widens_a_saving_by_the_pause():
+    twin = fitted(0.1)
+    motion = swing(ROBOT, 7)
+    longer = with_standing(replace(motion, dq=np.where(np.arange(len(motion.q))[:, None] < 300, motion.dq, 0.0)), 99.0)
+    unsure = replace(twin, remainder=replace(twin.remainder, pause=3.0))
+    without, widened = saving(twin, motion, longer).half_width, saving(unsure, motion, longer).half_width
+    stood = longer.time[-1] - longer.time[300]
+    assert widened == pytest.approx(np.hypot(without, 1.96 * 3.0 * stood), rel=0.02)
