@@ -23,6 +23,7 @@ from irtwin.providers.records import (
     load_run,
     load_twin,
 )
+from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan, run_of
@@ -85,7 +86,7 @@ def plan(
         modelling.check_plan_file(out)
     made, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(made.motion, made.joint_names, out)
+        modelling.write_motion(made.motion, made.robot, out)
     return made, kept
 
 
@@ -124,7 +125,7 @@ def predict(
 class Timings:
     """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times."""
 
-    joint_names: tuple[str, ...]
+    robot: Robot
     programme: Programme
     best: Cycle
     curve: Sequence[Cycle]
@@ -172,11 +173,11 @@ def optimise(
             time_scaling_of=known.name,
             time_scale=best.seconds / was,
         )
-        return Timings(twin.robot.joint_names, programme, best, times.curve()), made
+        return Timings(twin.robot, programme, best, times.curve()), made
 
     found, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(found.best.motion, found.joint_names, out)
+        modelling.write_motion(found.best.motion, found.robot, out)
     return found, kept
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from irtwin.planning.cycle import Cycle
     from irtwin.plans import Kept, Timings
 
+_OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -49,7 +50,7 @@ _kept = locating(
 @click.argument("source")
 @click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
 @click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
-@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
+@click.option("--out", type=FILE, help=_OUT)
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -176,7 +177,7 @@ def predict(
     type=Number(0.0, DAY),
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
-@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
+@click.option("--out", type=FILE, help=_OUT)
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
 def optimise(robot: str, run: str, out: Path | None, location: Location, name: str | None, **asked: Any) -> None:

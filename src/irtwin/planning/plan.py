@@ -53,7 +53,7 @@ class Plan:
     unchecked: links with mass but without collision shapes. fastest: how long the fastest motion on the path takes, s.
     """
 
-    joint_names: tuple[str, ...]
+    robot: Robot
     motion: Motion
     price: Price | None
     clearance: float
@@ -100,7 +100,7 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
     if meeting is not None:
         raise InputError(f"between samples of {rate:g} Hz {meeting}; ask for a higher rate")
     return Plan(
-        joint_names=twin.robot.joint_names,
+        robot=twin.robot,
         motion=motion,
         price=price(twin, [motion]),
         clearance=clearance,
