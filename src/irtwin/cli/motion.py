@@ -31,6 +31,7 @@ from irtwin.location import Location
 if TYPE_CHECKING:
     from irtwin.planning.cycle import Cycle
     from irtwin.plans import Kept, Timings
+    from irtwin.twin.price import Figure
 
 _OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 _PLAN = "plan"  # name of a planned run that was given none
@@ -186,7 +187,9 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
-    torque. The motion is kept as a planned run, and the robot's report says what it saves.
+    torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, closed brakes, or off:
+    states that the robot's logs show. A year is as long as plant.toml says. The motion is kept as a planned run, and
+    the robot's report says what it saves.
 
     \b
     Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
@@ -196,11 +199,12 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     found, kept = plans.optimise(robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked)
     for line in _curve_lines(found):
         click.echo(line)
-    click.echo(f"{_where(out, kept)}: {_cycle_text(found.best)} than {run} (95 % interval)")
+    saved = _cycle_text(found.best) + f" than {run}{_year(found, found.best.saved)}"
+    click.echo(f"{_where(out, kept)}: {saved} (95 % interval)")
 
 
 def _curve_lines(found: Timings) -> Iterator[str]:
-    """Yield the energy of each cycle time, and how much longer each move takes in the one that was chosen."""
+    """Yield the energy of each cycle time, what is new in the one that was chosen, and what its pauses could save."""
     for one in found.curve:
         yield _cycle_text(one)
     programme = found.programme
@@ -208,6 +212,20 @@ def _curve_lines(found: Timings) -> Iterator[str]:
     for section, factor in zip(programme.sections, found.best.factors, strict=True):
         if section.kind == "move":
             yield f"move from {time[section.first]:.2f} to {time[section.last]:.2f} s: {factor:.2f} times as long"
+    for proposal in found.proposals:
+        end = proposal.begin + proposal.seconds
+        back = "how long coming back takes is in no log" if proposal.takes is None else f"it takes {proposal.takes:g} s"
+        year = _year(found, proposal.saved)
+        yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
+    if not found.shows_off:
+        yield "no log shows the robot off: what switching it off saves is not known"
+
+
+def _year(found: Timings, saved: Figure) -> str:
+    """Say what a saving of each cycle, J, comes to in a year, where `plant.toml` says how many hours that has."""
+    if found.hours is None or saved.value <= 0:
+        return ""
+    return f" ({saved.times(found.hours / found.best.seconds / 1000)} kWh in {found.hours:g} h a year)"
 
 
 def _cycle_text(cycle: Cycle) -> str:
