@@ -64,5 +64,3 @@ def test_each_pause_has_what_is_left_of_its_own():
     assert of_pauses(pauses) == pytest.approx(2.0, rel=0.2)
     assert of_pauses([rng.standard_normal(n) for n in lengths]) < 0.1
     assert of_pauses(pauses[:3]) == 0.0
-    left = Remainder(sample=3.0, mean=0.0, seconds=10.0, pause=2.0)
-    assert left.energy(20.0, [3.0, 4.0]) == pytest.approx(10.0)

@@ -96,11 +96,13 @@ def test_a_motion_stands_longer_where_it_stood_last():
     assert (longer.dq[-1] == speeds[-1]).all()
 
 
-def test_what_a_pause_leaves_widens_a_saving_by_the_pause():
-    twin = fitted(0.1)
-    motion = swing(ROBOT, 7)
-    longer = with_standing(replace(motion, dq=np.where(np.arange(len(motion.q))[:, None] < 300, motion.dq, 0.0)), 99.0)
+def test_what_a_pause_leaves_is_unsure_by_how_much_longer_it_stands_there():
+    twin, motion = fitted(0.1), swing(ROBOT, 7)
+    speeds = motion.dq.copy()
+    speeds[300:360] = 0.0
+    stands = replace(motion, dq=speeds)
+    longer = with_standing(stands, stands.time[-1] + 5.0)
     unsure = replace(twin, remainder=replace(twin.remainder, pause=3.0))
-    without, widened = saving(twin, motion, longer).half_width, saving(unsure, motion, longer).half_width
-    stood = longer.time[-1] - longer.time[300]
-    assert widened == pytest.approx(np.hypot(without, 1.96 * 3.0 * stood), rel=0.02)
+    without, widened = (saving(one, stands, longer).half_width for one in (twin, unsure))
+    assert widened == pytest.approx(np.hypot(without, 1.96 * 3.0 * 5.0), rel=0.02)
+    assert saving(unsure, stands, stands).half_width == pytest.approx(saving(twin, stands, stands).half_width)

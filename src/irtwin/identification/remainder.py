@@ -24,8 +24,8 @@ _FEWEST, _MOST = 4, 12  # groups: fewer tell no scatter, more take time
 class Remainder:
     """What effects leave of power, W, one standard deviation: of a sample, of the mean over `seconds`, of a pause.
 
-    In a pause dry friction holds as much of the load as it happens to, and each pause has its own. Mean and pause are
-    grown so that `NORMAL` of them are half a 95 % interval.
+    At each pose dry friction holds a share of the load of its own, so a pause is off by as much whenever it stands
+    there. Mean and pause are grown so that `NORMAL` of them are half a 95 % interval.
     """
 
     sample: float
@@ -33,13 +33,9 @@ class Remainder:
     seconds: float
     pause: float = 0.0
 
-    def energy(self, seconds: float, pauses: Sequence[float] = ()) -> float:
-        """Return what is left of the energy of a motion with pauses of so many s, J.
-
-        The mean lasts a whole motion, and is noise in a shorter one; what is left in a pause lasts that pause.
-        """
-        lasting = self.mean * seconds * float(np.sqrt(max(1.0, self.seconds / max(seconds, 1e-9))))
-        return float(np.linalg.norm([lasting, *(self.pause * one for one in pauses)]))
+    def energy(self, seconds: float) -> float:
+        """Return what is left of the energy of a motion, J: it lasts a whole motion, and is noise in a shorter one."""
+        return self.mean * seconds * float(np.sqrt(max(1.0, self.seconds / max(seconds, 1e-9))))
 
 
 def remainder(blocks: Sequence[Block], terms: Sequence[Term], known: np.ndarray | None, ones: int) -> Remainder | None:

@@ -14,6 +14,7 @@ from irtwin.twin.twin import Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
 _WATT_HOUR = 3600.0  # J
+_SAME_POSE = 0.1  # rad (m)
 
 
 @dataclass(frozen=True)
@@ -82,13 +83,13 @@ def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
 def balance(twin: Twin, *parts: tuple[Motion, np.ndarray]) -> Figure:
     """Return the energy, J, of motions by the weights of their samples, (N,) s each; of negative ones it is taken off.
 
-    What is unsure in all alike, as the standby power, drops out; what effects leave of each does not.
+    What is unsure in all alike, as the standby power, drops out; what effects leave of each motion does not.
     """
     value = sum(float(weights @ twin.power(motion)) for motion, weights in parts)
     if twin.covariance is None:
         return Figure(value, None)
     slope = sum((_slope(twin, motion, weights) for motion, weights in parts), np.zeros(len(twin.parameters)))
-    return Figure(value, _half_width(twin, slope, *(_left(twin, motion, np.abs(weights)) for motion, weights in parts)))
+    return Figure(value, _half_width(twin, slope, *_left(twin, parts)))
 
 
 def mean_power(twin: Twin, motion: Motion, where: np.ndarray) -> Figure:
@@ -126,12 +127,20 @@ def with_standing(motion: Motion, seconds: float) -> Motion:
     )
 
 
-def _left(twin: Twin, motion: Motion, weights: np.ndarray) -> float:
-    """Return what effects leave of the energy of a motion, J, one standard deviation; by weights, (N,) s above 0."""
+def _left(twin: Twin, parts: Sequence[tuple[Motion, np.ndarray]]) -> list[float]:
+    """Return what effects leave of a balance, J, one standard deviation each: of motions, and of poses of their pauses.
+
+    What is left at a pose is the same in each motion, so what stands there as long in both drops out.
+    """
     if twin.remainder is None:
-        return 0.0
-    pauses = [float(weights[own].sum()) for own in stretches(standstill(motion))]
-    return twin.remainder.energy(float(weights.sum()), pauses)
+        return []
+    standing: dict[tuple[int, ...], float] = {}
+    for motion, weights in parts:
+        for own in stretches(standstill(motion)):
+            pose = tuple(np.round(motion.q[own].mean(axis=0) / _SAME_POSE).astype(int).tolist())
+            standing[pose] = standing.get(pose, 0.0) + float(weights[own].sum())
+    lasting = (twin.remainder.energy(float(np.abs(weights).sum())) for _, weights in parts)
+    return [*lasting, *(twin.remainder.pause * seconds for seconds in standing.values())]
 
 
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
