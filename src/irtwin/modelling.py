@@ -163,8 +163,7 @@ def expect(
     known = twin if isinstance(twin, Twin) else load(Path(twin))
     run = predicted.read_motion(known, Path(run_file), payload_mass, payload_com)
     table = predicted.predict(known, run)
-    pieces, _ = as_sampled(run.signals, run.file)
-    motions = [condition(replace(run, signals=piece), known.robot, known.cutoff) for piece in pieces]
+    motions = _motions(known, run)
     collisions = CollisionModel(known.robot)
     for motion in motions:
         check_motion(known, motion, collisions, run.file)
@@ -173,6 +172,17 @@ def expect(
     if out is not None:
         write_expectation(expected, Path(out))
     return expected
+
+
+def motions_of(robot: Robot, file: Path) -> list[Motion]:
+    """Return the motions, one between holes each, of a run's file. Raises InputError on a file that is no run."""
+    known = nominal_twin(robot)
+    return _motions(known, predicted.read_motion(known, file))
+
+
+def _motions(twin: Twin, run: Run) -> list[Motion]:
+    pieces, _ = as_sampled(run.signals, run.file)
+    return [condition(replace(run, signals=piece), twin.robot, twin.cutoff) for piece in pieces]
 
 
 def write_expectation(expected: Expectation, out: Path) -> None:
