@@ -133,8 +133,9 @@ def excite(
             f"{seconds:g} s at {rate:g} Hz are {seconds * rate:.0f} samples of {len(robot.joints)} joints; ask for at "
             f"most {most}: less time, or a lower rate"
         )
+    limits = JointLimits.of(robot)
     regressor = BaseRegressor(robot, criterion, tasks)
-    search = _Search(robot, seconds, box, np.random.default_rng(seed), regressor)
+    search = _Search(robot, seconds, box, np.random.default_rng(seed), limits, regressor)
     began = monotonic()
     interrupted = False
     try:
@@ -159,10 +160,16 @@ class _Search:
     """Interior-point search over the coefficients x: (2 K - 1, n); `best` is always a motion that keeps all limits."""
 
     def __init__(
-        self, robot: Robot, seconds: float, box: Box | None, random: np.random.Generator, regressor: BaseRegressor
+        self,
+        robot: Robot,
+        seconds: float,
+        box: Box | None,
+        random: np.random.Generator,
+        limits: JointLimits,
+        regressor: BaseRegressor,
     ) -> None:
         self._robot = robot
-        self._limits = JointLimits.of(robot)
+        self._limits = limits
         self._workspace = Workspace(robot, self._limits, box)
         self._body = OwnBody(robot)
         self._regressor = regressor
