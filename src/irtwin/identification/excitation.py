@@ -133,9 +133,7 @@ def excite(
             f"{seconds:g} s at {rate:g} Hz are {seconds * rate:.0f} samples of {len(robot.joints)} joints; ask for at "
             f"most {most}: less time, or a lower rate"
         )
-    limits = JointLimits.of(robot)
-    regressor = BaseRegressor(robot, criterion, tasks)
-    search = _Search(robot, seconds, box, np.random.default_rng(seed), limits, regressor)
+    search = _Search(robot, seconds, box, np.random.default_rng(seed), criterion, tasks)
     began = monotonic()
     interrupted = False
     try:
@@ -165,14 +163,14 @@ class _Search:
         seconds: float,
         box: Box | None,
         random: np.random.Generator,
-        limits: JointLimits,
-        regressor: BaseRegressor,
+        criterion: Criterion | None,
+        tasks: Sequence[Motion],
     ) -> None:
         self._robot = robot
-        self._limits = limits
+        self._limits = JointLimits.of(robot)
         self._workspace = Workspace(robot, self._limits, box)
         self._body = OwnBody(robot)
-        self._regressor = regressor
+        self._regressor = BaseRegressor(robot, criterion, tasks)
         self._random = random
         self._rest = _rest_of(seconds)
         factor = between_samples(self._rest.harmonics, len(self._rest.grid))
