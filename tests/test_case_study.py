@@ -17,6 +17,7 @@ from irtwin.location import Location
 from irtwin.planning.plan import Plan
 from irtwin.report.case_study.page import individuals
 from irtwin.report.wording import percent
+from irtwin.signals.log import read_data_set
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
 from tests.screens import faults, narrow_and_dark
@@ -96,9 +97,9 @@ def test_a_log_of_another_motion_is_refused(tmp_path: Path) -> None:
     data_set = case_study.unpack(tmp_path)
     still = np.zeros((101, 6))
     motion = Motion(np.linspace(0, 1.2, 101), still, still, still, run="still")
-    names = tuple(f"joint_a{number}" for number in range(1, 7))
+    robot = read_data_set(data_set).robot
     with pytest.raises(InputError, match=r"is the log of another motion, .* rad off"):
-        case_study.add_measurement(data_set, Plan(names, motion, None, 0.0, True, (), 1.2))
+        case_study.add_measurement(data_set, Plan(robot, motion, None, 0.0, True, (), 1.2))
     assert case_study.MEASURED not in (data_set / "dataset.toml").read_text()
 
 

@@ -23,6 +23,7 @@ from plant.effects import Effect
 from plant.fleet import Fleet, Traces
 from plant.logger import coloured
 from plant.logger import power as meter
+from plant.logger import released as brakes_released
 from plant.logger import torque as shown
 from plant.machine import Machine, build, read_drawings
 from plant.motion import Motion
@@ -71,13 +72,18 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
 
     def executed(motions: list[Motion]) -> tuple[Traces, np.ndarray, np.ndarray]:
         """Return what motions do, their power and that of copper, (T, R) W."""
-        traces = _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng)
-        released = _released(traces) if more else np.ones(traces.torque.shape[:2])
+        told = np.stack([motion.dq for motion in motions], axis=1)
+        released = _released(told) if more else np.ones(told.shape[:2])
+        traces = (
+            _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng, 1 - released)
+        )
         driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
         copper = (machine.drive.resistance * (driven.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
-        if not exact:
-            return traces, meter(driven, machine, effects, STEP), copper
-        return traces, _power(machine, driven, copper) + BRAKES * released * more, copper
+        if exact:
+            return traces, _power(machine, driven, copper) + BRAKES * released * more, copper
+        losses = tuple(effect for effect in effects if effect.id != "holding_brakes")
+        coils = BRAKES * more * brakes_released(replace(traces, dq=told), STEP)
+        return traces, meter(driven, machine, losses, STEP) + coils, copper
 
     traces, drawn, copper = executed(motions)
     sensed = shown(traces, machine, (), STEP)[::STRIDE]
@@ -127,11 +133,13 @@ def _effects(machine: Machine, runs: int, more: bool) -> tuple[Effect, ...]:
 
 
 def _simulated(
-    machine: Machine, motions: list[Motion], effects: tuple[Effect, ...], rng: np.random.Generator
+    machine: Machine, motions: list[Motion], effects: tuple[Effect, ...], rng: np.random.Generator, braked: np.ndarray
 ) -> Traces:
     runs, n = len(motions), len(machine.drawings.joints)
     jitter = 1 + machine.drawings.tolerance.friction_per_run * rng.standard_normal((runs, 2, n)).clip(-2, 2)
-    return Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP).run(effects)
+    return Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked).run(
+        effects
+    )
 
 
 def _followed(machine: Machine, motions: list[Motion], more: bool) -> Traces:
@@ -160,8 +168,8 @@ def _power(machine: Machine, traces: Traces, copper: np.ndarray) -> np.ndarray:
     return np.maximum(axes, 0.0) + machine.drawings.supply.standby
 
 
-def _released(traces: Traces) -> np.ndarray:
-    """Return (T, R) whether brakes are open: half a second longer than a joint moves."""
-    moving = (np.abs(traces.dq) > 0.01).any(axis=2)
+def _released(told: np.ndarray) -> np.ndarray:
+    """Return (T, R) whether brakes are open: half a second longer than a joint is told to move, (T, R, n) rad/s."""
+    moving = (np.abs(told) > 0.01).any(axis=2)
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving))[:, None], -(10**9)), axis=0)
     return ((np.arange(len(moving))[:, None] - last) * STEP <= 0.5).astype(float)

@@ -20,8 +20,8 @@ from irtwin.identification.validation import split
 from irtwin.planning.cycle import CycleTimes
 from irtwin.planning.programme import programme_of
 from irtwin.signals.conditioning import condition
-from irtwin.signals.motion import Motion
-from irtwin.twin.price import Figure
+from irtwin.signals.motion import Motion, standstill, stretches
+from irtwin.twin.price import Figure, with_standing
 from plant.motion import Motion as Programmed
 
 LONGER, PAUSE = 1.25, 0.1
@@ -42,17 +42,18 @@ def savings(case: Case) -> Iterator[tuple[str, Figure, float, float]]:
             continue
         cycle = LONGER * float(programme.seconds.sum())
         new = CycleTimes(twin, programme, PAUSE).in_time(cycle)
-        before, after = (_energy(case, one, cycle) for one in (motion, new.motion))
+        before, after = (_energy(case, one) for one in (with_standing(motion, cycle), new.motion))
         yield motion.run, new.saved, before - after, before
 
 
-def _energy(case: Case, motion: Motion, seconds: float) -> float:
-    """Return what a motion takes on the plant, standing still after it until so many seconds are over, J."""
-    law = CubicSpline(motion.time - motion.time[0], motion.q, bc_type="clamped")
-    time = np.minimum(np.arange(0.0, seconds, STEP), law.x[-1])
-    standing = (time >= law.x[-1])[:, None]
-    states = (law(time), *(np.where(standing, 0.0, law(time, order)) for order in (1, 2)))
-    return float(np.trapezoid(case.plant(Programmed(*states)), dx=STEP))
+def _energy(case: Case, motion: Motion) -> float:
+    """Return what a motion takes on the plant, J: told to stand where it stood."""
+    q = motion.q.copy()
+    for own in stretches(standstill(motion)):
+        q[own] = q[own].mean(axis=0)
+    law = CubicSpline(motion.time - motion.time[0], q)
+    time = np.arange(0.0, law.x[-1], STEP)
+    return float(np.trapezoid(case.plant(Programmed(*(law(time, order) for order in range(3)))), dx=STEP))
 
 
 def main() -> None:

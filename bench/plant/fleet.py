@@ -18,6 +18,7 @@ _ONLY_FRICTION = int(
 )
 _DRY_FORWARD = 0.9  # of the drawings' Coulomb friction is fed forward
 _DRY_WIDTH = 0.005  # rad/s
+_BRAKE = 1000.0  # N m
 SETTLE = 0.4  # s, at the first pose before the log starts
 
 
@@ -44,11 +45,13 @@ class Fleet:
         jitter: np.ndarray,
         step: float,
         near_zero: NearZero | None = None,
+        braked: np.ndarray | None = None,
     ) -> None:
         """`warmth`: (R, n) degC at the start; `jitter`: (R, 2, n) factors of Coulomb and viscous friction.
 
-        near_zero: how dry friction turns at zero speed; None: at once.
+        near_zero: how dry friction turns at zero speed; None: at once. braked: (T, R) 1 while brakes hold the joints.
         """
+        self.braked = np.zeros((1, len(motions))) if braked is None else braked
         self.near_zero = near_zero
         self.machine, self.payloads, self.warmth, self.jitter, self.step = machine, payloads, warmth, jitter, step
         settle = round(SETTLE / step)
@@ -125,7 +128,8 @@ class Fleet:
             lag = q_wanted[sample] - seen
             error = dq_wanted[sample] + control.position_gain * lag - velocity
             wanted = self.forward[sample] + gain[sample] * (error + integral)
-            integral = integral + (np.abs(wanted) < limit) * error * integral_gain
+            braked = self.braked[min(max(sample - self.settle, 0), len(self.braked) - 1), :, None]
+            integral = integral + (np.abs(wanted) < limit) * error * integral_gain * (1 - braked)
             current = current + drive_blend * (np.minimum(np.maximum(wanted, -limit), limit) - current)
             temperature = self.warmth + 3.0 * (1 - np.exp(-max(time, 0) / 6))
             state = State(time, motor_q, motor_dq, ddq, load, temperature)
@@ -152,7 +156,7 @@ class Fleet:
                 applied = np.where(elastic, spring, net)
             else:
                 applied = net
-            sliding = np.where(elastic | ~dry, 0.0, level)
+            sliding = np.where(elastic | ~dry, 0.0, level) + _BRAKE * braked
             if contact is not None:
                 self._push(arms, contact, time)
             at = sample - self.settle

@@ -65,7 +65,7 @@ def power(traces: Traces, machine: Machine, effects: tuple[Effect, ...], step: f
     axes = (traces.torque * traces.dq + losses).sum(axis=2)
     axes = _bus(axes, strength("no_regeneration")[:, 0], strength("bus_capacitor")[:, 0], step)
     standby = machine.drawings.supply.standby
-    total = axes + standby + strength("holding_brakes")[:, 0] * _released(traces, step)
+    total = axes + standby + strength("holding_brakes")[:, 0] * released(traces, step)
     time = step * np.arange(len(total))[:, None]
     total = total + strength("cycling_fan")[:, 0] * (np.sin(2 * np.pi * time / 2.7) > 0.4)
     total = total * (1 + strength("meter_gain")[:, 0] * (1 - 2e-5 * total))
@@ -100,7 +100,7 @@ def _bus(axes: np.ndarray, burnt: np.ndarray, capacity: np.ndarray, step: float)
     return np.where(grid < 0, grid * (1 - burnt), grid)
 
 
-def _released(traces: Traces, step: float) -> np.ndarray:
+def released(traces: Traces, step: float) -> np.ndarray:
     """Share of the coils' power: brakes open just before a motion, close 0.4 s after it, and take more to open."""
     moving = (np.abs(traces.dq) > 0.01).any(axis=2)
     reach, early = round(0.4 / step), round(0.05 / step)

@@ -110,7 +110,7 @@ def add_measurement(data_set: Path, plan: Plan) -> float:
     table, motion = pq.read_table(log), plan.motion
     time = table["time"].to_numpy()
     planned = np.column_stack([np.interp(time, motion.time, column) for column in motion.q.T])
-    measured = np.column_stack([table[name].to_numpy() for name in CHANNELS["q"].columns(plan.joint_names)])
+    measured = np.column_stack([table[name].to_numpy() for name in CHANNELS["q"].columns(plan.robot.joint_names)])
     off = float(np.abs(measured - planned).max())
     if off > _OFF:
         raise InputError(f"{log}: is the log of another motion, {off:.3f} rad off; make it by bench/case_study_log.py")

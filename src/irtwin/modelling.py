@@ -20,10 +20,12 @@ from irtwin.gap.choice import identified
 from irtwin.gap.isolation.torque_scale import torque_scale_of
 from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.cutoff import cutoff_for
+from irtwin.planning import robot_program
 from irtwin.planning.admission import check_motion
 from irtwin.planning.plan import Plan, Task, nominal_twin
 from irtwin.planning.plan import plan as make_plan
 from irtwin.robot.collision import CollisionModel
+from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, columns_of, csv_text
 from irtwin.signals.conditioning import condition
@@ -161,8 +163,7 @@ def expect(
     known = twin if isinstance(twin, Twin) else load(Path(twin))
     run = predicted.read_motion(known, Path(run_file), payload_mass, payload_com)
     table = predicted.predict(known, run)
-    pieces, _ = as_sampled(run.signals, run.file)
-    motions = [condition(replace(run, signals=piece), known.robot, known.cutoff) for piece in pieces]
+    motions = _motions(known, run)
     collisions = CollisionModel(known.robot)
     for motion in motions:
         check_motion(known, motion, collisions, run.file)
@@ -171,6 +172,17 @@ def expect(
     if out is not None:
         write_expectation(expected, Path(out))
     return expected
+
+
+def motions_of(robot: Robot, file: Path) -> list[Motion]:
+    """Return the motions, one between holes each, of a run's file. Raises InputError on a file that is no run."""
+    known = nominal_twin(robot)
+    return _motions(known, predicted.read_motion(known, file))
+
+
+def _motions(twin: Twin, run: Run) -> list[Motion]:
+    pieces, _ = as_sampled(run.signals, run.file)
+    return [condition(replace(run, signals=piece), twin.robot, twin.cutoff) for piece in pieces]
 
 
 def write_expectation(expected: Expectation, out: Path) -> None:
@@ -202,7 +214,7 @@ def read_twin(source: Path) -> Twin:
 
 
 def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, rate: float = 100.0) -> Plan:
-    """Plan a motion, and write it as a log, CSV or Parquet by its ending, which `predict` takes.
+    """Plan a motion, and write it by its ending: as a log, which `predict` takes, or as a program.
 
     source: a twin or its file, a URDF, or the folder of a data set. Raises InputError as `planning.plan.plan` does.
     """
@@ -210,21 +222,28 @@ def plan(source: Path | str | Twin, task: Task, out: Path | str | None = None, r
         check_plan_file(Path(out))
     planned = make_plan(source if isinstance(source, Twin) else read_twin(Path(source)), task, rate)
     if out is not None:
-        write_motion(planned.motion, planned.joint_names, Path(out))
+        write_motion(planned.motion, planned.robot, Path(out))
     return planned
 
 
 def check_plan_file(out: Path) -> None:
     """Raise InputError where no plan can be written to a file of this name."""
     check_place(out)
-    if out.suffix.lower() not in (".csv", ".parquet"):
-        raise InputError(f"{out}: a plan is written as .csv or .parquet; name such a file")
+    if out.suffix.lower() not in (".csv", ".parquet", *robot_program.WRITERS):
+        raise InputError(f"{out}: a plan is written as .csv, .parquet, .script or .src; name such a file")
 
 
-def write_motion(motion: Motion, joints: Sequence[str], out: Path) -> None:
-    """Write a planned motion as a log, CSV or Parquet by its ending."""
+def write_motion(motion: Motion, robot: Robot, out: Path) -> None:
+    """Write a planned motion by its ending: as a log, CSV or Parquet, or as a program, URScript or KRL.
+
+    Raises InputError where a program's language has no place for the robot.
+    """
+    ending, joints = out.suffix.lower(), robot.joint_names
+    if program := robot_program.WRITERS.get(ending):
+        write(out, program(motion, robot, out.stem).encode())
+        return
     signals = Signals(motion.time, motion.q, dq=motion.dq, ddq=motion.ddq)
-    if out.suffix.lower() == ".csv":
+    if ending == ".csv":
         write(out, csv_text(signals, joints).encode())
         return
     buffer = io.BytesIO()

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from sqlalchemy import select
+
 from irtwin import modelling
 from irtwin.errors import InputError
 from irtwin.location import Location
@@ -14,6 +16,7 @@ from irtwin.modelling import Announce, Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.plan import Plan, Task
 from irtwin.planning.programme import Programme, programme_of
+from irtwin.planning.waiting import Proposal, proposals
 from irtwin.providers.energy import stored_price
 from irtwin.providers.records import (
     check_run_name,
@@ -23,13 +26,16 @@ from irtwin.providers.records import (
     load_run,
     load_twin,
 )
+from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan, run_of
+from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import check_place
 from irtwin.storage.schema import MEASURED_RUN
 from irtwin.storage.staging import staged
+from irtwin.storage.tariff import read_tariff
 from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
 from irtwin.workflow import populate_apart, renew, rewriting, write_report
@@ -85,7 +91,7 @@ def plan(
         modelling.check_plan_file(out)
     made, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(made.motion, made.joint_names, out)
+        modelling.write_motion(made.motion, made.robot, out)
     return made, kept
 
 
@@ -122,12 +128,18 @@ def predict(
 
 @dataclass(frozen=True)
 class Timings:
-    """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times."""
+    """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times.
 
-    joint_names: tuple[str, ...]
+    `proposals`: what to do in the pauses of the best; `hours`: how many of a year the robot is on, None: not known.
+    """
+
+    robot: Robot
     programme: Programme
     best: Cycle
     curve: Sequence[Cycle]
+    proposals: Sequence[Proposal]
+    shows_off: bool
+    hours: float | None
 
 
 def optimise(
@@ -152,6 +164,7 @@ def optimise(
     with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
         run_id = find_run(place, robot_id, run, MEASURED_RUN).run_id
+        off = _off_power(place, robot_id)
 
     def make(twin: Twin) -> tuple[Timings, Run]:
         if not twin.knows_power:
@@ -172,12 +185,24 @@ def optimise(
             time_scaling_of=known.name,
             time_scale=best.seconds / was,
         )
-        return Timings(twin.robot.joint_names, programme, best, times.curve()), made
+        waiting = tuple(proposals(twin, programme.timed(best.factors), off))
+        hours = read_tariff(location.folder).hours
+        return Timings(twin.robot, programme, best, times.curve(), waiting, off is not None, hours), made
 
     found, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(found.best.motion, found.joint_names, out)
+        modelling.write_motion(found.best.motion, found.robot, out)
     return found, kept
+
+
+def _off_power(place: Workspace, robot_id: str) -> float | None:
+    """Return the mean power, W, that logs of a robot show while it was off; None where none does."""
+    state = schema.SupplyState
+    with place.reading() as session:
+        asked = select(state.seconds, state.power_w).where(state.robot_id == robot_id, state.state == "off")
+        seen = [(seconds, power) for seconds, power in session.execute(asked) if power is not None]
+    total = sum(seconds for seconds, _ in seen)
+    return sum(seconds * power for seconds, power in seen) / total if total else None
 
 
 def _keep(

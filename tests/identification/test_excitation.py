@@ -14,12 +14,14 @@ from tests.synthetic import arm
 
 from irtwin.errors import InputError
 from irtwin.identification import excitation
+from irtwin.identification.base_condition import BaseRegressor, determinant
 from irtwin.identification.excitation import Excitation, excite
 from irtwin.identification.motion_limits import CLEARANCE, FULL_SPEED_AFTER, Box
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.motion import Motion
 
 pytestmark = pytest.mark.slow
 
@@ -308,3 +310,13 @@ def test_a_robot_that_cannot_be_held_is_refused():
     weak = parse_urdf(boxed_arm(3).urdf.replace('effort="300.0"', 'effort="0.01"'))
     with pytest.raises(InputError, match="holding the arm takes more than the torque limits in every posture"):
         excite(weak, 5.0)
+
+
+def test_a_criterion_is_better_at_what_it_asks_than_the_condition_number() -> None:
+    q, dq, ddq = (values[:20] for values in excite(TWO, 5.0, iterations=5, seed=7).sample(20.0)[1:])
+    tasks = [Motion(np.arange(20) / 20.0, q, dq, ddq, run="task")]
+    asked = {"condition": {}, "determinant": {"criterion": determinant}, "energy": {"tasks": tasks}}
+    found = {name: excite(TWO, 5.0, iterations=60, **one).sample(20.0)[1:] for name, one in asked.items()}
+    for name in ("determinant", "energy"):
+        rank = BaseRegressor(TWO, **asked[name]).rank
+        assert rank(*found[name]) < rank(*found["condition"]) - 0.01

@@ -7,7 +7,7 @@ import pytest
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block
-from irtwin.identification.remainder import Remainder, remainder
+from irtwin.identification.remainder import Remainder, of_pauses, remainder
 
 TERMS = [Term("P0", "W", spread=600.0, lowest=0.0), Term("F", "N m", spread=100.0)]
 SECONDS, ROWS = 10.0, 200
@@ -55,3 +55,12 @@ def test_it_lasts_a_motion_and_is_noise_in_a_shorter_one():
     assert left.energy(20.0) == pytest.approx(40.0)
     assert left.energy(10.0) == pytest.approx(20.0)
     assert left.energy(2.5) == pytest.approx(10.0)
+
+
+def test_each_pause_has_what_is_left_of_its_own():
+    rng = np.random.default_rng(1)
+    lengths = rng.integers(30, 100, 200)
+    pauses = [2.0 * rng.standard_normal() + rng.standard_normal(n) for n in lengths]
+    assert of_pauses(pauses) == pytest.approx(2.0, rel=0.2)
+    assert of_pauses([rng.standard_normal(n) for n in lengths]) < 0.1
+    assert of_pauses(pauses[:3]) == 0.0

@@ -18,8 +18,8 @@ from irtwin.twin.twin import Parameter, Twin
 EFFECTS = ("rigid_body", "viscous_friction", "mechanical_power", "copper_loss", "standby_power")
 
 
-def twin(standby: float = 20.0, limits: float = np.inf) -> Twin:
-    robot = with_constants(arm(1))
+def twin(standby: float = 20.0, limits: float = np.inf, joints: int = 1) -> Twin:
+    robot = with_constants(arm(joints))
     robot = replace(robot, joints=tuple(replace(j, velocity=limits, effort=10 * limits) for j in robot.joints))
     stack = Twin(robot, EFFECTS, ()).stack
     values = {"P0": standby, "R": 8.0, "Fv": 3.0}

@@ -189,7 +189,7 @@ def test_bad_options_are_told(folder, options, message):
     assert message in said.err
     assert not (folder / "none.csv").exists()
     said = irtwin("plan", folder / "twin.json", *ENDS, "--out", folder / "none.txt")
-    assert "a plan is written as .csv or .parquet" in said.err
+    assert "a plan is written as .csv, .parquet, .script or .src" in said.err
 
 
 @pytest.mark.parametrize(
@@ -226,3 +226,16 @@ def test_a_plan_for_another_robot_is_refused(folder, tmp_path):
     said = irtwin("predict", folder / "twin.json", tmp_path / "plan.csv", "--out", tmp_path / "o.parquet")
     assert said.status == 2
     assert "plan.csv: column q_elbow: the robot has no moving joint" in said.err
+
+
+def test_poses_between_are_visited_in_the_order_that_takes_least() -> None:
+    far, near, middle = (np.array([turn, 1.0, 0.6, 0.0, 0.5, 0.0]) for turn in (0.7, -0.7, 0.1))
+    made = plan(nominal_twin(SIX), Task(START, GOAL, via=(far, near, middle)))
+    assert made.tour.order == (2, 3, 1) and made.tour.saved is None
+    assert made.tour.sooner > 0.3
+    for pose in (near, middle, far):
+        row = int(np.argmin(np.abs(made.motion.q - pose).max(axis=1)))
+        assert np.abs(made.motion.q[row] - pose).max() < 0.01 and np.abs(made.motion.dq[row]).max() < 0.2
+    assert np.ptp(np.diff(made.motion.time)) < 1e-9
+    with pytest.raises(InputError, match=r"a duration is that of one move; give none, and time the whole by"):
+        plan(nominal_twin(SIX), Task(START, GOAL, via=(near,), seconds=3.0))

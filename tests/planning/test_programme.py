@@ -81,3 +81,11 @@ def test_a_section_alone(factor: float = 2.0) -> None:
     alone = found.alone(1, factor)
     assert alone.time[-1] == pytest.approx(factor * found.seconds[1])
     assert alone.payload_mass == 3.0
+
+
+def test_a_timed_programme_knows_its_sections() -> None:
+    found = programme_of(motion(rest(0.4), bell(1.0), rest(0.6), -bell(2.0), rest(0.2)), "w")
+    timed = found.timed(np.array([1.0, 2.0, 0.0, 0.5, 3.0]))
+    assert [section.kind for section in timed.sections] == ["pause", "move", "move", "pause"]
+    assert timed.seconds == pytest.approx(found.seconds[[0, 1, 3, 4]] * [1.0, 2.0, 0.5, 3.0], abs=2 * STEP)
+    assert np.abs(timed.motion.dq[: timed.sections[0].last]).max() < 0.01

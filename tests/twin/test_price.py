@@ -10,7 +10,7 @@ from tests.synthetic import arm, measure, swing
 
 from irtwin.twin.files import from_json, load, to_json
 from irtwin.twin.identify import identify
-from irtwin.twin.price import price
+from irtwin.twin.price import price, saving, with_standing
 
 ROBOT = arm(2)
 
@@ -83,3 +83,26 @@ def test_what_effects_leave_of_power_is_in_the_interval():
     off = [replace(one, power=one.power + by) for one, by in zip(motions, (9, -7, 4, -8, 6, -4), strict=True)]
     steady, varying = (price(identify(ROBOT, of), [swing(ROBOT, 7)]).energy.half_width for of in (motions, off))
     assert varying > 3 * steady
+
+
+def test_a_motion_stands_longer_where_it_stood_last():
+    motion = swing(ROBOT, 7)
+    speeds = motion.dq.copy()
+    speeds[300:340] = 0.0
+    longer = with_standing(replace(motion, dq=speeds), motion.time[-1] + 1.0)
+    stood = slice(340, 340 + round(motion.rate))
+    assert longer.time[-1] == pytest.approx(motion.time[-1] + 1.0, abs=1 / motion.rate)
+    assert (longer.q[stood] == motion.q[339]).all() and not longer.dq[stood].any()
+    assert (longer.dq[-1] == speeds[-1]).all()
+
+
+def test_what_a_pause_leaves_is_unsure_by_how_much_longer_it_stands_there():
+    twin, motion = fitted(0.1), swing(ROBOT, 7)
+    speeds = motion.dq.copy()
+    speeds[300:360] = 0.0
+    stands = replace(motion, dq=speeds)
+    longer = with_standing(stands, stands.time[-1] + 5.0)
+    unsure = replace(twin, remainder=replace(twin.remainder, pause=3.0))
+    without, widened = (saving(one, stands, longer).half_width for one in (twin, unsure))
+    assert widened == pytest.approx(np.hypot(without, 1.96 * 3.0 * 5.0), rel=0.02)
+    assert saving(unsure, stands, stands).half_width == pytest.approx(saving(twin, stands, stands).half_width)

@@ -10,6 +10,7 @@ from tests.synthetic import arm, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.supply import HoldingBrakes
+from irtwin.signals.motion import standstill
 from irtwin.twin.identify import identify
 from irtwin.twin.supply_states import supply_states
 
@@ -70,3 +71,14 @@ def test_a_supply_that_is_off_takes_next_to_nothing():
     off = states(twin, replace(motion, power=power))["off"]
     assert off.seconds == pytest.approx(2.0, abs=0.1) and off.logged == pytest.approx(1.0)
     assert off.differs
+
+
+def test_a_joint_that_slips_at_rest_opens_no_brake():
+    whole = run(1, BRAKES)
+    closed = HoldingBrakes(delay=DELAY).columns(ROBOT, whole)[:, 0]
+    at = int(np.flatnonzero(standstill(whole) & (closed == 0))[5])
+    slip = whole.dq.copy()
+    slip[at : at + round(0.1 * whole.rate), 0] = 0.05
+    slipped = replace(whole, dq=slip)
+    assert (HoldingBrakes(delay=DELAY).columns(ROBOT, slipped)[:, 0] == closed).all()
+    assert (standstill(slipped) == standstill(whole)).all()

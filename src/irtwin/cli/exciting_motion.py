@@ -27,17 +27,42 @@ _LONG = 30.0  # s: of less nothing is said before
     metavar="X Y Z X Y Z",
     help="Keep the flange in a box, given by two corners in the base frame, m. Links always stay above the floor.",
 )
-def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: tuple[float, ...] | None) -> None:
+@click.option(
+    "--criterion",
+    type=click.Choice(["condition", "determinant"]),
+    default="condition",
+    show_default=True,
+    help="What is to be least: the condition number, or the determinant of the covariance (D-optimal).",
+)
+@click.option(
+    "--task",
+    "tasks",
+    type=FILE,
+    multiple=True,
+    help="CSV or Parquet file of a motion whose energy is to be told best, in place of a criterion. Repeatable.",
+)
+def excite(
+    urdf: Path,
+    seconds: float,
+    out: Path,
+    rate: float,
+    seed: int,
+    box: tuple[float, ...] | None,
+    criterion: str,
+    tasks: tuple[Path, ...],
+) -> None:
     """Design a motion that excites every base parameter.
 
     The motion is a finite Fourier series. It starts and ends at rest and keeps the joint limits, between samples too.
     Links with collision shapes keep off one another, and torque by the URDF's bodies within its limits.
-    Ctrl-C keeps the best motion so far.
+    With --task the variance of these motions' mechanical energy is least. Ctrl-C keeps the best motion so far.
 
     \b
-    Example: irtwin robot excite my.urdf --seconds 20 --out motion.csv
+    Example: irtwin robot excite my.urdf --seconds 20 --criterion determinant --out motion.csv
     """
+    from irtwin import modelling
     from irtwin.identification import excitation
+    from irtwin.identification.base_condition import determinant
     from irtwin.identification.motion_limits import Box
     from irtwin.robot.collision import CollisionModel
     from irtwin.robot.urdf import read_urdf
@@ -54,7 +79,16 @@ def excite(urdf: Path, seconds: float, out: Path, rate: float, seed: int, box: t
     expected = excitation.expected_seconds(len(described.joints), seconds)
     if expected > _LONG:
         announce(f"  {len(described.joints)} joints: about {10 * round(expected / 10)} s of processor")
-    motion = excitation.excite(described, seconds, rate=rate, seed=seed, box=within, progress=_excitation_progress())
+    motion = excitation.excite(
+        described,
+        seconds,
+        rate=rate,
+        seed=seed,
+        box=within,
+        criterion=determinant if criterion == "determinant" else None,
+        tasks=[motion for task in tasks for motion in modelling.motions_of(described, task)],
+        progress=_excitation_progress(),
+    )
     motion.write_csv(out)
     say_unchecked(checks_itself)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)

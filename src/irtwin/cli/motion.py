@@ -30,8 +30,11 @@ from irtwin.location import Location
 
 if TYPE_CHECKING:
     from irtwin.planning.cycle import Cycle
+    from irtwin.planning.plan import Tour
     from irtwin.plans import Kept, Timings
+    from irtwin.twin.price import Figure
 
+_OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -49,7 +52,10 @@ _kept = locating(
 @click.argument("source")
 @click.option("--from", "start", metavar="POSE", required=True, help="Where the motion starts.")
 @click.option("--to", "goal", metavar="POSE", required=True, help="Where it ends.")
-@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
+@click.option(
+    "--via", metavar="POSE", multiple=True, help="Stand there on the way, in the order that takes least. Repeatable."
+)
+@click.option("--out", type=FILE, help=_OUT)
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -77,6 +83,7 @@ def plan(
     source: str,
     start: str,
     goal: str,
+    via: tuple[str, ...],
     out: Path | None,
     line: bool,
     boxes: tuple[tuple[float, ...], ...],
@@ -98,6 +105,7 @@ def plan(
     will take, in the graph too.
 
     \b
+    Example: irtwin plan twin.json --from 0,0,0,0,0,0 --to 1,0,0,0,0,0 --via 2,0,0,0,0,0 --via 0.5,0,0,0,0,0 --out a.csv
     Example: irtwin plan twin.json --from 0,-1.57,1.57,0,0,0 --to 1,-1,1,0,0,0 --objective energy --out plan.csv
     """
     from irtwin import modelling, plans
@@ -111,6 +119,7 @@ def plan(
     task = Task(
         start=read_target(start, joints, "--from"),
         goal=read_target(goal, joints, "--to"),
+        via=[read_target(one, joints, "--via") for one in via],
         obstacles=[Obstacle((x, y, z), (a, b, c)) for x, y, z, a, b, c in boxes],
         line=line,
         least_energy=objective == "energy",
@@ -125,6 +134,8 @@ def plan(
         name = name or (out.stem if out else _PLAN)
         made, kept = plans.plan(source, task, location, name=name, out=out, rate=rate, announce=say)
     say_unchecked(made.checks_itself)
+    if made.tour is not None:
+        click.echo(_tour_text(made.tour))
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
     click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {(kept or made).price or _NO_POWER}")
 
@@ -176,7 +187,7 @@ def predict(
     type=Number(0.0, DAY),
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
-@click.option("--out", type=FILE, help="CSV or Parquet file to write.")
+@click.option("--out", type=FILE, help=_OUT)
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
 def optimise(robot: str, run: str, out: Path | None, location: Location, name: str | None, **asked: Any) -> None:
@@ -185,7 +196,9 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
-    torque. The motion is kept as a planned run, and the robot's report says what it saves.
+    torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, closed brakes, or off:
+    states that the robot's logs show. A year is as long as plant.toml says. The motion is kept as a planned run, and
+    the robot's report says what it saves.
 
     \b
     Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
@@ -195,11 +208,12 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     found, kept = plans.optimise(robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked)
     for line in _curve_lines(found):
         click.echo(line)
-    click.echo(f"{_where(out, kept)}: {_cycle_text(found.best)} than {run} (95 % interval)")
+    saved = _cycle_text(found.best) + f" than {run}{_year(found, found.best.saved)}"
+    click.echo(f"{_where(out, kept)}: {saved} (95 % interval)")
 
 
 def _curve_lines(found: Timings) -> Iterator[str]:
-    """Yield the energy of each cycle time, and how much longer each move takes in the one that was chosen."""
+    """Yield the energy of each cycle time, what is new in the one that was chosen, and what its pauses could save."""
     for one in found.curve:
         yield _cycle_text(one)
     programme = found.programme
@@ -207,6 +221,26 @@ def _curve_lines(found: Timings) -> Iterator[str]:
     for section, factor in zip(programme.sections, found.best.factors, strict=True):
         if section.kind == "move":
             yield f"move from {time[section.first]:.2f} to {time[section.last]:.2f} s: {factor:.2f} times as long"
+    for proposal in found.proposals:
+        end = proposal.begin + proposal.seconds
+        back = "how long coming back takes is in no log" if proposal.takes is None else f"it takes {proposal.takes:g} s"
+        year = _year(found, proposal.saved)
+        yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
+    if not found.shows_off:
+        yield "no log shows the robot off: what switching it off saves is not known"
+
+
+def _year(found: Timings, saved: Figure) -> str:
+    """Say what a saving of each cycle, J, comes to in a year, where `plant.toml` says how many hours that has."""
+    if found.hours is None or saved.value <= 0:
+        return ""
+    return f" ({saved.times(found.hours / found.best.seconds / 1000)} kWh in {found.hours:g} h a year)"
+
+
+def _tour_text(tour: Tour) -> str:
+    saved = "" if tour.saved is None else f"{tour.saved} J and "
+    order = ", ".join(map(str, tour.order))
+    return f"order of --via: {order}; saves {saved}{tour.sooner:.3f} s against the order given (95 % interval)"
 
 
 def _cycle_text(cycle: Cycle) -> str:

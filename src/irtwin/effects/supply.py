@@ -9,7 +9,7 @@ import numpy as np
 
 from irtwin.effects.effect import Coefficients, Effect, JointEffect, Predicted, Quantity, Term, quantity
 from irtwin.robot.description import Joint, Robot
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import Motion, moves
 
 _MOVING = 1e-2  # rad/s
 
@@ -153,7 +153,7 @@ class HoldingBrakes(Effect):
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return delays after which brakes close."""
-        return self.variants(delay=(0.0, 0.2, 0.5, 1.0, 2.0, 5.0))
+        return self.variants(delay=(0.0, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0, 5.0))
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return Pb."""
@@ -161,6 +161,6 @@ class HoldingBrakes(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, 1) whether the brakes are released."""
-        moving = np.any(np.abs(motion.dq) > _MOVING, axis=1)
+        moving = moves(motion, np.any(np.abs(motion.dq) > _MOVING, axis=1))
         last = np.maximum.accumulate(np.where(moving, motion.time, -np.inf))
         return (motion.time - last <= self.delay).astype(float)[:, None]

@@ -1,7 +1,8 @@
-"""The condition number of the scaled base regressor of a motion, and which way it falls."""
+"""How well a motion's base regressor tells the base parameters, by one of three criteria, and which way that rises."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,12 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.robot.body_regressor import body_regressor, regressor_slope
 from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
 
+Criterion = Callable[[np.ndarray], tuple[float, np.ndarray]]
+"""From a base regressor (N n, p) to a cost and its slope over each number, the same shape."""
+
+_ALL = 0.05  # share of what all parameters count beside an energy: what it does not ask for is still told
 _SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
 
 
@@ -28,12 +34,14 @@ class BaseRegressor:
     """The columns of the effects that torque shows on every robot, and of these the base columns.
 
     Rows and columns are those of `effects.stack`, here with their derivatives: 10 n of the rigid bodies, then n each.
+    criterion: what a motion is to be good for; None: the condition number. tasks: motions whose energy is to be told.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, criterion: Criterion | None = None, tasks: Sequence[Motion] = ()) -> None:
         self._model = robot.model
         self._n = len(robot.joints)
         self.columns = base_parameters(Stack(robot, EXCITED)).independent
+        self._criterion = energy_variance([self.energy_slope(task) for task in tasks]) if tasks else criterion
 
     def matrix(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the base regressor W of a motion, (N n, p): joint torque = W times base parameters."""
@@ -45,8 +53,20 @@ class BaseRegressor:
         length = np.linalg.norm(matrix, axis=0)
         return float(np.linalg.cond(matrix / length)) if length.all() else np.inf
 
+    def energy_slope(self, motion: Motion) -> np.ndarray:
+        """Return the slope of a motion's mechanical energy, J, over each base parameter, (p,)."""
+        work = np.gradient(motion.time)[:, None] * motion.dq
+        return np.asarray(work.ravel() @ self.matrix(motion.q, motion.dq, motion.ddq))
+
+    def rank(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> float:
+        """Return how bad a motion is by the criterion, of the regressor as it is: less is better."""
+        if self._criterion is None:
+            return self.condition_number(q, dq, ddq)
+        return self._criterion(self.matrix(q, dq, ddq))[0]
+
     def cost(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, slow: np.ndarray) -> tuple[float, MotionGradient]:
-        """Return a smooth cost and its gradient: log condition number of the scaled W less the mean log column length.
+        """Return a smooth cost and its gradient: the criterion's; of None the log condition number of the scaled W less
+        the mean log column length.
 
         The condition number alone is blind to size: a joint that creeps has columns as fine as one that swings. The
         column lengths are what D-optimality adds to it. `slow`: (n,) rad/s, where the sign of speed is rounded.
@@ -54,7 +74,7 @@ class BaseRegressor:
         n, samples = self._n, len(q)
         sign = np.tanh(dq / slow)
         everything = self._all(q, dq, ddq, sign)
-        value, slope = _smooth_cost(everything[:, self.columns])
+        value, slope = (self._criterion or _smooth_cost)(everything[:, self.columns])
         weight = np.zeros_like(everything)
         weight[:, self.columns] = slope
         weight = weight.reshape(samples, n, -1)
@@ -67,6 +87,39 @@ class BaseRegressor:
         each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]
         stack = np.concatenate([body_regressor(self._model, q, dq, ddq), *each_joint], axis=2)
         return stack.reshape(-1, stack.shape[2])
+
+
+def determinant(matrix: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the mean log standard deviation of base parameters in units of noise, and its slope: D-optimality."""
+    covariance = _covariance(matrix)
+    value = np.linalg.slogdet(covariance)[1] / (2 * len(covariance))
+    return float(value), -matrix @ covariance / len(covariance)
+
+
+def energy_variance(slopes: Sequence[np.ndarray]) -> Criterion:
+    """Return the criterion of the log deviation of energies whose slopes over the base parameters these are, (p,) each.
+
+    A small share of `determinant` beside it keeps what these energies do not ask for.
+    """
+    asked = np.transpose(slopes) @ np.array(slopes)
+
+    def criterion(matrix: np.ndarray) -> tuple[float, np.ndarray]:
+        covariance = _covariance(matrix)
+        variance = float(np.sum(covariance * asked))
+        whole, slope = determinant(matrix)
+        value = 0.5 * np.log(variance) + _ALL * whole
+        return float(value), -matrix @ covariance @ asked @ covariance / variance + _ALL * slope
+
+    return criterion
+
+
+def _covariance(matrix: np.ndarray) -> np.ndarray:
+    """Return the (p, p) covariance of base parameters by equations of unit noise; columns are scaled on the way."""
+    length = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
+    scaled = matrix / length
+    eigenvalues, vectors = np.linalg.eigh(scaled.T @ scaled)
+    eigenvalues = np.maximum(eigenvalues, np.finfo(float).eps * eigenvalues[-1])
+    return np.asarray((vectors / eigenvalues) @ vectors.T / np.outer(length, length))
 
 
 def _diagonals(values: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -12,13 +12,14 @@ import numpy as np
 import scipy
 
 from irtwin.errors import InputError
-from irtwin.identification.base_condition import BaseRegressor
+from irtwin.identification.base_condition import BaseRegressor, Criterion
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
 from irtwin.identification.motion_limits import Box, JointLimits, Workspace
 from irtwin.identification.own_body import OwnBody
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals, csv_text
+from irtwin.signals.motion import Motion
 
 Progress = Callable[[int, float, float], None]
 """Called with the iteration, the best condition number so far and the seconds since the start."""
@@ -107,12 +108,15 @@ def excite(
     rate: float = 100.0,
     seed: int = 0,
     box: Box | None = None,
+    criterion: Criterion | None = None,
+    tasks: Sequence[Motion] = (),
     iterations: int = 200,
     time_limit: float = math.inf,
     progress: Progress | None = None,
 ) -> Excitation:
     """Search a motion of `seconds` whose scaled base regressor has the least condition number (Yan 2018, eq. 4).
 
+    criterion: what else is to be least, as `base_condition.determinant`; with `tasks`, the variance of their energy.
     The limits of the joints, the floor and the `box` are kept at every instant; the robot's collision shapes keep off
     one another, and the torque by the URDF's bodies within its limits. Equal seeds give equal motions, other
     seeds other ones, unless `time_limit` (s) ends the search before its `iterations`. Its most work, for robots of many
@@ -129,7 +133,7 @@ def excite(
             f"{seconds:g} s at {rate:g} Hz are {seconds * rate:.0f} samples of {len(robot.joints)} joints; ask for at "
             f"most {most}: less time, or a lower rate"
         )
-    search = _Search(robot, seconds, box, np.random.default_rng(seed))
+    search = _Search(robot, seconds, box, np.random.default_rng(seed), criterion, tasks)
     began = monotonic()
     interrupted = False
     try:
@@ -153,12 +157,20 @@ class _MostWork(Exception):
 class _Search:
     """Interior-point search over the coefficients x: (2 K - 1, n); `best` is always a motion that keeps all limits."""
 
-    def __init__(self, robot: Robot, seconds: float, box: Box | None, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        seconds: float,
+        box: Box | None,
+        random: np.random.Generator,
+        criterion: Criterion | None,
+        tasks: Sequence[Motion],
+    ) -> None:
         self._robot = robot
         self._limits = JointLimits.of(robot)
         self._workspace = Workspace(robot, self._limits, box)
         self._body = OwnBody(robot)
-        self._regressor = BaseRegressor(robot)
+        self._regressor = BaseRegressor(robot, criterion, tasks)
         self._random = random
         self._rest = _rest_of(seconds)
         factor = between_samples(self._rest.harmonics, len(self._rest.grid))
@@ -169,6 +181,7 @@ class _Search:
         self.bounded = False
         self._better: list[FourierSeries] = []  # than all before, the best last
         self.best_condition = math.inf
+        self._best_rank = math.inf
 
     @property
     def best(self) -> FourierSeries | None:
@@ -233,14 +246,15 @@ class _Search:
         return position @ x, speed @ x, acceleration @ x
 
     def _consider(self, x: np.ndarray) -> float:
-        """Return the condition number of the motion, and keep it if it is the best and proven to keep the limits."""
-        condition = self._regressor.condition_number(*self._motion(x))
-        if self.best is None or condition < self.best_condition:
+        """Return how bad the motion is, and keep it if it is the best and proven to keep the limits."""
+        rank = self._regressor.rank(*self._motion(x))
+        if self.best is None or rank < self._best_rank:
             series = self._rest.series(x)
             if self._keeps(series):
                 self._better.append(series)
-                self.best_condition = condition
-        return condition
+                self._best_rank = rank
+                self.best_condition = self._regressor.condition_number(*self._motion(x))
+        return rank
 
     def _keeps(self, series: FourierSeries) -> bool:
         inside = self._limits.margin(series) > 0 and self._workspace.least_clearance(series) > 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -21,14 +22,16 @@ _FEWEST, _MOST = 4, 12  # groups: fewer tell no scatter, more take time
 
 @dataclass(frozen=True)
 class Remainder:
-    """What effects leave of power, W, one standard deviation: of a sample, and of the mean over some `seconds`.
+    """What effects leave of power, W, one standard deviation: of a sample, of the mean over `seconds`, of a pause.
 
-    Both are grown so that `NORMAL` of them are half a 95 % interval.
+    At each pose dry friction holds a share of the load of its own, so a pause is off by as much whenever it stands
+    there. Mean and pause are grown so that `NORMAL` of them are half a 95 % interval.
     """
 
     sample: float
     mean: float
     seconds: float
+    pause: float = 0.0
 
     def energy(self, seconds: float) -> float:
         """Return what is left of the energy of a motion, J: it lasts a whole motion, and is noise in a shorter one."""
@@ -57,8 +60,24 @@ def remainder(blocks: Sequence[Block], terms: Sequence[Term], known: np.ndarray 
         squares += float(left @ left) / rows
         seconds += sum(block.stop - block.start for block in group)
     count = len(groups)
-    grown = float(scipy.special.stdtrit(count - 1, (1 + LEVEL) / 2)) / NORMAL
-    return Remainder((squares / count) ** 0.5, grown * max(float(np.mean(more)), 0.0) ** 0.5, seconds / count)
+    return Remainder((squares / count) ** 0.5, _grown(more, np.ones(count)), seconds / count)
+
+
+def of_pauses(left: Sequence[np.ndarray]) -> float:
+    """Return what is left of the mean power of a pause, W, by what is left of each one's samples, W.
+
+    What counts is the energy of a pause, so long ones do. Zero where there are too few to tell.
+    """
+    if len(left) < _FEWEST:
+        return 0.0
+    rows = np.array([len(one) for one in left])
+    return _grown([one.mean() ** 2 - one.var() / len(one) for one in left], rows**2)
+
+
+def _grown(squares: Sequence[float], weights: np.ndarray) -> float:
+    """Return the root of a mean of squares, grown so that `NORMAL` of it are half a 95 % interval."""
+    grown = float(scipy.special.stdtrit(len(squares) - 1, (1 + LEVEL) / 2)) / NORMAL
+    return grown * math.sqrt(max(float(np.average(squares, weights=weights)), 0.0))
 
 
 def _groups(blocks: Sequence[Block]) -> list[list[Block]]:

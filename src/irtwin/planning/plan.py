@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -12,13 +14,14 @@ from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.planning.energy_optimal import Movement, Power, cheapest, keeps
+from irtwin.planning.order import best_order
 from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
 from irtwin.planning.poses import Pose, joints_for
 from irtwin.planning.timing import MotionLimits, Timed, Torque, fastest, rounded, through
 from irtwin.robot.collision import CollisionModel, Obstacle
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
-from irtwin.twin.price import Price, price
+from irtwin.twin.price import Figure, Price, price, saving
 from irtwin.twin.twin import Parameter, Twin
 
 KEEP_OFF = 0.01  # m: what a path keeps between two bodies, where start and goal do
@@ -28,7 +31,7 @@ _MOST = 1_000_000  # samples
 
 @dataclass(frozen=True)
 class Task:
-    """What a motion is to do: start and goal, boxes about it, and what counts.
+    """What a motion is to do: start and goal, poses to stand at between them in any order, boxes about it, what counts.
 
     line: the flange goes straight. least_energy: in `seconds`, or in the time of the fastest, the motion that costs
     least; else the fastest, slowed evenly to `seconds`. search: how long a path may be sought, s. Payload in kg and m
@@ -44,6 +47,7 @@ class Task:
     search: float = LONGEST_SEARCH
     payload_mass: float = 0.0
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    via: Sequence[np.ndarray | Pose] = ()
 
 
 @dataclass(frozen=True)
@@ -51,15 +55,17 @@ class Plan:
     """A planned motion, its price (None where the twin knows nothing of power) and its least clearance, m.
 
     unchecked: links with mass but without collision shapes. fastest: how long the fastest motion on the path takes, s.
+    tour: the order in which poses are visited, None where there are none between start and goal.
     """
 
-    joint_names: tuple[str, ...]
+    robot: Robot
     motion: Motion
     price: Price | None
     clearance: float
     checks_itself: bool
     unchecked: tuple[str, ...]
     fastest: float
+    tour: Tour | None = None
 
     @property
     def seconds(self) -> float:
@@ -67,8 +73,22 @@ class Plan:
         return float(self.motion.time[-1])
 
 
+@dataclass(frozen=True)
+class Tour:
+    """The order of the poses between start and goal, from 1 on, and what it saves against the order that was given.
+
+    saved: J, None where the twin knows nothing of power; sooner: s.
+    """
+
+    order: tuple[int, ...]
+    saved: Figure | None
+    sooner: float
+
+
 def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
     """Plan a motion of the twin's robot, sampled evenly at (nearly) `rate`, Hz.
+
+    Poses between start and goal are visited in the order that takes least time, or energy, by the fastest moves.
 
     Raises InputError where start or goal is out of reach, outside the limits or in collision, where there is no way or
     not enough time or torque, or where energy is to be least and the twin knows nothing of power.
@@ -77,6 +97,8 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
         raise InputError("least energy needs a twin that has seen power; name one that `irtwin diagnose` saved")
     if task.seconds is not None and not 0 < task.seconds <= _LONGEST:
         raise InputError(f"a motion cannot be planned to last {task.seconds:g} s; give up to {_LONGEST:g} s")
+    if task.via:
+        return _toured(twin, task, rate)
     limits = MotionLimits.of(twin.robot)
     collisions = CollisionModel(twin.robot, task.obstacles)
     quickest = _fastest(twin, task, limits, collisions)
@@ -100,13 +122,55 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
     if meeting is not None:
         raise InputError(f"between samples of {rate:g} Hz {meeting}; ask for a higher rate")
     return Plan(
-        joint_names=twin.robot.joint_names,
+        robot=twin.robot,
         motion=motion,
         price=price(twin, [motion]),
         clearance=clearance,
         checks_itself=collisions.checks_itself,
         unchecked=collisions.unchecked,
         fastest=quickest.seconds,
+    )
+
+
+def _toured(twin: Twin, task: Task, rate: float) -> Plan:
+    if task.seconds is not None:
+        raise InputError("a duration is that of one move; give none, and time the whole by `irtwin optimise`")
+    collisions = CollisionModel(twin.robot, task.obstacles)
+    poses: list[np.ndarray] = []
+    for number, target in enumerate((task.start, *task.via, task.goal)):
+        poses.append(joints_for(twin.robot, target, collisions, poses[-1] if poses else None, f"pose {number}"))
+
+    @cache
+    def leg(start: int, goal: int, least_energy: bool) -> Plan:
+        return plan(twin, replace(task, start=poses[start], goal=poses[goal], via=(), least_energy=least_energy), rate)
+
+    last = len(poses) - 1
+    cost = np.full((last + 1, last + 1), np.inf)
+    for start, goal in permutations(range(last + 1), 2):
+        if goal != 0 and start != last:
+            quick = leg(start, goal, False)
+            cost[start, goal] = twin.energy(quick.motion) if task.least_energy else quick.seconds
+    order, given = best_order(cost), list(range(last + 1))
+    made, was = (_joined([leg(*ends, task.least_energy) for ends in pairwise(one)], rate) for one in (order, given))
+    saved = saving(twin, made.motion, was.motion) if twin.knows_power else None
+    tour = Tour(tuple(order[1:-1]), saved, was.seconds - made.seconds)
+    return replace(made, price=price(twin, [made.motion]), tour=tour)
+
+
+def _joined(legs: Sequence[Plan], rate: float) -> Plan:
+    """Return plans one after another as one, without its price."""
+    ends = np.cumsum([0.0, *(leg.seconds for leg in legs)])
+    time = np.linspace(0.0, ends[-1], max(20, round(ends[-1] * rate)) + 1)
+    own = np.concatenate([leg.motion.time + begin for leg, begin in zip(legs, ends, strict=False)])
+    q, dq, ddq = (
+        np.column_stack([np.interp(time, own, column) for column in np.concatenate(values).T])
+        for values in zip(*((leg.motion.q, leg.motion.dq, leg.motion.ddq) for leg in legs), strict=True)
+    )
+    return replace(
+        legs[0],
+        motion=replace(legs[0].motion, time=time, q=q, dq=dq, ddq=ddq),
+        clearance=min(leg.clearance for leg in legs),
+        fastest=sum(leg.fastest for leg in legs),
     )
 
 

@@ -9,9 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from irtwin.errors import InputError
-from irtwin.signals.motion import Motion, standstill
-
-_BRIEF = 0.05  # s: where all joints turn at once they stand that long, and do not pause
+from irtwin.signals.motion import BRIEF, Motion, standstill
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,13 @@ class Programme:
         motion = self.motion.part(section.first, section.last + 1)
         return Programme(motion, (Section(0, len(motion.time) - 1, section.kind),)).retimed(np.array([factor]))
 
+    def timed(self, factors: np.ndarray) -> Programme:
+        """Return the programme with each section (S,) times as long; what takes no time is left out."""
+        motion = self.retimed(factors)
+        bounds = np.round(np.append(0.0, np.cumsum(self.seconds * factors)) * motion.rate).astype(int).tolist()
+        ends = zip(self.sections, pairwise(bounds), strict=True)
+        return Programme(motion, tuple(Section(*own, section.kind) for section, own in ends if own[1] > own[0]))
+
     def retimed(self, factors: np.ndarray) -> Motion:
         """Return the motion with each section (S,) times as long, at the log's rate; by a factor of zero left out."""
         old = self.motion.time[[self.sections[0].first, *(section.last for section in self.sections)]]
@@ -72,7 +77,7 @@ def programme_of(motion: Motion, place: str) -> Programme:
     still = standstill(motion)
     bounds = _bounds(still)
     for first, last in pairwise(bounds[1:-1]):
-        if still[first] and motion.time[last] - motion.time[first] < _BRIEF:
+        if still[first] and motion.time[last] - motion.time[first] < BRIEF:
             still[first:last] = False
     bounds = _bounds(still)
     kinds = ["pause" if still[first] else "move" for first in bounds[:-1]]

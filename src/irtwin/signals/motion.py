@@ -11,6 +11,8 @@ from irtwin.signals.channels import Signals
 
 # A joint stands still below this share of its fastest speed in the run, or below a speed that no task needs.
 STILL_SHARE, STILL_SPEED = 0.005, 1e-3  # -, rad/s
+_SLIP = 0.15  # s: no move is shorter
+BRIEF = 0.05  # s: where all joints turn at once they stand that long, and do not pause
 
 
 @dataclass(frozen=True)
@@ -51,4 +53,24 @@ class Motion(Signals):
 def standstill(motion: Motion) -> np.ndarray:
     """Return where no joint moves, (N,) bool."""
     speed = np.abs(motion.dq)
-    return np.asarray((speed < np.maximum(STILL_SPEED, STILL_SHARE * speed.max(axis=0))).all(axis=1))
+    return ~moves(motion, (speed >= np.maximum(STILL_SPEED, STILL_SHARE * speed.max(axis=0))).any(axis=1))
+
+
+def moves(motion: Motion, fast: np.ndarray) -> np.ndarray:
+    """Return where joints are `fast` (N,) for a while, (N,) bool: one that slips as it comes to rest does not move."""
+    lasting = fast.copy()
+    for own in stretches(fast):
+        lasting[own] = own.stop - own.start >= _SLIP * motion.rate
+    return lasting
+
+
+def pauses(motion: Motion) -> Iterator[Motion]:
+    """Yield the parts of a motion in which no joint moves, but for brief ones."""
+    least = max(3, round(BRIEF * motion.rate))
+    return (motion.part(own.start, own.stop) for own in stretches(standstill(motion)) if own.stop - own.start >= least)
+
+
+def stretches(where: np.ndarray) -> Iterator[slice]:
+    """Yield the stretches of samples at which `where` (N,) is true, in order."""
+    edges = np.flatnonzero(np.diff(where.astype(int), prepend=0, append=0)).tolist()
+    return map(slice, edges[::2], edges[1::2])

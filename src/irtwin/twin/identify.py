@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -26,12 +27,12 @@ from irtwin.identification.fits import (
     real_terms,
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
-from irtwin.identification.remainder import Remainder, remainder
+from irtwin.identification.remainder import Remainder, of_pauses, remainder
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.identification.uncertainty import half_widths, normal_covariance
 from irtwin.robot.description import Robot
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import Motion, pauses
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 Found = tuple[Terms, Estimate]
@@ -96,7 +97,7 @@ def identify(
     if constants:
         found.append((constants.terms, constants.estimate))
     parameters = [parameter for terms, result in found for parameter in _parameters(stack, terms, result, remaining)]
-    return Twin(
+    twin = Twin(
         robot=robot,
         effects=stack.effects,
         parameters=tuple(parameters),
@@ -110,6 +111,15 @@ def identify(
         remainder=remaining,
         body_change=change,
     )
+    return replace(twin, remainder=_with_pauses(twin, with_power))
+
+
+def _with_pauses(twin: Twin, motions: Sequence[Motion]) -> Remainder | None:
+    """Return the twin's remainder, with what its effects leave of the power of pauses."""
+    if twin.remainder is None:
+        return None
+    left = [part.power - twin.power(part) for motion in motions if motion.power is not None for part in pauses(motion)]
+    return replace(twin.remainder, pause=of_pauses(left))
 
 
 def _remainder(stack: Stack, blocks: Sequence[Block], terms: Terms) -> Remainder | None:

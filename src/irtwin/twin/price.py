@@ -9,12 +9,12 @@ import numpy as np
 
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.power_line import power_slope
-from irtwin.identification.validation import energy
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import Motion, standstill, stretches
 from irtwin.twin.twin import Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
 _WATT_HOUR = 3600.0  # J
+_SAME_POSE = 0.1  # rad (m)
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,10 @@ class Figure:
 
     value: float
     half_width: float | None
+
+    def times(self, factor: float) -> Figure:
+        """Return the figure times a factor, above 0."""
+        return Figure(self.value * factor, None if self.half_width is None else self.half_width * factor)
 
     def __str__(self) -> str:
         by = "" if self.half_width is None else f" +- {float(f'{self.half_width:.2g}'):g}"
@@ -42,7 +46,7 @@ class Price:
     mean: Figure
 
     def __str__(self) -> str:
-        hours = Figure(self.energy.value / _WATT_HOUR, _scaled(self.energy.half_width, 1 / _WATT_HOUR))
+        hours = self.energy.times(1 / _WATT_HOUR)
         parts = (
             f"energy {self.energy} J ({hours} Wh)",
             f"peak power {self.peak} W",
@@ -64,67 +68,79 @@ def cost(twin: Twin, motions: Sequence[Motion]) -> Price:
     """Return what `price` does; of a twin that knows nothing of power, what its joints take together."""
     powers = [twin.power(motion) for motion in motions]
     seconds = sum(map(_seconds, motions))
-    total = sum(energy(motion.time, power) for motion, power in zip(motions, powers, strict=True))
     highest = int(np.argmax([power.max() for power in powers]))
     most = int(np.argmax(powers[highest]))
-    widths: tuple[float | None, float | None] = (None, None)
+    taken = balance(twin, *((motion, trapezoid(motion.time)) for motion in motions))
+    width = None
     if twin.covariance is not None:
-        slope = sum(
-            (_slope(twin, motion, trapezoid(motion.time)) for motion in motions), np.zeros(len(twin.parameters))
-        )
         at_peak = np.zeros(len(powers[highest]))
         at_peak[most] = 1.0
-        at_peak = _slope(twin, motions[highest], at_peak)
-        left = twin.remainder
-        widths = (
-            _half_width(twin, slope, *(left.energy(_seconds(motion)) for motion in motions if left)),
-            _half_width(twin, at_peak, *([left.sample] if left else [])),
-        )
-    mean = Figure(total / seconds, _scaled(widths[0], 1 / seconds))
-    return Price(seconds, Figure(total, widths[0]), Figure(float(powers[highest][most]), widths[1]), mean)
+        slope = _slope(twin, motions[highest], at_peak)
+        width = _half_width(twin, slope, twin.remainder.sample if twin.remainder else 0.0)
+    return Price(seconds, taken, Figure(float(powers[highest][most]), width), taken.times(1 / seconds))
+
+
+def balance(twin: Twin, *parts: tuple[Motion, np.ndarray]) -> Figure:
+    """Return the energy, J, of motions by the weights of their samples, (N,) s each; of negative ones it is taken off.
+
+    What is unsure in all alike, as the standby power, drops out; what effects leave of each motion does not.
+    """
+    value = sum(float(weights @ twin.power(motion)) for motion, weights in parts)
+    if twin.covariance is None:
+        return Figure(value, None)
+    slope = sum((_slope(twin, motion, weights) for motion, weights in parts), np.zeros(len(twin.parameters)))
+    return Figure(value, _half_width(twin, slope, *_left(twin, parts)))
 
 
 def mean_power(twin: Twin, motion: Motion, where: np.ndarray) -> Figure:
     """Return the mean power over those samples of a motion `where` (N,) is true, W; some are."""
     weights = np.where(where, trapezoid(motion.time), 0.0)
-    seconds = float(weights.sum())
-    value = float(weights @ twin.power(motion)) / seconds
-    if twin.covariance is None:
-        return Figure(value, None)
-    left = [twin.remainder.energy(seconds) / seconds] if twin.remainder else []
-    return Figure(value, _half_width(twin, _slope(twin, motion, weights) / seconds, *left))
+    return balance(twin, (motion, weights)).times(1 / float(weights.sum()))
 
 
 def saving(twin: Twin, motion: Motion, was: Motion) -> Figure:
     """Return the electrical energy, J, that a motion saves in place of one that was; negative if it costs.
 
-    Where it lasts longer, standing still after the one that was is counted too. The interval is that of the difference:
-    what is unsure in both alike, as the standby power, drops out. What effects leave of power does not.
+    Where it lasts longer, the one that was stands longer where it stood last.
     """
-    instead = _with_standing(was, _seconds(motion))
-    saved = twin.energy(instead) - twin.energy(motion)
-    if twin.covariance is None:
-        return Figure(saved, None)
-    slope = _slope(twin, instead, trapezoid(instead.time)) - _slope(twin, motion, trapezoid(motion.time))
-    left = [twin.remainder.energy(_seconds(one)) for one in (motion, instead) if twin.remainder]
-    return Figure(saved, _half_width(twin, slope, *left))
+    instead = with_standing(was, _seconds(motion))
+    return balance(twin, (instead, trapezoid(instead.time)), (motion, -trapezoid(motion.time)))
 
 
-def _with_standing(motion: Motion, seconds: float) -> Motion:
-    """Return a motion, and standing still where it ends until so many seconds after it began."""
+def with_standing(motion: Motion, seconds: float) -> Motion:
+    """Return a motion that lasts so many seconds, if it is shorter: it stands longer where it stood last."""
     more = round((seconds - _seconds(motion)) * motion.rate)
     if more < 1:
         return motion
-    rest = np.zeros((more, motion.q.shape[1]))
+    count = len(motion.time)
+    last = max(np.flatnonzero(standstill(motion)), default=count - 1)
+    rows = np.insert(np.arange(count), last, np.full(more, last))
+    moves = np.insert(np.ones(count), last, np.zeros(more))[:, None]
     return Motion(
-        np.append(motion.time, motion.time[-1] + np.arange(1, more + 1) / motion.rate),
-        np.vstack([motion.q, rest + motion.q[-1]]),
-        np.vstack([motion.dq, rest]),
-        np.vstack([motion.ddq, rest]),
+        motion.time[0] + np.arange(count + more) / motion.rate,
+        motion.q[rows],
+        motion.dq[rows] * moves,
+        motion.ddq[rows] * moves,
         run=motion.run,
         payload_mass=motion.payload_mass,
         payload_com=motion.payload_com,
     )
+
+
+def _left(twin: Twin, parts: Sequence[tuple[Motion, np.ndarray]]) -> list[float]:
+    """Return what effects leave of a balance, J, one standard deviation each: of motions, and of poses of their pauses.
+
+    What is left at a pose is the same in each motion, so what stands there as long in both drops out.
+    """
+    if twin.remainder is None:
+        return []
+    standing: dict[tuple[int, ...], float] = {}
+    for motion, weights in parts:
+        for own in stretches(standstill(motion)):
+            pose = tuple(np.round(motion.q[own].mean(axis=0) / _SAME_POSE).astype(int).tolist())
+            standing[pose] = standing.get(pose, 0.0) + float(weights[own].sum())
+    lasting = (twin.remainder.energy(float(np.abs(weights).sum())) for _, weights in parts)
+    return [*lasting, *(twin.remainder.pause * seconds for seconds in standing.values())]
 
 
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
@@ -166,7 +182,3 @@ def trapezoid(time: np.ndarray) -> np.ndarray:
     """Return the weights of the trapezoidal rule, (N,) s."""
     steps = np.diff(time)
     return np.asarray((np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / 2)
-
-
-def _scaled(width: float | None, factor: float) -> float | None:
-    return None if width is None else width * factor
