@@ -182,4 +182,4 @@ def lost_files(place: Workspace) -> list[str]:
         except InputError:  # a path that leads outside
             pass
         lost.append(f"{file.path} of {file.robot_id} is missing or altered")
-    return lost
+    return list(dict.fromkeys(lost))  # two runs of one content are one file
