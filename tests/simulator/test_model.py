@@ -48,3 +48,18 @@ def test_a_model_of_other_joints_is_refused(tmp_path):
     file = mujoco_models.write(tmp_path / "arm.xml", arm(3))
     with pytest.raises(InputError, match=r"has no joint joint_4; its joints are joint_1, joint_2, joint_3: give"):
         read_model(file, ROBOT)
+
+
+def test_a_urdf_is_a_model_without_its_pictures(tmp_path):
+    text = ROBOT.urdf
+    picture = '<visual><geometry><mesh filename="package://arm/none.stl"/></geometry></visual></link>'
+    rubs = '<joint name="joint_2" type="revolute"><dynamics damping="2.5" friction="1.5"/>'
+    text = text.replace("</link>", picture).replace('<joint name="joint_2" type="revolute">', rubs)
+    file = tmp_path / "arm.urdf"
+    file.write_text(text)
+    model = read_model(file, ROBOT)
+    assert model.numbers("joint_2") == {"damping": 2.5, "frictionloss": 1.5}
+    motion = swing(ROBOT, 1, seconds=2.0)
+    expected = rigid_torque(ROBOT, motion)
+    expected[:, 1] += 2.5 * motion.dq[:, 1] + 1.5 * np.sign(motion.dq[:, 1])
+    np.testing.assert_allclose(model.torque(motion.q, motion.dq, motion.ddq), expected, atol=1e-4)

@@ -138,7 +138,7 @@ def demo(location: Location, no_open: bool, case_study: bool, **asked: Any) -> N
     "--simulator",
     metavar="MODEL.xml",
     type=FILE,
-    help="Model of the robot in MuJoCo, to hold the data against: what differs is said. Logs with commands are "
+    help="Model of the robot, MJCF or URDF, to hold the data against: what differs is said. Logs with commands are "
     "played through it where it has servos. Needs irtwin[mujoco].",
 )
 @click.option(

@@ -168,14 +168,13 @@ def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | 
 
 
 def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
-    """Return a cause with the simulator's numbers beside the robot's; a number below zero is zero in both."""
+    """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both."""
 
     def told(one: document.Parameter) -> document.Parameter:
-        name = catalogue()[cause.effect].in_mjcf.get(one.name)
-        if name is None or one.joint is None or cause.scope != CHANGED:
+        if one.joint is None or cause.scope != CHANGED:
             return one
-        own = simulator.numbers(one.joint)[name]
-        return replace(one, simulator=own, robot=max(0.0, own + one.value))
+        own = simulator.numbers(one.joint).get(catalogue()[cause.effect].in_mjcf.get(one.name, ""))
+        return one if own is None else replace(one, simulator=own, robot=max(0.0, own + one.value))
 
     return replace(cause, parameters=tuple(map(told, cause.parameters)))
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from irtwin.document.document import Cause, Document
 from irtwin.effects.catalogue import catalogue
-from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Model
+from irtwin.simulator.model_file import Tag
 from irtwin.twin.twin import Twin
 
 Key = tuple[str, str, str]  # effect, joint, name of a parameter
@@ -27,9 +27,9 @@ def written(model: Model, document: Document, off: Mapping[Key, float] | None = 
     """
     changed: dict[Tag, dict[str, float]] = {}
     for (effect, joint, name), robot in _numbers(document).items():
-        tag = model.file.tag(["joint"], "name", joint)
+        tag, attribute = model.file.number(joint, catalogue()[effect].in_mjcf[name])
         number = robot + (off or {}).get((effect, joint, name), 0.0)
-        changed.setdefault(tag, {})[catalogue()[effect].in_mjcf[name]] = max(number, 0.0)
+        changed.setdefault(tag, {})[attribute] = max(number, 0.0)
     return model.file.changed(changed)
 
 

@@ -18,7 +18,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
-from irtwin.simulator.mjcf_file import MjcfFile, read_mjcf
+from irtwin.simulator.model_file import ModelFile, read_model_file
 
 if TYPE_CHECKING:
     import mujoco
@@ -43,7 +43,7 @@ class Model:
     `others` are joints of the model that the robot lacks: a gripper's, a free body's. They stay where they begin.
     """
 
-    file: MjcfFile
+    file: ModelFile
     compiled: mujoco.MjModel
     joints: tuple[str, ...]
     positions: np.ndarray  # (n,) in qpos
@@ -93,9 +93,10 @@ class Model:
         return np.asarray(found + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
     def numbers(self, joint: str) -> Mapping[str, float]:
-        """Return the joint's numbers as the model has them, by what MJCF calls them."""
+        """Return the joint's numbers as the model has them, by what MJCF calls them; those that its file can hold."""
         place = self.speeds[self.joints.index(joint)]
-        return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in NUMBERS}
+        held = [name for name in NUMBERS if self.file.holds(name)]
+        return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in held}
 
 
 def read_model(path: Path, robot: Robot) -> Model:
@@ -104,7 +105,7 @@ def read_model(path: Path, robot: Robot) -> Model:
     Raises InputError where the file is no model, a mesh that gives a body its inertia is missing, or the robot's joints
     are not among the model's.
     """
-    file = read_mjcf(path)
+    file = read_model_file(path)
     compiled, delays = _compiled(file)
     places, others = joints_of(compiled, robot.joint_names, str(path))
     return Model(
@@ -146,7 +147,7 @@ def pair(model: Model) -> Paired:
     return Paired(compiled, np.array(second), np.array([compiled.joint(joint).id for joint in model.joints]))
 
 
-def _compiled(file: MjcfFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray]:
+def _compiled(file: ModelFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray]:
     """Return the compiled model without the delays of its actuators, and these; `paired`: joints with a second one."""
     try:
         import mujoco
@@ -154,7 +155,7 @@ def _compiled(file: MjcfFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjMode
         raise InputError(f"{file.path}: reading a model needs MuJoCo; install irtwin[mujoco]") from error
     try:
         spec = mujoco.MjSpec.from_file(str(file.path))
-        _drop_pictures(spec, mujoco)
+        _drop_pictures(spec, mujoco, file.is_urdf)
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
         for one in spec.actuators:
             one.delay, one.nsample = 0.0, 0
@@ -178,12 +179,15 @@ def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:
     second.forcelimited, second.forcerange = True, (-1.0, 1.0)
 
 
-def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any) -> None:
-    """Take out what a body with an inertia of its own needs for pictures and contacts alone: files may be missing."""
+def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any, is_urdf: bool) -> None:
+    """Take out what a body with an inertia of its own needs for pictures and contacts alone: files may be missing.
+
+    A URDF has all inertia in its <inertial>.
+    """
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         return
-    for body in spec.bodies[1:]:
-        if body.explicitinertial:
+    for body in spec.bodies if is_urdf else spec.bodies[1:]:
+        if is_urdf or body.explicitinertial:
             for geom in list(body.geoms):
                 if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
                     spec.delete(geom)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Flange, Model
+from irtwin.simulator.model_file import Tag
 
 if TYPE_CHECKING:
     import mujoco

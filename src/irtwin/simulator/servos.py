@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 
 from irtwin.errors import InputError
-from irtwin.simulator.mjcf_file import Tag
 from irtwin.simulator.model import Model, Paired, pair
+from irtwin.simulator.model_file import Tag
 from irtwin.simulator.payload import load, loaded_tag
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irtwin.errors import InputError
-from irtwin.simulator.mjcf_file import read_mjcf
+from irtwin.simulator.model_file import read_model_file
 
 TEXT = """<?xml version='1.0'?>
 <!-- an arm; <joint name="lift" damping="7"/> was here -->
@@ -29,11 +29,11 @@ def model(folder, text=TEXT):
 
 def test_a_file_with_nothing_changed_is_the_same_bytes(tmp_path):
     file = model(tmp_path)
-    assert read_mjcf(file).changed({}) == file.read_bytes()
+    assert read_model_file(file).changed({}) == file.read_bytes()
 
 
 def test_changed_numbers_alone_differ(tmp_path):
-    file = read_mjcf(model(tmp_path))
+    file = read_model_file(model(tmp_path))
     pan, lift = (file.tag(["joint"], "name", name) for name in ("pan", "lift"))
     new = {pan: {"damping": 1.25}, lift: {"armature": 0.5}}
     expected = TEXT.replace("damping = '1.0'", "damping = '1.25'").replace('class="x" >', 'class="x" armature="0.5">')
@@ -41,7 +41,7 @@ def test_changed_numbers_alone_differ(tmp_path):
 
 
 def test_an_element_takes_another_name_and_attributes_go(tmp_path):
-    file = read_mjcf(model(tmp_path))
+    file = read_model_file(model(tmp_path))
     changed = file.changed({file.tag(["joint"], "name", "lift"): {"": "freejoint", "class": None, "user": "1 2"}})
     assert changed.decode() == TEXT.replace(
         '<joint name="lift" class="x" ></joint>', '<freejoint name="lift" user="1 2"></freejoint>'
@@ -51,23 +51,23 @@ def test_an_element_takes_another_name_and_attributes_go(tmp_path):
 @given(value=st.floats(0, 1e6))
 def test_numbers_are_read_back_as_they_were(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("model")
-    file = read_mjcf(model(folder))
+    file = read_model_file(model(folder))
     changed = file.changed({file.tag(["joint"], "name", "lift"): {"frictionloss": value}})
-    tags = read_mjcf(model(folder, changed.decode())).tags
+    tags = read_model_file(model(folder, changed.decode())).tags
     (lift,) = [tag for tag in tags if tag.attributes.get("name") == "lift"]
     assert float(lift.attributes["frictionloss"]) == value
 
 
 def test_an_element_of_another_file_is_not_changed(tmp_path):
     with pytest.raises(InputError, match=r'arm\.xml: has no <joint name="elbow"> of its own; give the file'):
-        read_mjcf(model(tmp_path)).tag(["joint"], "name", "elbow")
+        read_model_file(model(tmp_path)).tag(["joint"], "name", "elbow")
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("<mujoco>", r"line 1, column 9: no element found; mend the XML"),
-        ("<robot/>", r"outermost element is <robot>; give a model of MuJoCo"),
+        ("<sdf/>", r"outermost element is <sdf>; give a model of MuJoCo, <mujoco>, or a URDF"),
         ('<!DOCTYPE m [<!ENTITY a "b">]><mujoco/>', r"line 1: declares a document type; remove it"),
         ('<mujoco><include file="../other.xml"/></mujoco>', r'<include file="../other.xml"> is outside the folder'),
         ('<mujoco><asset><mesh file="/etc/passwd"/></asset></mujoco>', r"outside the folder of the model"),
@@ -79,17 +79,42 @@ def test_an_element_of_another_file_is_not_changed(tmp_path):
 )
 def test_what_is_no_model_or_reaches_outside_is_refused(tmp_path, text, said):
     with pytest.raises(InputError, match=said):
-        read_mjcf(model(tmp_path, text))
+        read_model_file(model(tmp_path, text))
 
 
 def test_a_model_in_another_encoding_is_refused(tmp_path):
     file = tmp_path / "arm.xml"
     file.write_bytes("<mujoco/>".encode("utf-16"))
     with pytest.raises(InputError, match=r"arm\.xml, line 1: not UTF-8 text \(byte 1\); save it as UTF-8"):
-        read_mjcf(file)
+        read_model_file(file)
 
 
 def test_included_files_are_looked_at_too(tmp_path):
     (tmp_path / "part.xml").write_text('<mujocoinclude><include file="/etc/hosts"/></mujocoinclude>', encoding="utf-8")
     with pytest.raises(InputError, match=r"part\.xml: <include file=\"/etc/hosts\"> is outside"):
-        read_mjcf(model(tmp_path, '<mujoco><include file="part.xml"/></mujoco>'))
+        read_model_file(model(tmp_path, '<mujoco><include file="part.xml"/></mujoco>'))
+
+
+URDF = """<robot name="arm">
+  <link name="base"/>
+  <joint name="pan" type="revolute"><axis xyz="0 0 1"/><dynamics damping="1.0" friction='2'/></joint>
+  <joint name="lift" type="revolute">
+    <axis xyz="0 1 0"/>
+  </joint>
+</robot>
+"""
+
+
+def test_a_urdf_holds_damping_and_friction_in_dynamics_there_or_yet_to_come(tmp_path):
+    file = read_model_file(model(tmp_path, URDF))
+    assert file.is_urdf and file.holds("damping") and not file.holds("armature")
+    (pan, damping), (lift, friction), (same, _) = (
+        file.number(joint, name) for joint, name in (("pan", "damping"), ("lift", "frictionloss"), ("lift", "damping"))
+    )
+    assert (damping, friction, lift is same) == ("damping", "friction", True)
+    new = file.changed({pan: {damping: 1.5}, lift: {friction: 0.25, "damping": 3.0}}).decode()
+    assert new == URDF.replace('damping="1.0"', 'damping="1.5"').replace(
+        '<joint name="lift" type="revolute">',
+        '<joint name="lift" type="revolute"><dynamics friction="0.25" damping="3.0"/>',
+    )
+    assert file.changed({}) == URDF.encode()

@@ -1,10 +1,11 @@
-"""A model file of MuJoCo (MJCF): read without reaching outside its folder, and changed in single numbers."""
+"""A model's file, MJCF or URDF: read without reaching outside its folder, and changed in single numbers."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from xml.parsers import expat
 
@@ -12,12 +13,13 @@ from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
 
 _MOST = 20_000_000  # bytes
+_IN_URDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
 _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
 
 
 @dataclass(frozen=True, eq=False)
 class Tag:
-    """A start tag: its element, attributes, and the bytes of the file that it takes."""
+    """A start tag: its element, attributes, and the bytes of the file that it takes; none where it is yet to come."""
 
     element: str
     attributes: Mapping[str, str]
@@ -26,7 +28,7 @@ class Tag:
 
 
 @dataclass(frozen=True)
-class MjcfFile:
+class ModelFile:
     """The file's bytes and its start tags, in their order; files that it includes are not among them."""
 
     path: Path
@@ -41,7 +43,7 @@ class MjcfFile:
         """
         content = self.content
         for tag in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
-            text, after = content[tag.start : tag.stop], content[tag.stop :]
+            text, after = content[tag.start : tag.stop] or f"<{tag.element}/>".encode(), content[tag.stop :]
             for attribute, value in changes[tag].items():
                 if attribute:
                     text = _with_attribute(text, attribute, repr(value) if isinstance(value, float) else value)
@@ -64,6 +66,23 @@ class MjcfFile:
             f'{self.path}: has no <{elements[0]} {key}="{value}"> of its own; give the file that defines it'
         )
 
+    @property
+    def is_urdf(self) -> bool:
+        """Whether it is a URDF."""
+        return self.tags[0].element == "robot"
+
+    def holds(self, number: str) -> bool:
+        """Return whether it has a place for a joint's number, by what MJCF calls it."""
+        return not self.is_urdf or number in _IN_URDF
+
+    def number(self, joint: str, number: str) -> tuple[Tag, str]:
+        """Return the tag and the attribute that hold a joint's number."""
+        own = self.tag(["joint"], "name", joint)
+        if not self.is_urdf:
+            return own, number
+        after = self.tags[self.tags.index(own) + 1 :]
+        return next(one for one in after if one.element == "dynamics"), _IN_URDF[number]
+
     def inertial(self, body: str) -> Tag | None:
         """Return the tag of a body's own inertial, None where the file has none: included, or taken from geoms."""
         of = ""
@@ -74,20 +93,31 @@ class MjcfFile:
         return None
 
 
-def read_mjcf(path: Path) -> MjcfFile:
+def read_model_file(path: Path) -> ModelFile:
     """Read a model file, and look at those that it names.
 
     Raises InputError where one is no XML, has entities or more than 20 MB, or names a file outside the folder.
     """
     file = _scanned(path)
     outermost = file.tags[0].element
+    if file.is_urdf:
+        return replace(file, tags=tuple(_with_dynamics(file.tags)))  # files that it names are meshes: nobody loads them
     if outermost != "mujoco":
-        raise InputError(f"{path}: outermost element is <{outermost}>; give a model of MuJoCo, <mujoco>")
+        raise InputError(f"{path}: outermost element is <{outermost}>; give a model of MuJoCo, <mujoco>, or a URDF")
     _check_inside(file, path.parent, {})
     return file
 
 
-def _scanned(path: Path) -> MjcfFile:
+def _with_dynamics(tags: Sequence[Tag]) -> Iterator[Tag]:
+    """Yield the tags of a URDF, with one of <dynamics> that is yet to come in each joint that has none."""
+    for place, tag in enumerate(tags):
+        yield tag
+        inside = takewhile(lambda one: one.element not in ("joint", "link"), tags[place + 1 :])
+        if tag.element == "joint" and not any(one.element == "dynamics" for one in inside):
+            yield Tag("dynamics", {}, tag.stop, tag.stop)
+
+
+def _scanned(path: Path) -> ModelFile:
     content = read_input(path, _MOST)
     as_text(path, content)  # what is changed is sought byte by byte
     tags: list[Tag] = []
@@ -107,7 +137,7 @@ def _scanned(path: Path) -> MjcfFile:
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise InputError(f"{path}, line {error.lineno}, column {error.offset + 1}: {reason}; mend the XML") from error
-    return MjcfFile(path, content, tuple(tags))
+    return ModelFile(path, content, tuple(tags))
 
 
 def _end(content: bytes, start: int) -> int:
@@ -124,7 +154,7 @@ def _end(content: bytes, start: int) -> int:
     raise AssertionError("the parser has seen its end")
 
 
-def _check_inside(file: MjcfFile, folder: Path, seen: dict[Path, None]) -> None:
+def _check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
     """Raise InputError where a file, or one that it includes, names one outside the folder of the model."""
     seen[file.path] = None
     folders: dict[str, str] = {}
@@ -143,7 +173,7 @@ def _check_inside(file: MjcfFile, folder: Path, seen: dict[Path, None]) -> None:
             _check_inside(_scanned(place), folder, seen)
 
 
-def _files(file: MjcfFile) -> Iterator[tuple[str, str]]:
+def _files(file: ModelFile) -> Iterator[tuple[str, str]]:
     for tag in file.tags:
         for key, value in tag.attributes.items():
             if key.startswith("file") and value:
