@@ -120,8 +120,7 @@ def test_a_run_chosen_here_is_told_and_one_chosen_in_the_scene_is_drawn(page: Pa
 @pytest.mark.parametrize("width", [1440, 1024])
 def test_nothing_sticks_out(page: Page, width: int):
     page.set_viewport_size({"width": width, "height": 900})
-    page.wait_for_timeout(300)
-    assert page.evaluate("document.documentElement.scrollWidth") == width
+    page.wait_for_function(f"document.documentElement.scrollWidth == {width}")  # charts take their time to follow
 
 
 def test_on_paper_no_chart_is_wider_than_the_page(page: Page, tmp_path: Path):
