@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 from irtwin.errors import InputError
@@ -36,7 +37,8 @@ def real_path(path: Path) -> Path | None:
     """Return where a path leads; None where its links go round in a circle, a name is too long or has a NUL."""
     try:
         real = path.resolve()
-        real.is_file()
+        with suppress(FileNotFoundError, NotADirectoryError):
+            real.stat()
         return real
     except (OSError, RuntimeError, ValueError):  # Python 3.13 has the former for a circle, those before the latter
         return None
