@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -120,7 +121,10 @@ def test_a_run_chosen_here_is_told_and_one_chosen_in_the_scene_is_drawn(page: Pa
 @pytest.mark.parametrize("width", [1440, 1024])
 def test_nothing_sticks_out(page: Page, width: int):
     page.set_viewport_size({"width": width, "height": 900})
-    page.wait_for_function(f"document.documentElement.scrollWidth == {width}")  # charts take their time to follow
+    until = time.monotonic() + 20.0
+    while (wide := page.evaluate("document.documentElement.scrollWidth")) != width:  # charts take their time to follow
+        assert time.monotonic() < until, f"{wide} pixels"
+        page.wait_for_timeout(100)
 
 
 def test_on_paper_no_chart_is_wider_than_the_page(page: Page, tmp_path: Path):
