@@ -50,9 +50,9 @@ class Choice:
 
     @property
     def torque_left(self) -> np.ndarray:
-        """What is left of each joint's torque but noise that is new in each sample, (n,), as a share of it.
+        """What is left of each joint's torque but noise that is new in each sample, (1, n), as a share of it.
 
-        None, (0, n), where no torque was logged.
+        (0, n) where no torque was logged.
         """
         left, logged = (
             [one[:, 1:] for one in some]
