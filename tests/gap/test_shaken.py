@@ -62,6 +62,17 @@ def test_shaking_adds_as_much_noise_as_there_is() -> None:
     assert again.torque is motion.torque
 
 
+def test_of_a_long_run_the_middle_is_shaken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("irtwin.gap.data.noise_floor._ENOUGH", 100)
+    run = logged(1)
+    motion = condition_for_fit(run, ROBOT, CUTOFF)
+    ((same, again),) = shaken([run, run], {run.name: motion}, ROBOT, DEFAULT.data)
+    first = (len(motion.time) - 100) // 2
+    np.testing.assert_array_equal(same.q, motion.q[first : first + 100])
+    assert again.q.shape == same.q.shape
+    assert same.whole is None  # what depends on the past begins there
+
+
 def test_only_observed_runs_are_shaken() -> None:
     run = replace(logged(1), role="reference")
     assert not shaken([run], {run.name: condition_for_fit(run, ROBOT, CUTOFF)}, ROBOT, DEFAULT.data)

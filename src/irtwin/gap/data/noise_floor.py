@@ -160,18 +160,26 @@ def shaken(
     """Return observed runs' motions, each with the same of positions and speeds to which their noise was added again.
 
     The noise is white, as large as what the filter takes away says; runs that were smoothed before they were logged
-    tell none. So many runs as make `_ENOUGH` samples, if there are.
+    tell none. So many runs as make `_ENOUGH` samples, if there are; the middle of one that has more.
     """
     random = np.random.default_rng(0)
     found: list[tuple[Motion, Motion]] = []
+    missing = _ENOUGH
     for run in (run for run in runs if run.role == "observed"):
         motion = motions[run.name]
         again = _shaken(run, motion, robot, limits, random)
         if again is not None:
-            found.append((motion, again))
-        if sum(len(one.time) for one, _ in found) >= _ENOUGH:
+            found.append((_middle(motion, missing), _middle(again, missing)))
+            missing -= len(motion.time)
+        if missing <= 0:
             break
     return tuple(found)
+
+
+def _middle(motion: Motion, samples: int) -> Motion:
+    """Return so many samples of the middle of a motion, as a motion; all of one that has no more."""
+    first = (len(motion.time) - samples) // 2
+    return motion if first <= 0 else motion.rows(slice(first, first + samples))
 
 
 def _shaken(run: Run, motion: Motion, robot: Robot, limits: Data, random: np.random.Generator) -> Motion | None:
