@@ -78,17 +78,22 @@ def test_a_payload_that_is_updated_is_a_row_and_a_fact_of_its_author(workspace: 
 def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Path) -> None:
     said = (
         f'<{RUN}> a <urn:plant/Night_Shift> ; rdfs:comment "leise"@de . GRAPH <urn:mine> {{ <urn:a> <urn:b> <urn:c> }}'
+        "<https://w3id.org/irtwin/tariff/electricity> irt:Energy_Price 0.25e0 ; irt:Currency 'EUR' ."
     )
     update(workspace, f"INSERT DATA {{ {said} }}")
     with Workspace.existing(workspace) as place, KnowledgeGraph(None, workspace) as anew:
         map_rows(place, anew)
-        assert len(anew.triples(GRAPH_ASSERTED)) == 2
+        assert len(anew.triples(GRAPH_ASSERTED)) == 4
     night = f"SELECT ?t {{ <{RUN}> a ?t FILTER(STRSTARTS(STR(?t), 'urn:')) }}"
     assert rows(workspace, night) == [("urn:plant/Night_Shift",)]
+    priced = f"<{RUN}> irt:Energy_Cost ?cost ; irt:Energy_Consumption ?energy"
+    price = f"SELECT (?cost / ?energy * 3.6e6 AS ?price) {{ {priced} }}"
+    assert rows(workspace, price) == [(pytest.approx(0.25),)]
     (why,) = explain(f"<{RUN}> rdfs:comment ?", workspace)
     assert why.by.startswith("asserted by anna, ")
     update(workspace, f"DELETE DATA {{ {said} }}")
     assert rows(workspace, night) == rows(workspace, "SELECT ?o { GRAPH <urn:mine> { ?s ?p ?o } }") == []
+    assert rows(workspace, price) == []
     with Workspace.existing(workspace) as place, place.reading() as session:
         assert (
             session.scalars(
