@@ -12,7 +12,6 @@ import scipy
 _LOBES = 3  # of the sinc on either side: 1e-4 lost at a tenth of the cutoff, nothing left from twice it on
 FEWEST_PERIODS = 10  # of the cutoff in a run: the kernel spans six
 _OVERSAMPLING = 4  # samples kept per cutoff period after decimation
-_BLOCK = 8  # times the kernel, at least, that an FFT takes at once
 _AT_ONCE = 16  # samples that are filtered and decimated as one product of matrices
 
 
@@ -82,11 +81,8 @@ def _band(taps: np.ndarray, step: int, rows: int) -> np.ndarray:
 
 
 def _convolved(signal: np.ndarray, taps: np.ndarray) -> np.ndarray:
-    """Return (N, ...) under (K,) taps where these have all their samples, (N - K + 1, ...): in blocks, by FFT."""
-    length = _BLOCK << (len(taps) - 1).bit_length()
-    step, count = length - len(taps) + 1, len(signal) - len(taps) + 1
-    missing = -(-count // step) * step - count
-    whole = np.pad(signal, [(0, missing), *[(0, 0)] * (signal.ndim - 1)])
-    blocks = np.lib.stride_tricks.sliding_window_view(whole, length, axis=0)[::step]
-    filtered = np.fft.irfft(np.fft.rfft(blocks) * np.fft.rfft(taps, length), length)[..., len(taps) - 1 :]
-    return np.moveaxis(filtered, -1, 1).reshape(-1, *signal.shape[1:])[:count]
+    """Return (N, ...) under (K,) taps where these have all their samples, (N - K + 1, ...)."""
+    length = scipy.fft.next_fast_len(len(signal), real=True)
+    passed = scipy.fft.rfft(taps, length).reshape(-1, *[1] * (signal.ndim - 1))
+    filtered = scipy.fft.irfft(scipy.fft.rfft(signal, length, axis=0) * passed, length, axis=0)
+    return np.asarray(filtered[len(taps) - 1 : len(signal)])
