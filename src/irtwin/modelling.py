@@ -17,8 +17,6 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
-from irtwin.gap.isolation.torque_scale import torque_scale_of
-from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.planning import robot_program
 from irtwin.planning.admission import check_motion
@@ -38,6 +36,7 @@ from irtwin.twin.described import places, text_of
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
 from irtwin.twin.price import Price, price
+from irtwin.twin.torque_scale import torque_scale
 from irtwin.twin.twin import Twin
 
 Announce = Callable[[str], None]
@@ -69,7 +68,7 @@ def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | N
         if named is None
         else fit(given.robot, motions, named)
     )
-    return replace(twin, torque_scale=torque_scale_of(twin, given, motions, ScaleOfTorque()))
+    return replace(twin, torque_scale=torque_scale(given, motions, twin.joint_torque))
 
 
 def predict(

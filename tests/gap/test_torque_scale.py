@@ -13,17 +13,15 @@ from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.finding import quantities
-from irtwin.gap.isolation.torque_scale import torque_scale
-from irtwin.gap.thresholds import DEFAULT
 from irtwin.robot.kinematics import flange
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
+from irtwin.twin.torque_scale import torque_scale
 
 pytestmark = pytest.mark.usefixtures("no_experiment")
 
 ROBOT = arm(3)
 LOAD, GAIN = 3.0, 1.09  # kg at the flange; of every drive's torque constant
-LIMITS = DEFAULT.scale_of_torque
 
 
 def loaded_torque(motion, mass):
@@ -73,7 +71,7 @@ def test_a_mass_weighed_by_drives_that_read_high_lies_in_its_interval():
 
 def scale(**changes):
     data = replace(logged(1.0, power=False), **changes)
-    return torque_scale(data, [], lambda motion: motion.torque, LIMITS)
+    return torque_scale(data, [condition(data.runs[0], ROBOT, 10.0)], lambda motion: motion.torque)
 
 
 def test_where_the_uncertainty_comes_from():
@@ -92,7 +90,7 @@ def test_constants_that_power_told_are_not_nominal_and_power_does_not_count_agai
     motions = [condition(run, ROBOT, 10.0) for run in data.runs]
     for simulated in (False, True):
         of_currents = replace(data, runs=runs, simulated=simulated)
-        found = torque_scale(of_currents, motions, lambda motion: motion.torque, LIMITS)
+        found = torque_scale(of_currents, motions, lambda motion: motion.torque)
         assert (found.source, found.uncertainty, found.low, found.high) == ("assumed", 0.1, 1 / 1.1, 1 / 0.9)
         assert found.why.endswith("10 %: power tells the torque constants, joint by joint")
 
@@ -106,17 +104,17 @@ def test_power_on_the_bus_narrows_the_scale(gain):
     def real(motion):
         return motion.torque - offset
 
-    found = torque_scale(data, motions, real, LIMITS)
+    found = torque_scale(data, motions, real)
     assert found.low < 1 / gain < found.high
     assert found.high - found.low < 0.06
     assert "narrows" in found.why
-    at_mains = torque_scale(replace(data, power_at="mains"), motions, real, LIMITS)
+    at_mains = torque_scale(replace(data, power_at="mains"), motions, real)
     assert (at_mains.low, at_mains.high) == (1 / 1.1, 1 / 0.9)
 
 
 def test_power_that_contradicts_does_not_count():
     data = logged(1.6, power=True)
     motions = [condition(run, ROBOT, 10.0) for run in data.runs]
-    found = torque_scale(data, motions, lambda motion: motion.torque - 1.6 * truth(ROBOT)["c"], LIMITS)
+    found = torque_scale(data, motions, lambda motion: motion.torque - 1.6 * truth(ROBOT)["c"])
     assert (found.low, found.high) == (1 / 1.1, 1 / 0.9)
     assert "does not count" in found.why

@@ -25,7 +25,6 @@ from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
-from irtwin.gap.isolation.torque_scale import torque_scale
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
 from irtwin.gap.localisation.flexible_regression import flexible_regression
@@ -44,7 +43,7 @@ from irtwin.identification.two_processes import begun, one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
-from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.torque_scale import TorqueScale, torque_scale
 from irtwin.twin.twin import Twin
 
 
@@ -186,7 +185,7 @@ def diagnose(
         tell("Trying every effect on torque")
         torque, floor, refusals = search.torque_causes(_tried(search, plain))
         explained.append(torque)
-        scale = torque_scale(data_set, case.seen, torque, thresholds.scale_of_torque)
+        scale = torque_scale(data_set, case.seen, torque)
     energies: EnergyErrors | None = None
     causes = [cause for one in explained for cause in one.finding.causes]
     twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)

@@ -86,16 +86,6 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class ScaleOfTorque:
-    """How far logged torque may be off on all joints alike; half a 95 % interval each."""
-
-    assumed: float = _threshold(
-        0.1, "torque of drives, where the data set states nothing", "share", "decisions/gap-regression.md"
-    )
-    sensor: float = _threshold(0.02, "torque of sensors, and power of a meter", "share", "decisions/gap-regression.md")
-
-
-@dataclass(frozen=True)
 class Matters:
     """What is worth a word to a person."""
 
@@ -119,7 +109,6 @@ class Thresholds:
 
     data: Data = field(default_factory=Data)
     criterion: Criterion = Criterion()
-    scale_of_torque: ScaleOfTorque = ScaleOfTorque()
     matters: Matters = Matters()
 
     def changed(self, name: str, value: float) -> Thresholds:

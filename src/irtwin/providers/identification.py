@@ -11,8 +11,6 @@ from datetime import UTC, datetime
 
 from irtwin.effects.stack import Stack
 from irtwin.gap.choice import identified
-from irtwin.gap.isolation.torque_scale import torque_scale_of
-from irtwin.gap.thresholds import ScaleOfTorque
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.identification.validation import FIT, HELD_OUT, Split, split
 from irtwin.providers.motions import RobotMotions, robot_motions
@@ -23,6 +21,7 @@ from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
 from irtwin.twin.files import to_json
+from irtwin.twin.torque_scale import torque_scale
 from irtwin.twin.twin import BaseParameter, Choice, Parameter, Twin
 from irtwin.twin.validate import validate
 
@@ -56,7 +55,7 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
     """Return the rows and the file of a robot's twin, which was fitted to `parts` of the known motions."""
     keys = known.keys
     stored = stored_data_set(workspace, robot_id, twin.robot)
-    twin = replace(twin, torque_scale=torque_scale_of(twin, stored, parts.fit, ScaleOfTorque()))
+    twin = replace(twin, torque_scale=torque_scale(stored, parts.fit, twin.joint_torque))
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"

@@ -1,20 +1,40 @@
-"""The scale of torque that a twin was fitted with: how sure it is, and what goes with it.
+"""The scale of torque, logged over that which is there: how sure it is, and what goes with it.
 
-All torques may be off by one share, as drives' constants are nominal. A fit does not see that, so a twin's covariance
-does not hold it: what is common to all parameters is no noise of each.
+Torque from current times a nominal constant may be off by a tenth on all joints alike. A fit does not see that, as all
+it finds is off with it, so a twin's covariance does not hold it: what is common to all parameters is no noise of each.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from irtwin.effects.effect import Quantity
+from irtwin.effects.effect import Quantity, Term
+from irtwin.errors import InputError
+from irtwin.identification.accumulate import Rows, accumulate
+from irtwin.identification.estimators import estimate
+from irtwin.identification.uncertainty import half_widths
+from irtwin.signals.log import DataSet
+from irtwin.signals.motion import Motion
 
+STATED, SIMULATED, SENSOR, ASSUMED = "stated", "simulated", "sensor", "assumed"
+_SENSOR = re.compile(r"\b(?:sensors?|link-side)\b", re.IGNORECASE)
+_LOSSES = (  # of joint torques and speeds, (N, n) each
+    lambda torque, speed: torque**2,
+    lambda torque, speed: np.abs(torque),
+    lambda torque, speed: np.abs(speed),
+    lambda torque, speed: speed**2,
+)
+_ASSUMED = 0.1  # of torque of drives, where the data set states nothing: half a 95 % interval, as the next
+_OF_SENSOR = 0.02  # of torque of sensors, and of power of a meter
+_SPREAD = 1e3  # of a loss' coefficient: no more is known of it
 _FORCES = re.compile(r"\b(?:kg|N)\b")
 _POWER_OF = re.compile(r"\)\^(\d+)$")
+
+Torque = Callable[[Motion], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -59,3 +79,88 @@ def _degree(part: str) -> int:
         return 0
     power = _POWER_OF.search(part)
     return int(power[1]) if power else 1
+
+
+def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -> TorqueScale | None:
+    """Return how sure the scale is by what the data set states, and by power where that tells more.
+
+    motions: filtered alike, of which some have a torque, else None; torque: the real joint torque, (N, n) N m, of each
+    that explains what was logged. Power counts where
+    it was measured on the DC bus: that of the mains holds the efficiency of a supply. Nor does it count twice: where
+    the runs say no torque, power told the torque constants.
+    """
+    if not any(motion.torque is not None for motion in motions):
+        return None
+    by_power = bool(data_set.runs) and all(run.signals.torque is None for run in data_set.runs)
+    known = _stated(data_set, by_power)
+    with_power = [motion for motion in motions if motion.power is not None]
+    if by_power or known.uncertainty == 0 or not with_power or data_set.power_at != "dc_bus":
+        return known
+    told = _told_by_power(with_power, torque)
+    return known if told is None else _narrowed(known, *told)
+
+
+def _stated(data_set: DataSet, by_power: bool) -> TorqueScale:
+    note = data_set.notes.get("torque")
+    if data_set.torque_scale_uncertainty is not None:
+        share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
+    elif by_power:
+        share, source, why = _ASSUMED, ASSUMED, "power tells the torque constants, joint by joint"
+    elif data_set.simulated:
+        share, source, why = 0.0, SIMULATED, "a simulator made it"
+    elif isinstance(note, str) and _SENSOR.search(note):
+        share, source, why = _OF_SENSOR, SENSOR, "a sensor measured torque"
+    else:
+        share, source, why = _ASSUMED, ASSUMED, "torque of drives comes from nominal constants"
+    words = f"The scale of torque is {f'uncertain by {100 * share:.3g} %' if share else 'exact'}: {why}"
+    return TorqueScale(share, source, 1 / (1 + share), 1 / (1 - share), words)
+
+
+def _narrowed(known: TorqueScale, slope: float, half: float) -> TorqueScale:
+    """Join what is known of true torque over logged, 1 give or take the uncertainty, with the slope of power."""
+    half = float(np.hypot(half, _OF_SENSOR * abs(slope)))
+    if half >= known.uncertainty:
+        return known
+    said = f"power over torque times speed is {slope:.3f} (give or take {half:.3f})"
+    if abs(slope - 1) > np.hypot(half, known.uncertainty):
+        return replace(known, why=f"{known.why}; {said}, farther off than that, and does not count")
+    weights = np.array([known.uncertainty, half]) ** -2.0
+    middle, rest = float(weights @ [1.0, slope] / weights.sum()), float(weights.sum() ** -0.5)
+    return replace(known, low=middle - rest, high=middle + rest, why=f"{known.why}; {said}, which narrows it")
+
+
+def _told_by_power(motions: Sequence[Motion], torque: Torque) -> tuple[float, float] | None:
+    """Return the slope of power over torque times speed, and half its 95 % interval; None where power does not tell.
+
+    Losses of windings, inverters and iron are fitted beside it, joint by joint; where it depends on which, by so much
+    it is unsure. Only while the robot takes power: what it gives back may be burnt.
+    """
+    slopes = [_slope(motions, torque, losses) for losses in (_LOSSES, _LOSSES[:1])]
+    if any(slope is None for slope in slopes):
+        return None
+    (slope, half), (other, _) = [one for one in slopes if one is not None]
+    return slope, float(np.hypot(half, slope - other))
+
+
+def _slope(
+    motions: Sequence[Motion], torque: Torque, losses: Sequence[Callable[[np.ndarray, np.ndarray], np.ndarray]]
+) -> tuple[float, float] | None:
+    joints = motions[0].dq.shape[1]
+    terms = [Term("slope", "1", expected=1.0), Term("P0", "W", spread=_SPREAD)]
+    terms += [Term("loss", "", spread=_SPREAD)] * (len(losses) * joints)
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.power is not None
+        real = torque(motion)
+        work = (real * motion.dq).sum(axis=1)
+        columns = np.column_stack([work, np.ones_like(work), *(loss(real, motion.dq) for loss in losses)])
+        return Rows(columns[:, None], np.zeros((len(work), 1)), motion.power[:, None], (work < 0)[:, None])
+
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    try:
+        blocks = accumulate(motions, equations, pattern)
+    except InputError:  # nothing is left of runs that only brake
+        return None
+    found = estimate(blocks, pattern, terms)
+    half = float(half_widths(found.covariance, np.array([term.spread for term in terms]), found.blocks)[0])
+    return (float(found.values[0]), half) if np.isfinite(half) else None
