@@ -58,7 +58,7 @@ def channel_of(motions, tried, cause=None, rivals=(), part=1.0):
         shown = evidence(system, system.moments(np.full(2, NOISE)), (), own.variants).explained
         shape = own.variants[int(np.argmax(shown))]
         causes = (Cause(cause, MISSING, ("joint_2",), (shape,), 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
-    attribution = Attribution(causes, np.full(2, NOISE), found, np.zeros((len(found), 2)), (), np.zeros(0))
+    attribution = Attribution(causes, np.full(2, NOISE), found, np.zeros((len(found), 2)), np.zeros(0))
     finding = finding_of("torque", ROBOT.joint_names, frozenset(m.run for m in motions), system, attribution, None, 0)
     vars(finding)["closed_squares"] = np.array([part * finding.counted.before for _ in causes])
     return finding, system_of

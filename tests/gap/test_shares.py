@@ -41,7 +41,7 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
         Cause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
         for k, column in enumerate(columns)
     )
-    return system, Attribution(causes, np.array([noise]), (), np.zeros((0, 2)), (), np.zeros(0))
+    return system, Attribution(causes, np.array([noise]), (), np.zeros((0, 2)), np.zeros(0))
 
 
 def apart(system, attribution):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
@@ -42,25 +42,21 @@ def find_beside_power(
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
     `predicted` the joint torque by the twin, `before` the power that it takes. Where real torque was found, the search
     is repeated with the floor that is left, and with power linear about that torque if losses, which grow with its
-    square, make a difference; each effect is then tried in its best shape only.
+    square, make a difference.
     """
 
-    def about(torque: Torque, power: TwinPower, of_torque: Sequence[Effect]) -> JointEquations:
-        tried = (of_torque, effects[1])
-        return joint_equations(stack, case.measured, case.grouping, tried, below, torque, power, case.shaken)
+    def about(torque: Torque, power: TwinPower, level: Floor) -> Finding:
+        both = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, case.shaken)
+        return _find(case, both, level, seed, without)
 
-    equations = about(predicted, before, effects[0])
-    first, both = _find(case, equations, floor, seed, without)
+    first = about(predicted, before, floor)
     if not any(cause.carries_power for cause in first.causes):
         return first, floor
     explained = ExplainedTorque(stack, first, below)
     power = TwinPower(stack, case.with_power, case.grouping, explained)
     left = floor_left(case, floor, explained, power)
     if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * power.system.noise_before[0]:
-        shapes = _best_shapes(both)
-        del equations  # before as much memory is taken once more
-        equations = about(explained, power, shapes)
-        return _find(case, equations, left, seed, without)[0], left
+        return about(explained, power, left), left
     return replace(first, floor=left.torque), left
 
 
@@ -75,25 +71,8 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _best_shapes(found: Attribution) -> list[Effect]:
-    """Return the effects on torque, each joint's in the shape that explains most beside what was found."""
-    kept = [*found.shapes, *(variant for cause in found.causes for variant in cause.variants)]
-    shapes: dict[tuple[int, str | None], Effect] = {}
-    for variant in kept:
-        effect, joint = variant.effect, variant.terms[0].joint
-        if effect.signal != "torque":
-            continue
-        if isinstance(effect, JointEffect) and joint is not None:
-            shapes[id(effect), joint] = effect.on(joint)
-        else:
-            shapes[id(effect), None] = effect
-    return list(shapes.values())
-
-
-def _find(
-    case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]
-) -> tuple[Finding, Attribution]:
-    """Return what both equations show of torque, and all that they show."""
+def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> Finding:
+    """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
     both = attributed(case, whole, np.concatenate(levels), without)
@@ -101,8 +80,7 @@ def _find(
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(equations, tuple(of_power), both.noise)
     where = "torque", case.robot.joint_names, case.observed
-    found = finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
-    return found, both
+    return finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
 
 
 def _causes_of_torque(found: Attribution) -> list[Cause]:
@@ -121,6 +99,5 @@ def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
         both.noise[:-1],
         tuple(replace(one, variants=tuple(map(equations.in_torque, one.variants))) for one in mine),
         both.visible[inside],
-        tuple(equations.in_torque(both.shapes[k]) for k in inside),
         both.log_odds[inside],
     )

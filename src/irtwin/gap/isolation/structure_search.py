@@ -28,14 +28,13 @@ Found = tuple[Hypothesis, Variant]
 class Attribution:
     """The causes found, ranked by gain; `noise` (g,) what they leave; `visible` (H, 2) of each hypothesis before any:
     what it adds beyond what the twin imitates, as a mean square in units of the noise, and as a part of all it adds;
-    `shapes` of each beside the causes, and `log_odds` (H,) that it is there beside them.
+    `log_odds` (H,) that it is there beside the causes.
     """
 
     causes: tuple[Cause, ...]
     noise: np.ndarray
     hypotheses: tuple[Hypothesis, ...]
     visible: np.ndarray
-    shapes: tuple[Variant, ...]
     log_odds: np.ndarray
 
 
@@ -58,13 +57,10 @@ def attribute(
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = visibility(system, system.moments(noise), shapes)
     found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
-    known = {(one.effect, one.scope, one.joint): variant for one, variant in found}
     after = search.beside(found, noise)
-    known |= {(one.effect, one.scope, one.joint): after.variant(k) for k, one in enumerate(after.hypotheses)}
-    best = [known.get((one.effect, one.scope, one.joint), shape) for one, shape in zip(candidates, shapes, strict=True)]
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
     beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
-    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, tuple(best), beside)
+    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, beside)
 
 
 def judged(
