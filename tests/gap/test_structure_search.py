@@ -235,8 +235,9 @@ def test_products_are_those_of_the_factors():
     term = Term("constant", "1", expected=2.0, spread=3.0)
     system = replace(system, terms=((EFFECT, term),), observed=np.arange(RUNS) >= RUNS // 2)
     for run, moments in enumerate(system.moments(np.array([0.5]))):
-        factor, used = system.factor(run, 0)
-        places = np.append(used, 7)
-        expected = np.zeros((8, 8))
-        expected[np.ix_(places, places)] = factor.T @ factor / 0.25
+        rows = system.blocks[run].factors[0]
+        changes = rows[:, 1:-1] * system.observed[run]
+        every = np.column_stack([rows[:, :-1], changes]) * system.scale
+        factor = np.column_stack([every, rows[:, -1] - 2.0 * rows[:, 0]])
+        expected = factor.T @ factor / 0.25
         np.testing.assert_allclose(moments.whole, expected, rtol=1e-9, atol=1e-6)

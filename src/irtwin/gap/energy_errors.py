@@ -47,17 +47,14 @@ def energy_errors(finding: Finding, motions: Sequence[Motion], rest: Sequence[in
     before = (finding.before, (), finding.rmse) if rest is None else (finding.system, rest, finding.attribution.noise)
     for system, columns, noise in (before, after):
         ones = next(k for k, column in enumerate(system.columns) if column.effect.drawn_at_rest) + system.base
-        moments = system.moments(noise)
+        moments, level = system.moments(noise), float(max(noise[0], system.quietest[0]))
         total = Summed(moments)
         part = []
         for group in np.flatnonzero(system.group_observed):
-            vector = system.solution(columns, total - moments[group])
-            residual, energy = 0.0, 0.0
-            for block in np.flatnonzero(system.group == group):
-                factor, used = system.factor(int(block), 0)
-                left = factor @ np.append(-vector[used], 1.0)
-                residual += float(factor[:, int(np.flatnonzero(used == ones)[0])] @ left) / system.scale[ones]
-                energy += mean[system.blocks[block].run] * float(system.blocks[block].rows[0])
+            weights = np.append(-system.solution(columns, total - moments[group]), 1.0)
+            residual = (moments[group].of(np.array([ones])) @ weights)[0] * level**2 / system.scale[ones]
+            blocks = (system.blocks[block] for block in np.flatnonzero(system.group == group))
+            energy = sum(mean[block.run] * float(block.rows[0]) for block in blocks)
             part.append(100 * abs(residual) / max(abs(energy), 1e-9))
         errors.append(np.array(part))
     return EnergyErrors(*errors)

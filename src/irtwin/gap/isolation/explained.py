@@ -63,8 +63,7 @@ class Explained:
 
     def _column(self, columns: np.ndarray, k: int) -> np.ndarray:
         """Return the candidate column k of an effect's columns (..., m)."""
-        system = self.finding.system
-        own = system.columns[(k - len(system.columns) if k >= system.changed else k) - system.base]
+        own = self.finding.system.column(k)
         if own.index is not None:
             return np.asarray(columns[..., own.index])
         return np.asarray(columns @ np.array([term.expected for term in own.effect.terms(self.stack.robot)]))

@@ -17,7 +17,7 @@ import numpy as np
 from irtwin.gap.regression.hypotheses import Variant, bounds
 from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.projection import Projected, asked_columns, fitted_columns, projected, projected_in
+from irtwin.gap.regression.projection import Projected, asked_columns, projected, projected_in
 
 _SPEAKS = 1e-3  # of what a variant says in its strongest group: a group with less says nothing of it
 _NOTHING = 1e-12  # squares, in units of the noise: what adds less acts nowhere
@@ -74,7 +74,7 @@ def evidence(
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
     total = Summed(moments)
     asked = asked_columns(total, [k for variant in variants for k in variant.columns])
-    inside = fitted_columns(system, chosen)
+    inside = system.fitted(chosen)
     whole = projected(system, total, inside, asked)
     explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(moments)))
     information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
@@ -106,7 +106,7 @@ def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Va
     """
     total = Summed(moments)
     columns = [k for variant in variants for k in variant.columns]
-    whole = projected(system, total, fitted_columns(system, ()), asked_columns(total, columns))
+    whole = projected(system, total, system.fitted(()), asked_columns(total, columns))
     ends = np.cumsum([len(variant.columns) for variant in variants])[:-1]
     rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
     both = zip(*(np.split(each.squares(columns), ends) for each in (whole, total)), strict=True)

@@ -34,16 +34,6 @@ class Hypothesis:
     scope: str
     variants: tuple[Variant, ...]
 
-    @property
-    def of_bodies(self) -> bool:
-        """Whether it is the robot's bodies that differ."""
-        return self.variants[0].effect.bodies
-
-    @property
-    def name(self) -> str:
-        """Readable, unique within a diagnosis."""
-        return f"{self.effect} {self.scope} at {self.joint or 'the robot'}"
-
 
 @dataclass(frozen=True)
 class Column:

@@ -99,12 +99,8 @@ class System:
 
         def measured(block: Block, observed: bool) -> Block:
             factors = []
-            for factor, row in zip(block.factors, self.pattern, strict=True):
-                used = np.flatnonzero(row)
-                own = values[used]
-                if self.both and observed:
-                    later = used >= self.base
-                    own[later] += values[used[later] + len(self.columns)]
+            for factor, places in zip(block.factors, self._places[observed], strict=True):
+                own = np.bincount(places.own, np.append(values, 0.0)[places.every])[:-1]
                 factors.append(np.column_stack([factor[:, :-1], factor[:, :-1] @ own]))
             return replace(block, factors=tuple(factors))
 
@@ -200,43 +196,29 @@ class System:
     def _size(self) -> int:
         return self.base + len(self.columns) * (2 if self.both else 1)
 
-    def factor(self, block: int, equation: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a block's factor of an equation, (r, k + 1), in units of the prior, and the indices (k,) it has.
+    @cached_property
+    def _units(self) -> np.ndarray:
+        """(D + 1,) of all columns and of the measurement."""
+        return np.append(self.scale, 1.0)
 
-        The last column is what was measured, less what was expected.
-        """
-        used = np.flatnonzero(self.pattern[equation])
-        factor = self.blocks[block].factors[equation]
-        own = used[used < self.base]
-        target = factor[:, -1] - factor[:, : len(own)] @ self.expected[own]
-        columns = factor[:, :-1]
-        if self.both and self.observed[block]:
-            later = used >= self.base
-            columns = np.concatenate([columns, columns[:, later]], axis=1)
-            used = np.append(used, used[later] + len(self.columns))
-        return np.column_stack([columns * self.scale[used], target]), used
+    @cached_property
+    def _expected(self) -> list[np.ndarray]:
+        """Of each equation what is expected of the columns that it holds, (k + 1,)."""
+        every = np.append(self.expected, np.zeros(len(self.columns)))
+        return [np.append(every[row], 0.0) for row in self.pattern]
 
     def _held(self, equation: int, observed: bool, weights: np.ndarray) -> np.ndarray:
         """Return what (D + 1,) weights of all columns are of those that an equation holds, (k + 1,), unscaled."""
-        used = np.flatnonzero(self.pattern[equation])
-        own, later = used[used < self.base], used[used >= self.base]
-        scaled = weights[:-1] * self.scale
-        each = np.append(scaled[used], weights[-1])
-        each[: len(own)] -= weights[-1] * self.expected[own]
-        if self.both and observed:
-            each[len(own) : -1] += scaled[later + len(self.columns)]
-        return each
+        places = self._places[observed][equation]
+        each = np.bincount(places.own, (weights * self._units)[places.every])
+        return np.asarray(each - weights[-1] * self._expected[equation])
 
     def _among_all(self, equation: int, observed: bool, products: np.ndarray) -> np.ndarray:
         """Return products with what an equation holds, (k + 1,), as those with all columns, (D + 1,)."""
-        used = np.flatnonzero(self.pattern[equation])
-        own, later = used[used < self.base], used[used >= self.base]
+        places = self._places[observed][equation]
         found = np.zeros(self._size + 1)
-        found[used] = products[:-1] * self.scale[used]
-        found[-1] = products[-1] - products[: len(own)] @ self.expected[own]
-        if self.both and observed:
-            changed = later + len(self.columns)
-            found[changed] = products[len(own) : -1] * self.scale[changed]
+        found[places.every] = products[places.own] * self._units[places.every]
+        found[-1] -= products @ self._expected[equation]
         return found
 
     @cached_property
@@ -251,11 +233,9 @@ class System:
     def _products_of(self, blocks: np.ndarray, equation: int) -> Products:
         """Return an equation's products over a group's blocks."""
         places = self._places[bool(self.observed[blocks[0]])][equation]
-        used = np.flatnonzero(self.pattern[equation])
-        own = used[used < self.base]
         stacked = np.concatenate([self.blocks[block].factors[equation] for block in blocks])
-        stacked[:, -1] -= stacked[:, : len(own)] @ self.expected[own]
-        return Products.of(places, stacked, np.append(self.scale[used], 1.0))
+        stacked[:, -1] -= stacked @ self._expected[equation]
+        return Products.of(places, stacked, np.append(self.scale[: self.changed][self.pattern[equation]], 1.0))
 
     @cached_property
     def _places(self) -> tuple[list[Places], list[Places]]:
@@ -359,18 +339,19 @@ class System:
         of: Sequence[int] | np.ndarray,
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
-        inside = self._inside(chosen)
+        inside = self.fitted(chosen)
         vector = self._solved(inside, *self._weighted_among(inside, fitted, noise))
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
     def solution(self, chosen: Sequence[int], total: Moments) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
-        inside = self._inside(chosen)
+        inside = self.fitted(chosen)
         products = total.among(inside, np.append(inside, self._size))
         return self._solved(inside, products[:, :-1], products[:, -1])
 
-    def _inside(self, chosen: Sequence[int]) -> np.ndarray:
+    def fitted(self, chosen: Sequence[int]) -> np.ndarray:
+        """Return the indices of the columns that are fitted: the twin's and those chosen."""
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
 
     def _solved(self, inside: np.ndarray, among: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -25,11 +25,6 @@ class Projected:
     asked: np.ndarray
     pairs: tuple[tuple[np.ndarray, np.ndarray], ...]
 
-    @classmethod
-    def by(cls, whole: Moments, asked: np.ndarray, products: np.ndarray, weights: np.ndarray) -> Projected:
-        """Take the products (c, a) of the columns that are fitted, and their weights in the fit to these."""
-        return cls(whole, asked, ((np.ascontiguousarray(products.T), np.ascontiguousarray(weights.T)),))
-
     def of(self, columns: np.ndarray) -> np.ndarray:
         """Return the products among each row of columns: (V, k) -> (V, k, k)."""
         found = self.whole.blocks(columns)
@@ -47,7 +42,8 @@ def projected(system: System, total: Moments, inside: np.ndarray, asked: np.ndar
     """Return the products of what a fit of the columns `inside` to all groups leaves of the columns `asked`."""
     products = total.among(inside, np.append(inside, asked))
     among, beside = products[:, : len(inside)], products[:, len(inside) :]
-    return Projected.by(total, asked, beside, _weights(system, inside, among, beside))
+    weights = solved(factored(among, system.prior(inside[system.base :])), beside)
+    return Projected(total, asked, ((np.ascontiguousarray(beside.T), np.ascontiguousarray(weights.T)),))
 
 
 def projected_in(part: Moments, whole: Projected, inside: np.ndarray) -> Projected:
@@ -58,11 +54,6 @@ def projected_in(part: Moments, whole: Projected, inside: np.ndarray) -> Project
     return Projected(part, asked, ((own, across - own @ seen[:, : len(inside)]), (across, own)))
 
 
-def fitted_columns(system: System, chosen: Sequence[int]) -> np.ndarray:
-    """Return the indices of the columns that are fitted: the twin's and those chosen."""
-    return np.append(np.arange(system.base), np.array(chosen, dtype=int))
-
-
 def asked_columns(total: Moments, columns: Sequence[int]) -> np.ndarray:
     """Return the columns that are asked for and the measurement, in order.
 
@@ -71,8 +62,3 @@ def asked_columns(total: Moments, columns: Sequence[int]) -> np.ndarray:
     """
     asked = np.unique([*columns, total.size - 1])
     return np.pad(asked, (0, max(0, _PANEL - len(asked))), mode="edge")
-
-
-def _weights(system: System, inside: np.ndarray, among: np.ndarray, products: np.ndarray) -> np.ndarray:
-    """Return the weights (c, a) of the columns `inside` in the fit of others, by their products (c, c) and (c, a)."""
-    return solved(factored(among, system.prior(inside[system.base :])), products)

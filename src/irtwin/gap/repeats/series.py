@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from irtwin.effects.friction import SLOW
 from irtwin.signals.motion import Motion
@@ -76,21 +77,14 @@ def following(motion: Motion, joint: int) -> np.ndarray:
 
 
 def correlation_samples(residual: np.ndarray) -> float:
-    """Return of how many samples (N,), at least one, one says as much as an independent one; NaN are left out.
+    """Return of how many samples (N,), at least one, one says as much as an independent one.
 
     The sum of the autocorrelation over all lags, cut where it has become noise.
     """
-    known = np.isfinite(residual)
-    count = int(known.sum())
-    if count < 4:
+    left, count = residual - residual.mean(), len(residual)
+    products = scipy.signal.correlate(left, left, method="fft")[count - 1 :][: count // 2]
+    if count < 4 or products[0] <= 0:
         return 1.0
-    left = np.where(known, residual - residual[known].mean(), 0.0)
-    length = 2 ** int(np.ceil(np.log2(2 * len(left))))
-    spectrum, both = (np.abs(np.fft.rfft(each, length)) ** 2 for each in (left, known.astype(float)))
-    products, pairs = (np.fft.irfft(each, length)[: len(left) // 2] for each in (spectrum, both))
-    if products[0] <= 0:
-        return 1.0
-    correlation = products / np.maximum(pairs, 0.5) * (pairs[0] / products[0])
-    times = 2 * np.cumsum(correlation) - 1
+    times = 2 * np.cumsum(products / products[0] * count / (count - np.arange(len(products)))) - 1
     enough = np.flatnonzero(np.arange(len(times)) >= _WINDOW * times)
     return float(max(1.0, times[enough[0] if len(enough) else -1]))

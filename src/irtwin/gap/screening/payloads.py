@@ -6,7 +6,7 @@ carry it. Here the runs are parted in two, as explains most; whether there is a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,22 +61,19 @@ class _Parts:
     def of(cls, robot: Robot, system: System, noise: np.ndarray, fewest: int) -> _Parts | None:
         """Take the runs apart; None where too few are observed, or the twin has no last body."""
         runs = tuple(dict.fromkeys(block.run for block in system.blocks))
-        seen = {block.run for block, observed in zip(system.blocks, system.observed, strict=True) if observed}
+        of_runs = replace(system, group=np.array([runs.index(block.run) for block in system.blocks]))
         onto = _payload_columns(robot, system)
-        if onto is None or len(seen) < fewest:
+        if onto is None or of_runs.group_observed.sum() < fewest:
             return None
         base, size = system.base, system.base + onto.shape[1] + 1
         full = np.zeros((base + 1, size))
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
-        products = np.zeros((len(runs), size, size))
-        for number, block in enumerate(system.blocks):
-            tell_step(f"  payloads in {block.run}")
-            for joint, level in enumerate(noise):
-                factor, used = system.factor(number, joint)
-                inside = used < base
-                mapped = factor[:, np.append(inside, True)] @ full[np.append(used[inside], base)] / level
-                products[runs.index(block.run)] += mapped.T @ mapped
-        return cls(runs, products, np.array([run in seen for run in runs]), base, system.prior())
+        products = []
+        for run, moments in zip(runs, of_runs.moments(noise), strict=True):
+            tell_step(f"  payloads in {run}")
+            kept = np.append(np.arange(base), moments.size - 1)
+            products.append(full.T @ moments.among(kept, kept) @ full)
+        return cls(runs, np.array(products), of_runs.group_observed, base, system.prior())
 
     def carrying(self) -> np.ndarray:
         """Return (R,) which runs carry the payload; the heavier where either part could.
