@@ -233,7 +233,8 @@ def test_the_unit_of_noise_does_not_matter(unit):
 def test_products_are_those_of_the_factors():
     system, _ = system_of(np.eye(3), np.array([1.0, -2.0, 0.5]))
     term = Term("constant", "1", expected=2.0, spread=3.0)
-    system = replace(system, terms=((EFFECT, term),), observed=np.arange(RUNS) >= RUNS // 2)
+    columns = tuple(replace(one, term=replace(one.term, spread=2.0)) for one in system.columns)
+    system = replace(system, terms=((EFFECT, term),), columns=columns, observed=np.arange(RUNS) >= RUNS // 2)
     for run, moments in enumerate(system.moments(np.array([0.5]))):
         rows = system.blocks[run].factors[0]
         changes = rows[:, 1:-1] * system.observed[run]
