@@ -13,12 +13,11 @@ from irtwin.effects.effect import Effect, force_unit
 from irtwin.errors import InputError
 from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case, case_of
-from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.energy_errors import energy_errors
 from irtwin.gap.isolation.cause import Cause
 from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.regression.held_out import left_out
-from irtwin.gap.search import Search, twin_equations, variants
+from irtwin.gap.search import Search, variants
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.signals.log import DataSet, Run
@@ -63,12 +62,10 @@ def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ..
 
 def _findings(case: Case) -> Iterator[Finding]:
     """Yield what torque shows, then what power shows on the torque that is explained."""
-    stack = case.stack.with_effects([*case.effects, *case.run_offsets])
-    plain = twin_equations(case, stack)
-    floor = noise_floor(case.runs, case.motions, case.thresholds.data)
-    search, of_torque = Search(case, stack, plain, floor), None
+    search, of_torque = Search(case), None
+    floor = search.floor
     tried = _standing(case, "torque"), _standing(case, "power")
-    if case.shows("torque") and plain is not None:
+    if case.shows("torque"):
         of_torque, floor, _ = search.torque_causes(tried)
         yield of_torque.finding
     if case.shows("power"):

@@ -17,7 +17,7 @@ from irtwin.gap import writing
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
-from irtwin.gap.data.noise_floor import Floor, noise_floor
+from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.cause import Cause
@@ -35,7 +35,7 @@ from irtwin.gap.rehearsal import channel_equations
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
-from irtwin.gap.search import Search, check_observed, twin_equations, variants
+from irtwin.gap.search import Search, check_observed, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.gap.writing import Simulator
 from irtwin.identification.progress import tell, tell_step
@@ -162,20 +162,18 @@ def diagnose(
     case = case_of(data_set, withhold, thresholds, twin)
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
-    stack = case.stack.with_effects([*case.effects, *case.run_offsets])
     tell("Fitting the twin")
-    plain = twin_equations(case, stack)
-    differ = disturbances(case)
-    case, taken = removed(case, stack, plain, differ)
+    search = Search(case, frozenset(unknown), seed)
+    plain, differ = search.plain, disturbances(case)
+    case, taken = removed(case, search.stack, plain, differ)
     if taken:
         case = case.with_friction_near_zero()
-        stack = case.stack.with_effects(stack.effects)
-        plain = twin_equations(case, stack)
+        search = replace(search, case=case)
+        plain = search.plain
     tell_step("  the noise floor")
-    floor = noise_floor(case.runs, case.motions, thresholds.data)
+    floor = search.floor
     if case.shows("torque") and plain is not None:
         check_observed(plain)
-    search = Search(case, stack, plain, floor, frozenset(unknown), seed)
     twin_torque = search.twin.torque
     explained: list[Explained] = []
     refusals = NOTHING_REFUSED
@@ -223,7 +221,7 @@ def diagnose(
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
     measures = {one.finding.name: flexible_regression(one, seed) for one in left}
     tell("Designing the next experiment")
-    stacks = {"torque": stack, "power": search.power_stack}
+    stacks = {"torque": search.stack, "power": search.power_stack}
     equations = channel_equations(stacks, case, search.below, torque or twin_torque)
     proposal = next_experiment(
         case.robot,

@@ -13,7 +13,7 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.data.case import Case
-from irtwin.gap.data.noise_floor import Floor
+from irtwin.gap.data.noise_floor import Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
@@ -27,11 +27,6 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.torque_from_power import ThroughPower
 
 
-def twin_equations(case: Case, stack: Stack) -> System | None:
-    """Return the equations of torque of the twin alone; None where no torque is known."""
-    return torque_system(stack, case.with_torque, case.grouping, (), None) if case.with_torque else None
-
-
 def check_observed(system: System) -> None:
     """Raise InputError where no sample of an observed run is left."""
     if not system.observed.any():
@@ -40,18 +35,27 @@ def check_observed(system: System) -> None:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for the causes in a case, and what it stands on.
-
-    `stack`: the twin's effects; `plain`: its equations of torque alone, None where no torque is known; `floor`: the
-    noise floor; `unknown` are not known to it; `seed` draws orders of many causes.
-    """
+    """The search for the causes in a case: `unknown` are not known to it; `seed` draws orders of many causes."""
 
     case: Case
-    stack: Stack
-    plain: System | None
-    floor: Floor
     unknown: Set[Without] = frozenset()
     seed: int = 0
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The twin's effects."""
+        return self.case.stack.with_effects([*self.case.effects, *self.case.run_offsets])
+
+    @cached_property
+    def plain(self) -> System | None:
+        """The equations of torque of the twin alone; None where no torque is known."""
+        case = self.case
+        return torque_system(self.stack, case.with_torque, case.grouping, (), None) if case.with_torque else None
+
+    @cached_property
+    def floor(self) -> Floor:
+        """The noise floor."""
+        return noise_floor(self.case.runs, self.case.motions, self.case.thresholds.data)
 
     @cached_property
     def twin(self) -> LeftOut | ThroughPower:

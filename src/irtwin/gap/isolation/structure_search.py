@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -287,15 +287,11 @@ def _cause(found: Found, posterior: Posterior) -> Cause:
 def _joined(parts: Sequence[Cause]) -> Cause:
     """Return causes of one effect at several joints as one: as sure as at the joint where it is most."""
     first = max(parts, key=lambda one: one.probability)
-    return Cause(
-        effect=first.effect,
-        scope=first.scope,
+    return replace(
+        first,
         joints=tuple(joint for one in parts for joint in one.joints),
         variants=tuple(variant for one in parts for variant in one.variants),
         gain=sum(one.gain for one in parts),
-        log_odds=first.log_odds,
-        probability=first.probability,
-        rivals=first.rivals,
     )
 
 
