@@ -94,19 +94,22 @@ class Diagnosis:
         robot = self.description
         acted_on = [(cause.effect, cause.touched(robot)) for _, cause in self.causes]
         ids = cause_ids(acted_on, robot.joint_names)
-        named = [(finding, cause, name) for (finding, cause), name in zip(self.causes, ids, strict=True)]
-        written = tuple(writing.cause(robot, *one, self.scale, self.thresholds.criterion) for one in named)
+        ids_of = {id(cause): name for (_, cause), name in zip(self.causes, ids, strict=True)}
+        written = tuple(
+            writing.cause(robot, finding, cause, ids_of[id(cause)], self.scale, self.thresholds.criterion)
+            for finding, cause in self.causes
+        )
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
             written = tuple(writing.beside(self.simulator, one) for one in written)
         causes = apart.causes(written)
-        found = writing.findings(robot, self.channels, named, written, self.thresholds.matters)
+        found = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
         found = apart.findings(found, causes, self.thresholds.matters)
         causes = writing.folded(causes, found)
         judged = verdict_of(found)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(
-            robot, self.runs, self.channels, self.floor, self.energies, named, self.yardstick, self.seed
+            robot, self.runs, self.channels, self.floor, self.energies, ids_of, self.yardstick, self.seed
         )
         return Document(
             verdict=verdict,

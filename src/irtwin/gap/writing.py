@@ -83,15 +83,14 @@ def cause(
 def findings(
     robot: Robot,
     channels: Sequence[Finding],
-    named: Sequence[tuple[Finding, Cause, str]],
+    ids_of: Mapping[int, str],
     causes: Sequence[document.Cause],
     limits: Matters,
 ) -> tuple[document.Finding, ...]:
-    """Return the causes as a tree, the branch that closes most first; `named`: every cause with its id."""
+    """Return the causes as a tree, the branch that closes most first; `ids_of`: the id of each, by its object's."""
     of_all = [(channel, branch) for channel in channels for branch in branches(channel)]
     of_all.sort(key=lambda pair: -pair[1].closing.size)
     written = {cause.id: cause for cause in causes}
-    ids_of = _ids(named)
     own_of_all = [[written[ids_of[id(each)]] for each in branch.causes] for _, branch in of_all]
     joints = [_joints(robot, own) for own in own_of_all]
     ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
@@ -116,11 +115,6 @@ def findings(
             )
         )
     return tuple(found)
-
-
-def _ids(named: Sequence[tuple[Finding, Cause, str]]) -> dict[int, str]:
-    """Return the id of each cause, by that of the object."""
-    return {id(one): name for _, one, name in named}
 
 
 def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding]) -> tuple[document.Cause, ...]:
@@ -192,18 +186,17 @@ def shrink(
     findings: Sequence[Finding],
     floor: Floor,
     energies: EnergyErrors | None,
-    named: Sequence[tuple[Finding, Cause, str]],
+    ids_of: Mapping[int, str],
     yardstick: Mapping[str, Closeable],
     seed: int,
 ) -> document.Shrink:
-    """Return how far the gap shrinks on runs that took no part in the fit; `named`: every cause with its id.
+    """Return how far the gap shrinks on runs that took no part in the fit; `ids_of` as in `findings`.
 
     What is closed of it together is left out where causes act in a channel whose floor nobody knows.
     """
     changes = {finding.name: _change(finding, seed) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
     changed = [one.name for one in findings if one.causes or (torque_too and one.plain is not None)]
-    ids_of = _ids(named)
     return document.Shrink(
         held_out_runs=tuple(runs),
         noise_floor_from=floor.source,
