@@ -28,20 +28,11 @@ BOTH = f"ASK {{ <{DATA1}> a ?type . <{DATA2}> a ?type . }}"
 
 @pytest.fixture(scope="module")
 def w3c(new_graph: Callable[[], Path], start) -> Iterator[Server]:
+    """A server of the suite's data. Each update is a process: those that are done come last, and nothing is put back."""
     with start(new_graph()) as running:
-        fill(running)
+        done = running.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
+        assert done.status_code == 204, done.text
         yield running
-
-
-def fill(server: Server) -> None:
-    done = server.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
-    assert done.status_code == 204, done.text
-
-
-@pytest.fixture
-def writable(w3c: Server) -> Iterator[Server]:
-    yield w3c
-    fill(w3c)
 
 
 def send(server: Server, method: str, parameters: str = "", kind: str | None = None, body: bytes | str = ""):
@@ -123,6 +114,38 @@ def test_the_answer_has_a_fitting_type(w3c: Server, query: str, kinds: tuple[str
     assert any(kind in response.headers["content-type"] for kind in kinds)
 
 
+@pytest.mark.parametrize(
+    ("method", "parameters", "kind", "body"),
+    [
+        pytest.param("PUT", f"query=ASK%20%7B%7D&{chosen(default_graph=[DATA0])}", FORM, "", id="bad_query_method"),
+        pytest.param("GET", "query=ASK%20%7B%7D&query=SELECT%20%2A%20%7B%7D", None, "", id="bad_multiple_queries"),
+        pytest.param("POST", "", "text/plain", "ASK {}", id="bad_query_wrong_media_type"),
+        pytest.param("POST", "", None, "query=ASK%20%7B%7D", id="bad_query_missing_form_type"),
+        pytest.param("POST", "", None, "ASK {}", id="bad_query_missing_direct_type"),
+        pytest.param("POST", "", f"{QUERY}; charset=UTF-16", "ASK {}".encode("utf-16"), id="bad_query_non_utf8"),
+        pytest.param("GET", "query=ASK%20%7B", None, "", id="bad_query_syntax"),
+        pytest.param("GET", "update=CLEAR%20ALL", None, "", id="bad_update_get"),
+        pytest.param("POST", "", FORM, "update=CLEAR%20NAMED&update=CLEAR%20DEFAULT", id="bad_multiple_updates"),
+        pytest.param("POST", "", "text/plain", "CLEAR NAMED", id="bad_update_wrong_media_type"),
+        pytest.param("POST", "", None, "update=CLEAR%20NAMED", id="bad_update_missing_form_type"),
+        pytest.param("POST", "", f"{UPDATE}; charset=UTF-16", "CLEAR NAMED".encode("utf-16"), id="bad_update_non_utf8"),
+        pytest.param("POST", "", FORM, "update=CLEAR%20XYZ", id="bad_update_syntax"),
+        pytest.param(
+            "POST",
+            chosen(using_named_graph=["http://example/people"]),
+            UPDATE,
+            "PREFIX foaf:  <http://xmlns.com/foaf/0.1/>\nWITH <http://example/addresses>\n"
+            "DELETE { ?person foaf:givenName 'Bill' }\nINSERT { ?person foaf:givenName 'William' }\n"
+            "WHERE {\n    ?person foaf:givenName 'Bill'\n}",
+            id="bad_update_dataset_conflict",
+        ),
+    ],
+)
+def test_what_breaks_the_protocol_is_refused(w3c: Server, method: str, parameters: str, kind, body) -> None:
+    assert 400 <= send(w3c, method, parameters, kind, body).status_code < 500
+    assert is_true(send(w3c, "POST", "", QUERY, f"ASK {{ <{DATA1}> a <{DOCUMENT}> }}"))  # nothing was done
+
+
 def update_of(place: str, pattern: str = "?s a foaf:Document", what: str = "a dc:BibliographicResource") -> str:
     return f"""{PREFIXES}DROP ALL ;
 INSERT DATA {{ {ALL_DATA} }} ;
@@ -173,10 +196,10 @@ TWO_OF_THREE = f"ASK {{ {IS_RESOURCE[DATA1]} {IS_RESOURCE[DATA2]} FILTER NOT EXI
         ),
     ],
 )
-def test_an_update_asks_the_graphs_of_its_request(writable: Server, parameters: str, update: str, then: str) -> None:
-    response = send(writable, "POST", parameters, UPDATE, update)
+def test_an_update_asks_the_graphs_of_its_request(w3c: Server, parameters: str, update: str, then: str) -> None:
+    response = send(w3c, "POST", parameters, UPDATE, update)
     assert response.status_code == 204, response.text
-    assert is_true(send(writable, "POST", "", QUERY, then))
+    assert is_true(send(w3c, "POST", "", QUERY, then))
 
 
 @pytest.mark.parametrize(
@@ -186,49 +209,17 @@ def test_an_update_asks_the_graphs_of_its_request(writable: Server, parameters: 
         pytest.param(UPDATE, "CLEAR ALL", id="update_post_direct"),
     ],
 )
-def test_an_update_is_done(writable: Server, kind: str, body: str) -> None:
-    assert send(writable, "POST", "", kind, body).status_code == 204
-    assert not is_true(send(writable, "POST", "", QUERY, "ASK { ?s ?p ?o }"))
+def test_an_update_is_done(w3c: Server, kind: str, body: str) -> None:
+    assert send(w3c, "POST", "", kind, body).status_code == 204
+    assert not is_true(send(w3c, "POST", "", QUERY, "ASK { ?s ?p ?o }"))
 
 
-def test_update_base_uri(writable: Server) -> None:
+def test_update_base_uri(w3c: Server) -> None:
     place = "http://example.org/protocol-base-test/"
-    assert writable.update(f"CREATE SILENT GRAPH <{place}>").status_code == 204
+    assert w3c.update(f"CREATE SILENT GRAPH <{place}>").status_code == 204
     said = "<http://example.org/s> <http://example.org/p> <test>"
     update = f"CLEAR GRAPH <{place}> ;\nINSERT DATA {{ GRAPH <{place}> {{ {said} }} }}"
-    assert send(writable, "POST", "", UPDATE, update).status_code == 204
+    assert send(w3c, "POST", "", UPDATE, update).status_code == 204
     query = f"SELECT ?o WHERE {{ GRAPH <{place}> {{ <http://example.org/s> <http://example.org/p> ?o }} }}"
-    (row,) = send(writable, "POST", "", QUERY, query).json()["results"]["bindings"]
-    assert row["o"] == {"type": "uri", "value": f"{writable.url}/test"}
-
-
-@pytest.mark.parametrize(
-    ("method", "parameters", "kind", "body"),
-    [
-        pytest.param("PUT", f"query=ASK%20%7B%7D&{chosen(default_graph=[DATA0])}", FORM, "", id="bad_query_method"),
-        pytest.param("GET", "query=ASK%20%7B%7D&query=SELECT%20%2A%20%7B%7D", None, "", id="bad_multiple_queries"),
-        pytest.param("POST", "", "text/plain", "ASK {}", id="bad_query_wrong_media_type"),
-        pytest.param("POST", "", None, "query=ASK%20%7B%7D", id="bad_query_missing_form_type"),
-        pytest.param("POST", "", None, "ASK {}", id="bad_query_missing_direct_type"),
-        pytest.param("POST", "", f"{QUERY}; charset=UTF-16", "ASK {}".encode("utf-16"), id="bad_query_non_utf8"),
-        pytest.param("GET", "query=ASK%20%7B", None, "", id="bad_query_syntax"),
-        pytest.param("GET", "update=CLEAR%20ALL", None, "", id="bad_update_get"),
-        pytest.param("POST", "", FORM, "update=CLEAR%20NAMED&update=CLEAR%20DEFAULT", id="bad_multiple_updates"),
-        pytest.param("POST", "", "text/plain", "CLEAR NAMED", id="bad_update_wrong_media_type"),
-        pytest.param("POST", "", None, "update=CLEAR%20NAMED", id="bad_update_missing_form_type"),
-        pytest.param("POST", "", f"{UPDATE}; charset=UTF-16", "CLEAR NAMED".encode("utf-16"), id="bad_update_non_utf8"),
-        pytest.param("POST", "", FORM, "update=CLEAR%20XYZ", id="bad_update_syntax"),
-        pytest.param(
-            "POST",
-            chosen(using_named_graph=["http://example/people"]),
-            UPDATE,
-            "PREFIX foaf:  <http://xmlns.com/foaf/0.1/>\nWITH <http://example/addresses>\n"
-            "DELETE { ?person foaf:givenName 'Bill' }\nINSERT { ?person foaf:givenName 'William' }\n"
-            "WHERE {\n    ?person foaf:givenName 'Bill'\n}",
-            id="bad_update_dataset_conflict",
-        ),
-    ],
-)
-def test_what_breaks_the_protocol_is_refused(w3c: Server, method: str, parameters: str, kind, body) -> None:
-    assert 400 <= send(w3c, method, parameters, kind, body).status_code < 500
-    assert is_true(send(w3c, "POST", "", QUERY, f"ASK {{ <{DATA1}> a <{DOCUMENT}> }}"))  # nothing was done
+    (row,) = send(w3c, "POST", "", QUERY, query).json()["results"]["bindings"]
+    assert row["o"] == {"type": "uri", "value": f"{w3c.url}/test"}

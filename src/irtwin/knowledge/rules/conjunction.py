@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import rdflib
@@ -40,9 +41,14 @@ class Conjunction:
 
 def conjunction(construct: str) -> Conjunction:
     """Read a CONSTRUCT; NoConjunction where it is more."""
-    query = translateQuery(parseQuery(construct), initNs=PREFIXES).algebra
+    query = _algebra(construct)
     patterns, comparisons = _conjuncts(query.p)
     return Conjunction(patterns, comparisons, list(query.template))
+
+
+@lru_cache(maxsize=256)  # rdflib takes a tenth of a second a rule, and the rules are those of the last time
+def _algebra(construct: str) -> Any:
+    return translateQuery(parseQuery(construct), initNs=PREFIXES).algebra
 
 
 def _conjuncts(node: Any) -> tuple[list[Pattern], list[Comparison]]:
