@@ -17,7 +17,7 @@ from sqlalchemy import Engine, event
 from irtwin.knowledge.mapping.remembered import RememberedRows
 from irtwin.knowledge.store import graph as store
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.storage import database, files
+from irtwin.storage import database, files, staging
 from irtwin.storage.database import Workspace
 from irtwin.workflow import conclude, map_rows, rewriting
 from tests import rows
@@ -95,6 +95,17 @@ def killed_while_ingesting(point: str, folder: Path, url: str | None) -> None:
         run.sha256 = "4" * 64
         series[run.run_id] = rows.samples(20 + number)
     workspace.ingest(robot, joints, runs, series)
+
+
+def killed_apart(folder: Path, point: str) -> None:
+    """Work on a robot apart, and be killed there, or at a step of `staging` that puts it in its place."""
+    from tests.storage.test_database import populate
+
+    with Workspace(folder) as place, staging.staged(place, rows.ROBOT) as apart:
+        populate(apart)
+        if point == "apart":
+            os.kill(os.getpid(), signal.SIGKILL)
+        setattr(staging, point, lambda *_: os.kill(os.getpid(), signal.SIGKILL))
 
 
 def ingest_five_times(digit: int, folder: Path, url: str | None) -> None:

@@ -20,7 +20,7 @@ from irtwin.simulator.playing import diagnose
 
 def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), **numbers):
     """Write a data set that a robot of some numbers made, and the model."""
-    told = {name: servo_arm.swings(6, seed) for seed, name in enumerate(runs)}
+    told = {name: servo_arm.swings(4, seed) for seed, name in enumerate(runs)}
     data, model = servo_arm.write(folder, told)
     data_set, _, own = servo_arm.read(data, model)
     made = servo_arm.played(data_set, own, servo_arm.changed(own, **numbers))
@@ -161,7 +161,7 @@ def test_commands_that_the_model_clips_are_said(tmp_path):
 
 def with_torque(folder, **numbers):
     """Return a data set whose runs have commands, positions and torque, and a model that it is held against."""
-    told = {name: servo_arm.swings(6, seed) for seed, name in enumerate("ab")}
+    told = {name: servo_arm.swings(4, seed) for seed, name in enumerate("ab")}
     data_set, model, own = servo_arm.read(*servo_arm.write(folder, told))
     return servo_arm.played(data_set, own, servo_arm.changed(own, **numbers), torque_noise=5e-3), model
 

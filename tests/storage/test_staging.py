@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import signal
 from pathlib import Path
 
 import pytest
-from tests import rows
+from tests import killed_writers, rows
+from tests.forks import FORKS
 from tests.storage.test_database import WORK, populate, state, workspace
 
 from irtwin.errors import InputError
@@ -18,25 +18,6 @@ from irtwin.storage.staging import staged
 pytestmark = pytest.mark.slow
 
 __all__ = ["workspace"]
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-sys.path.insert(0, {tests!r})
-from irtwin.storage import staging
-from irtwin.storage.database import Workspace
-from irtwin.storage.staging import staged
-from tests import rows
-from tests.storage.test_database import populate
-
-with Workspace(Path({folder!r})) as place, staged(place, rows.ROBOT) as apart:
-    populate(apart)
-    kill = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
-    if {point!r} == "apart":
-        kill()
-    setattr(staging, {point!r}, kill)
-"""
-
 
 def test_what_is_made_apart_takes_its_place(workspace: Workspace) -> None:
     with staged(workspace, rows.ROBOT) as apart:
@@ -130,8 +111,10 @@ def test_a_kill_leaves_the_earlier_state(tmp_path: Path, point: str) -> None:
     with Workspace(tmp_path) as place:
         place.ingest(*rows.data_set())
         before = state(place)
-    code = KILLED.format(tests=str(Path(rows.__file__).parents[1]), folder=str(tmp_path), point=point)
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
+    process = FORKS.Process(target=killed_writers.killed_apart, args=(tmp_path, point))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
     with Workspace(tmp_path) as place:
         assert list(tmp_path.glob(".staged-*"))
         with staged(place, rows.ROBOT) as apart:

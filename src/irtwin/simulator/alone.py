@@ -79,26 +79,27 @@ class Alone:
         soft = (1 - holding) / holding / np.maximum(free + armature, 1e-9)
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
+        load, bodies = (
+            of[0, :, None] + np.einsum("kvn,kspn->svpn", changes[:, :, 0], of[1:]) for of in (self.load, self.inertia)
+        )
+        inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
+        gives = step * inverse / (1 + step * damping * inverse)
+        held_force, held_speed = inverse / (inverse + soft), back / (inverse + soft)
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
-        followed, changed = q.copy(), changes.any()
+        followed, below, lets_move = q.copy(), -band, -friction
         moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
         moved[0, 0] = q
         for row in range(len(told)):
-            load, bodies = self.load[0, row], self.inertia[0, row]
-            if changed:
-                load = load + (changes * self.load[1:, row, None]).sum(axis=0)
-                bodies = bodies + (changes * self.inertia[1:, row, None]).sum(axis=0)
-            inverse = 1 / (bodies + armature)
             followed += share * (told[row] - followed)
             off = followed - q
-            off -= np.minimum(np.maximum(off, -band), band)
+            off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
             moved[row, 1:] = force
-            force -= joint * v + load
-            held = (force * inverse + back * v) / (inverse + soft)
-            force -= np.minimum(np.maximum(held, -friction), friction)
-            v = v + step * force * inverse / (1 + step * damping * inverse)
-            q = q + step * v
+            force -= joint * v + load[row]
+            held = force * held_force[row] + held_speed[row] * v
+            force -= np.minimum(np.maximum(held, lets_move), friction)
+            v += force * gives[row]
+            q += step * v
             moved[row + 1, 0] = q
         moved[-1, 1:] = moved[-2, 1:]
         return moved
