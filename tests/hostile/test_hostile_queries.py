@@ -111,7 +111,9 @@ def test_deep(small: Server, name: str) -> None:
 @pytest.mark.parametrize("name", TOO_MUCH)
 def test_too_much(small: Server, name: str) -> None:
     said = refused(small, TOO_MUCH[name], 503)
-    assert said.startswith((f"the query was cancelled after {SECONDS} s", "the query needs more than 128 MB of memory")), said
+    assert said.startswith(
+        (f"the query was cancelled after {SECONDS} s", "the query needs more than 128 MB of memory")
+    ), said
 
 
 def test_the_server_is_well_after_all_that(small: Server) -> None:

@@ -28,7 +28,7 @@ BOTH = f"ASK {{ <{DATA1}> a ?type . <{DATA2}> a ?type . }}"
 
 @pytest.fixture(scope="module")
 def w3c(new_graph: Callable[[], Path], start) -> Iterator[Server]:
-    """A server of the suite's data. Each update is a process: those that are done come last, and nothing is put back."""
+    """A server of the suite's data; updates that are done come last, for each takes a second, and none is put back."""
     with start(new_graph()) as running:
         done = running.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
         assert done.status_code == 204, done.text

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.slow
 
 __all__ = ["workspace"]
 
+
 def test_what_is_made_apart_takes_its_place(workspace: Workspace) -> None:
     with staged(workspace, rows.ROBOT) as apart:
         populate(apart)

@@ -77,9 +77,15 @@ def pixels(page: Any) -> np.ndarray:
     return np.array(page.evaluate(COLOURS), dtype=float).reshape(120, 160, 4)[:, :, :3]
 
 
-def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(browser: Any, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def arm(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, list[str]]:
+    """The scene of the KR6, for the tests that come first: others close it."""
+    return open_page(browser, tmp_path_factory.mktemp("arm"), kr6())
+
+
+def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(arm: tuple[Any, list[str]]) -> None:
     robot = kr6()
-    page, complaints = open_page(browser, tmp_path, robot)
+    page, complaints = arm
     first = pixels(page)
     orange = (first[:, :, 0] > 150) & (first[:, :, 2] < 90)
     assert orange.mean() > 0.01
@@ -95,9 +101,11 @@ def test_the_robot_is_drawn_and_moves_and_its_numbers_are_right(browser: Any, tm
     assert complaints == []
 
 
-@pytest.mark.parametrize("robot", [kr6(), bare(kind="prismatic")])
-def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path, robot: Robot) -> None:
-    page, _ = open_page(browser, tmp_path, robot)
+def test_the_joints_stand_where_the_kinematics_say(arm: tuple[Any, list[str]]) -> None:
+    joints_stand_where_the_kinematics_say(arm[0], kr6())
+
+
+def joints_stand_where_the_kinematics_say(page: Any, robot: Robot) -> None:
     time, q = run(robot).time, run(robot).q
     for sample in (0, 360, 800):
         page.evaluate(SEEK, float(time[sample]))
@@ -107,6 +115,15 @@ def test_the_joints_stand_where_the_kinematics_say(browser: Any, tmp_path: Path,
         links = [robot.links[1 + joint].name for joint in range(len(robot.joints))]
         for place, link in zip(answer["places"], links, strict=True):
             np.testing.assert_allclose(np.linalg.solve(world, np.array(place).reshape(4, 4).T), known[link], atol=2e-4)
+
+
+def test_it_plays_tells_the_time_and_stops_at_the_end(arm: tuple[Any, list[str]]) -> None:
+    page, complaints = arm
+    page.evaluate("document.addEventListener('irtwin:time', (event) => { window.heard = event.detail.time; })")
+    page.evaluate(SEEK, 3.0)
+    play(page)
+    assert page.evaluate("window.heard") == pytest.approx(11.0)
+    assert complaints == []
 
 
 def test_a_joint_beyond_its_limits_is_marked(browser: Any, tmp_path: Path) -> None:
@@ -119,9 +136,10 @@ def test_a_joint_beyond_its_limits_is_marked(browser: Any, tmp_path: Path) -> No
     assert page.evaluate(outside) == [False, True]
 
 
-def test_a_curve_of_each_joint_follows_the_time(browser: Any, tmp_path: Path) -> None:
+def test_joints_that_slide_stand_right_and_a_curve_of_each_follows_the_time(browser: Any, tmp_path: Path) -> None:
     robot = bare(kind="prismatic")
     page, complaints = open_page(browser, tmp_path, robot)
+    joints_stand_where_the_kinematics_say(page, robot)
     shown = run(robot)
     page.evaluate(SEEK, 7.0)
     places = "cursors => cursors.map((cursor) => Number(cursor.getAttribute('x1')))"
@@ -199,14 +217,6 @@ def test_another_run_can_be_chosen_here_or_elsewhere(browser: Any, tmp_path: Pat
     assert page.inner_text(".is-time") == "3.0"
     assert page.locator(".is-quantity").input_value() == "position"  # no torque was modelled
     assert page.locator(".is-colour").input_value() == "own" and page.locator(".is-legend").is_hidden()
-    assert complaints == []
-
-
-def test_it_plays_tells_the_time_and_stops_at_the_end(browser: Any, tmp_path: Path) -> None:
-    page, complaints = open_page(browser, tmp_path, kr6())
-    page.evaluate("document.addEventListener('irtwin:time', (event) => { window.heard = event.detail.time; })")
-    play(page)
-    assert page.evaluate("window.heard") == pytest.approx(11.0)
     assert complaints == []
 
 
