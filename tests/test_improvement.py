@@ -12,14 +12,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from irtwin import asking, workflow
+from irtwin import asking, plans, workflow
 from irtwin.document import form
 from irtwin.document.document import Document
+from irtwin.errors import InputError
 from irtwin.identification.programmes import Programme, programmes
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.location import Location
 from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import record
+from irtwin.providers.improvement import _worst
 from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -225,9 +228,8 @@ def test_bad_logs_are_told_and_change_nothing(improved: tuple[Path, Said], tmp_p
     assert list(asking.ask("energy_per_run", workspace)) == before
 
 
-def test_without_power_there_is_nothing_to_judge_by(tmp_path: Path) -> None:
-    runs = [log(1, 1.0), log(2, 1.0), log(3, 1.0)]
-    dark = [replace(run, signals=replace(run.signals, power=None)) for run in runs]
-    workflow.run(data_sets.write(tmp_path / "logs", ROBOT, dark), tmp_path / "workspace")
-    said = refused("arm_2", new_log(tmp_path, replace(dark[0], name="more")), "--workspace", tmp_path / "workspace")
-    assert said == "irtwin: arm_2: no run outside the fit has measured power to judge by; log power"
+def test_without_power_there_is_nothing_to_judge_by(flagged: tuple[Path, list[str], list[str]]) -> None:
+    twin = plans.robot_twin("arm_2", Location(flagged[0] / "workspace"))
+    dark = replace(measure(ROBOT, swing(ROBOT, 1)), power=None)
+    with pytest.raises(InputError, match="arm_2: no run outside the fit has measured power to judge by; log power"):
+        _worst(twin, [dark])

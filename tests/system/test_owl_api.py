@@ -51,9 +51,9 @@ def rdf_xml(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", params=[NEWEST, *OLDER])
-def answers(request: pytest.FixtureRequest, rdf_xml: Path) -> dict[str, dict]:
+def answers(request: pytest.FixtureRequest) -> dict[str, dict]:
     """What one version says of each file."""
-    place = rdf_xml if request.param == "3.4" else folder("ontology")
+    place = request.getfixturevalue("rdf_xml") if request.param == "3.4" else folder("ontology")
     done = check(request.param, *(place / name for name in FILES))
     assert done.returncode == 0, done.stderr
     found = {str(Path(file).relative_to(place)): answer for file, answer in json.loads(done.stdout).items()}
