@@ -83,7 +83,9 @@ ROBOTS = {"one joint": arm(1), "a gantry": gantry(), "a gantry without masses": 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot", ["one joint", pytest.param("a gantry", marks=pytest.mark.nightly), "a gantry without masses"]
+)
 @pytest.mark.parametrize("lacking", ["power", "torque"])
 def test_small_robots_are_diagnosed(robot, lacking, tmp_path):
     made = runs(ROBOTS[robot], 2, **{lacking: nothing})
