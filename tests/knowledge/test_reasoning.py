@@ -61,6 +61,16 @@ ALARMS = {
         ("irt:raised_by_Rule", "https://w3id.org/irtwin/rules/twin_alarm"),
     )
 }
+ACTIONS = {
+    (f"id:saving_action/{robot}/switch_off_while_waiting", name, value)
+    for robot in ("Arm_A", "Arm_B")
+    for name, value in (
+        ("rdf:type", "irt:Saving_Action"),
+        ("irt:saves_at", f"id:robot/{robot}"),
+        ("irt:called_for_by", f"id:robot/{robot}"),
+        ("irt:applies_Remedy", "https://w3id.org/irtwin/remedy/switch_off_while_waiting"),
+    )
+}
 REASON = "the twin misses the energy of this run by 12 %, more than 10 %; identify it again"
 
 
@@ -81,7 +91,7 @@ def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
 
 def test_rules_conclude_what_is_known_of_two_robots(reasoned: KnowledgeGraph) -> None:
     links = short({one for one in reasoned.triples(GRAPH_SHACL) if not isinstance(one.object, Literal)})
-    assert links == CONCLUSIONS | DOMINANT | ALARMS
+    assert links == CONCLUSIONS | DOMINANT | ALARMS | ACTIONS
     said = {one for one in short(reasoned.triples(GRAPH_SHACL)) - links if "twin_alarm/Arm_A" in one[0]}
     assert said == {
         ("id:twin_alarm/Arm_A.check_1", "irt:Alarm_Since", "2026-03-02T09:00:00Z"),

@@ -15,7 +15,7 @@ from irtwin.serve import description, graph_store, negotiation, page
 from irtwin.serve.answer import Replies, Reply
 from irtwin.serve.asking import Asking
 from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
-from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
+from irtwin.serve.protocol import Operation, Refusal, read_body, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
@@ -86,16 +86,7 @@ class Endpoint:
         return await asyncio.to_thread(change, parameters, *sent)
 
     async def _body(self, request: Request) -> bytes:
-        body = bytearray()
-        try:
-            async with asyncio.timeout(self._limits.seconds):
-                async for piece in request.stream():
-                    body += piece
-                    if len(body) > self._limits.request:
-                        raise Refusal(413, f"a request has at most {self._limits.request:,} bytes")
-        except TimeoutError:
-            raise Refusal(408, "the request did not come in time") from None
-        return bytes(body)
+        return await read_body(request, self._limits.request, self._limits.seconds)
 
     async def _respond(self, operation: Operation | None, request: Request, send: Send) -> None:
         try:

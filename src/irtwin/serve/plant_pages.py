@@ -1,4 +1,4 @@
-"""/, /robot/NAME, /run/NAME, /compare and /tables: the plant as a person reads it, made of answers of the workers."""
+"""/, /robot/NAME, /run/NAME, /compare, /tables, /saving: the plant as a person reads it, by answers of the workers."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from typing import Any
 
 from pyoxigraph import NamedNode
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
+from irtwin.report.plant import actions, choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.paging import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion
 from irtwin.serve.asking import Asking, Bindings
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.pool import Limits
+from irtwin.serve.protocol import Refusal, read_body
 from irtwin.serve.report_files import ReportFiles
+from irtwin.serve.saving_form import KNOWN, read_form
 from irtwin.serve.standing import noted
+from irtwin.serve.updates import Updates
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
 POLICY = (
@@ -36,8 +39,9 @@ WITH_CURVES = POLICY.replace(
 class PlantPages:
     """The pages of a workspace, asked of its workers."""
 
-    def __init__(self, workspace: Path, asking: Asking, reports: ReportFiles) -> None:
+    def __init__(self, workspace: Path, asking: Asking, reports: ReportFiles, updates: Updates, limits: Limits) -> None:
         self._workspace, self._asking, self._reports = workspace, asking, reports
+        self._updates, self._limits = updates, limits
         self._links = links.links(asking.base)
 
     def routes(self) -> list[Route]:
@@ -48,12 +52,14 @@ class PlantPages:
             "/run/{name}": self._run,
             "/compare": self._compare,
             "/tables/robots.{form}": self._robots_table,
+            "/tables/actions.{form}": self._actions_table,
             "/tables/made.{form}": self._made_table,
             "/tables/runs.{form}": self._runs_table,
             "/tables/ledger.{form}": self._ledger_table,
             "/tables/comparison.{form}": self._comparison_table,
         }
-        return [Route(path, page, methods=["GET"]) for path, page in pages.items()]
+        done = Route("/saving", self._done, methods=["POST"])
+        return [*(Route(path, page, methods=["GET"]) for path, page in pages.items()), done]
 
     async def _plant(self, request: Request) -> Response:
         asked, wrong = self._chosen(request)
@@ -63,7 +69,9 @@ class PlantPages:
 
         def drawn() -> str:
             plant = overview.overview(answers, asked)
-            return page.render("page.html.jinja", answers, {}, found=plant, reports=self._reports.names(), **values)
+            beside = {"actions": actions.actions(answers, asked), "writable": self._updates.allowed}
+            names = self._reports.names()
+            return page.render("page.html.jinja", answers, {}, found=plant, reports=names, **beside, **values)
 
         return await html(drawn)
 
@@ -113,6 +121,21 @@ class PlantPages:
             return choice.choice(request.query_params), ""
         except InputError as error:
             return choice.ALL, str(error)
+
+    async def _actions_table(self, request: Request) -> Response:
+        asked, _ = self._chosen(request)
+        known = {name: page.questions()[name] for name in ("robots", "actions", "before_and_after")}
+        answers = await self._asking.answers(request, known, {})
+        return await table(request, "actions", lambda: actions.actions_sheet(actions.actions(answers, asked)))
+
+    async def _done(self, request: Request) -> Response:
+        """Keep that an action was done, and lead back to the list."""
+        said = read_form(await read_body(request, self._limits.request, self._limits.seconds))
+        self._updates.admit(said.authorization)
+        if not await self._asking.holds(request, KNOWN, {"action": said.action}):
+            raise Refusal(404, f"the graph knows no saving action {said.action}")
+        await self._updates.do(said.operation, self._asking.base, said.authorization, said.author)
+        return RedirectResponse("/#saving", status_code=303)
 
     async def _made_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, {"made": page.questions()["made"]}, {})

@@ -170,7 +170,7 @@ def application(
     resources = checked(location.folder)
     asking = Asking(pool, updates, limits, base)
     reports = ReportFiles(location.folder)
-    plant = PlantPages(location.folder, asking, reports)
+    plant = PlantPages(location.folder, asking, reports, updates, limits)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

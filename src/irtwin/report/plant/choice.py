@@ -8,7 +8,7 @@ from datetime import date
 from urllib.parse import urlencode
 
 from irtwin.errors import InputError
-from irtwin.report.questions import PageQuestion
+from irtwin.report.questions import PageQuestion, Row
 
 GROUPS = ("cell", "line", "type", "manufacturer")  # cell and line as the data sets' notes say them
 SORTS = {  # of a line, by what a form calls it; the greatest first
@@ -34,9 +34,9 @@ class Selection:
         names = {"from": self.first, "to": self.last, "find": self.find, "group": self.group, "sort": self.sort}
         return urlencode({name: value for name, value in names.items() if value})
 
-    def finds(self, *texts: str | None) -> bool:
-        """Whether one of the texts holds what is looked for."""
-        return any(self.find.lower() in (text or "").lower() for text in texts)
+    def finds(self, robot: Row) -> bool:
+        """Whether a row of `robots.rq` holds what is looked for, in its name or in what robots are grouped by."""
+        return any(self.find.lower() in (robot[place] or "").lower() for place in ("name", *GROUPS))
 
     def of_days(self, questions: Mapping[str, PageQuestion]) -> dict[str, PageQuestion]:
         """Return a page's questions, those of energy narrowed to the runs that began on the days."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from irtwin.report.plant.choice import ALL, GROUPS, Selection
+from irtwin.report.plant.choice import ALL, Selection
 from irtwin.report.plant.energies import KINDS, Days, EnergyKind, added_up, by_day, days, kind, kwh, share
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
@@ -171,7 +171,7 @@ def _groups(answers: Answers, asked: Selection) -> list[Group]:
     beside = _Beside(answers)
     lines: dict[EnergyKind | None, list[RobotLine]] = {}
     for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
-        if not asked.finds(robot["name"], *(robot[name] for name in GROUPS)):
+        if not asked.finds(robot):
             continue
         of_group = (robot[asked.group] or "not said") if asked.group else ""
         for energy in known.get(robot["robot"], [None]):

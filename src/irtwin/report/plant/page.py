@@ -12,6 +12,7 @@ from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.report.plant import choice, links, paging
 from irtwin.report.plant.energies import kwh
+from irtwin.report.plant.verification import FEWEST
 from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
@@ -45,6 +46,9 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: A
             "tariff": next(iter(rows.get("tariff", ())), None),
             "graph_stands": None,
             "curves": None,
+            "actions": (),
+            "writable": False,
+            "fewest": FEWEST,
             "asked": choice.ALL,
             "groups": choice.GROUPS,
             "sorts": choice.SORTS,

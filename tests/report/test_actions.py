@@ -1,0 +1,93 @@
+"""The list of what is to be done to save: its order, its states, the runs between two changes, its table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from tests import plants
+
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.plant import overview, page
+from irtwin.report.plant.actions import actions, actions_sheet
+from irtwin.report.plant.choice import Selection
+from irtwin.report.questions import Answer, Answers, PageQuestion, ask
+
+
+def answered(rows: dict[str, list[dict[str, Any]]]) -> Answers:
+    return {name: Answer(PageQuestion(name, "", (), ""), tuple(of)) for name, of in rows.items()}
+
+
+def action(robot: str, what: str, done_on: str | None = None, year_j: float | None = None) -> dict[str, Any]:
+    said = {"action": f"id:{robot}/{what}", "robot": robot, "name": robot, "what": what, "place": "", "advice": None}
+    return {**said, "year_j": year_j, "run_j": None, "done_on": done_on, "by": "anna" if done_on else None}
+
+
+def run(robot: str, day: str, energy_j: float) -> dict[str, Any]:
+    made = {"time_s": 3600.0, "pieces": None, "cycles": None, "product": None, "payload_kg": None}
+    return {"robot": robot, "day": day, "energy_j": energy_j, **made}
+
+
+ROBOT = {"cell": None, "line": None, "type": None, "manufacturer": None}
+LEVELS = {"2026-01-10": 100.0, "2026-02-10": 90.0, "2026-03-10": 60.0}
+ANSWERS = answered(
+    {
+        "robots": [{"robot": name, "name": name, **ROBOT} for name in ("A", "B")],
+        "actions": [
+            action("A", "small", year_j=1.0),
+            action("A", "first", "2026-02-01"),
+            action("A", "second", "2026-03-01"),
+            action("B", "large", year_j=5.0),
+            action("B", "done", "2026-02-20"),
+        ],
+        "before_and_after": [run("A", day, level + off) for day, level in LEVELS.items() for off in (-1.0, 0.0, 1.0)],
+    }
+)
+
+
+def test_proposals_come_first_and_the_greatest_of_them() -> None:
+    found = actions(ANSWERS)
+    assert [one.row["what"] for one in found] == ["large", "small", "second", "done", "first"]
+    assert [one.state for one in found] == [
+        "proposed", "proposed", "done, verified", "done, too few runs", "done, verified"
+    ]  # fmt: skip
+    assert [one.row["name"] for one in actions(ANSWERS, Selection(find="b"))] == ["B", "B"]
+
+
+def test_a_change_is_held_against_the_runs_since_the_one_before() -> None:
+    saved = {one.row["what"]: one.saved.saved_j for one in actions(ANSWERS) if one.saved is not None}
+    assert saved == pytest.approx({"second": 3 * 30.0, "first": 3 * 10.0, "done": 0.0})
+
+
+def test_two_changes_of_one_day_are_told_together() -> None:
+    rows = [*ANSWERS["actions"].rows, action("A", "also", "2026-03-01")]
+    found = actions({**ANSWERS, **answered({"actions": rows})})
+    assert {one.row["what"]: one.others for one in found if one.others} == {"second": 1, "also": 1}
+
+
+def test_the_table_says_energies_in_kwh() -> None:
+    sheet = actions_sheet(actions(ANSWERS))
+    (second,) = [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows if row[1] == "second"]
+    assert (second["state"], second["by"], second["compared_for_each"]) == ("done, verified", "anna", "hour")
+    assert second["saved_kWh"] == pytest.approx(90.0 / 3.6e6)
+    assert {len(row) for row in sheet.rows} == {len(sheet.columns)}
+
+
+def test_a_page_lists_what_the_graph_proposes(plant: KnowledgeGraph) -> None:
+    answers = ask(plant, page.questions(), {})
+    found = overview.overview(answers)
+    html = page.render(
+        "page.html.jinja",
+        answers,
+        {},
+        found=found,
+        reports=[],
+        actions=actions(answers),
+        file="",
+        excel=True,
+        trouble="",
+    )
+    assert "What to do to save" in html and ">switch off while waiting</a>" in html
+    assert ">check the gear oil and temperature</a><small>j1</small>" in html
+    assert '<form action="/saving"' not in html and "with a token for updates" in html
+    assert plants.HOSTILE not in html
