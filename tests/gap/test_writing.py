@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from tests.gap_cases import document
 from tests.synthetic import arm
 
-from irtwin.gap.writing import _joints, _members, folded
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.gap.writing import _joints, _members, beside_unknown, folded
 
 
 def test_members_are_the_cause_and_its_rivals_each_with_its_probability():
@@ -30,3 +32,12 @@ def test_a_guess_beside_a_likely_cause_adds_no_joint_to_what_is_said_of_the_fami
     guess, other = (replace(cause, joints=(joint,), confidence=0.49) for joint in ("joint_1", "joint_2"))
     assert _joints(arm(3), [guess, replace(other, confidence=0.5)]) == ("joint_2",)
     assert _joints(arm(3), [guess, other]) == ("joint_1", "joint_2")
+
+
+def test_beside_something_unknown_a_cause_is_as_likely_as_not():
+    cause, *_ = document("ambiguous").causes
+    sure = replace(cause, confidence=0.92, evidence=replace(cause.evidence, probability_of_rivals={"backlash": 0.46}))
+    told = beside_unknown(sure, DEFAULT.criterion)
+    assert told.confidence == pytest.approx(0.5)
+    assert told.evidence.probability_of_rivals == pytest.approx({"backlash": 0.25})
+    assert told.indistinguishable_from == sure.indistinguishable_from

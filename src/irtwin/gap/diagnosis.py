@@ -99,6 +99,8 @@ class Diagnosis:
             writing.cause(robot, finding, cause, ids_of[id(cause)], self.scale, self.thresholds.criterion)
             for finding, cause in self.causes
         )
+        if self.left_open == MUCH_IS_LEFT:
+            written = tuple(writing.beside_unknown(one, self.thresholds.criterion) for one in written)
         apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
             written = tuple(writing.beside(self.simulator, one) for one in written)

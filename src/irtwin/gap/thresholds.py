@@ -78,6 +78,9 @@ class Criterion:
         _P,
         "decisions/gap-criterion.md",
     )
+    unknown_there: float = _threshold(
+        0.5, "the same where much of the gap is left, so that such an effect is there", _P, "decisions/gap-criterion.md"
+    )
 
     def visible(self, hypotheses: int) -> float:
         """Return the mean square, in units of the noise, from which so many hypotheses let an effect be likely."""

@@ -80,6 +80,14 @@ def cause(
     )
 
 
+def beside_unknown(cause: document.Cause, limits: Criterion) -> document.Cause:
+    """Return a cause where much of the gap is left: an effect that is no cause is there, and may stand for this one."""
+    part = (1 - limits.unknown_there) / (1 - limits.unknown)
+    rivals = {rival: part * chance for rival, chance in cause.evidence.probability_of_rivals.items()}
+    evidence = replace(cause.evidence, probability_of_rivals=rivals)
+    return replace(cause, confidence=part * cause.confidence, evidence=evidence)
+
+
 def findings(
     robot: Robot,
     channels: Sequence[Finding],
