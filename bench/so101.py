@@ -5,8 +5,9 @@
 FOLDER: a data set of commands and positions without torque (`docs/LOG_FORMAT.md`); MODEL.xml: its model in MuJoCo.
 Three splits are measured. "within": the eight motions whose commands go farthest are fitted, so that the others lie
 within what was seen. "first": the first eight are. Each is fitted, written into the model's file, read back and played
-on the motions that are left. "halves": what is named on each half of the motions. Then the model is changed by numbers
-that are known, played, and diagnosed, and so is the model itself.
+on the motions that are left, and on these until the gripper first lies on the table. "halves": what is named on each
+half of the motions. Then the model is changed by numbers that are known, played, and diagnosed, and so is the model
+itself.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import mujoco
 import numpy as np
 
 from irtwin.signals.log import DataSet, Run, read_data_set
@@ -27,6 +29,7 @@ from irtwin.simulator.playing import Playing, diagnose
 from irtwin.simulator.servos import NAMES, Servos, servos
 
 _FITTED = 8
+_SITE, _TABLE = "gripperframe", -0.038  # m, below which the gripper is when it cannot go on down
 _NOISE = 1e-3  # rad, of positions that are made
 _CHANGES = (  # number, joint, what it is times the model's, or more than it
     (),
@@ -55,10 +58,12 @@ def split(data_set: DataSet, model: Model, names: Sequence[str]) -> None:
         file = Path(folder) / "robot.xml"
         file.write_bytes(found.written())
         own = servos(read_model(file, data_set.robot))
-        left = {run.name: _left(own, run) for run in data_set.runs if run.name not in names}
+        others = [run for run in data_set.runs if run.name not in names]
+        left, clear = ({run.name: _left(own, run, until) for run in others} for until in (False, True))
     print(f"  {took:.0f} s; fitted {', '.join(names)}")
-    print("  " + ", ".join(f"{name} {rms:.1f}" for name, rms in left.items()))
-    print(f"  median {np.median(list(left.values())):.1f}, worst {max(left.values()):.1f} mrad")
+    for said, found_left in (("whole", left), ("until the table", clear)):
+        print(f"  {said}: " + ", ".join(f"{name} {rms:.1f}" for name, rms in found_left.items()))
+        print(f"  median {np.median(list(found_left.values())):.1f}, worst {max(found_left.values()):.1f} mrad")
 
 
 def halves(data_set: DataSet, model: Model) -> None:
@@ -118,9 +123,20 @@ def _of(data_set: DataSet, names: Sequence[str]) -> DataSet:
     return replace(data_set, runs=tuple(run for run in data_set.runs if run.name in names))
 
 
-def _left(own: Servos, run: Run) -> float:
+def _left(own: Servos, run: Run, until_table: bool = False) -> float:
     left = run.signals.q - play(own, [own.numbers], [whole(run)])[0][0][:, 0]
-    return 1e3 * float(np.sqrt((left**2).mean()))
+    return 1e3 * float(np.sqrt((left[: _touches(own.model, run) if until_table else None] ** 2).mean()))
+
+
+def _touches(model: Model, run: Run) -> int | None:
+    """Return the first row at which the gripper lies on the table, if any does."""
+    data = mujoco.MjData(model.compiled)
+    for row, q in enumerate(run.signals.q):
+        data.qpos[model.positions] = q
+        mujoco.mj_kinematics(model.compiled, data)
+        if data.site(_SITE).xpos[2] < _TABLE:
+            return row
+    return None
 
 
 def main() -> None:

@@ -35,6 +35,7 @@ MODEL = """<mujoco model="arm">
   </actuator>
 </mujoco>
 """
+STOPPED = MODEL.replace('name="lift"', 'name="lift" limited="true" range="-1.2 1.2"')  # what falls ends there
 _LINK = """<link name="{}"><inertial><origin xyz="0.1 0 0"/><mass value="{}"/>
 <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>"""
 _JOINT = """<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><origin xyz="{} 0 0"/>

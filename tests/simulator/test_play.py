@@ -59,3 +59,12 @@ def test_a_joint_by_itself_plays_nearly_as_the_whole_model(tmp_path):
     far = max(np.abs(one.measured - own_).max() for one, own_ in zip(stretches, whole_, strict=True))
     near = max(np.abs(one - other).max() for one, other in zip(single, whole_, strict=True))
     assert near < 0.02 < far
+
+
+def test_a_joint_by_itself_stops_where_the_model_has_a_stop(tmp_path):
+    told = {"a": servo_arm.swings(6, 1)}
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, told, text=servo_arm.STOPPED))
+    numbers = servo_arm.changed(own, torque_limit=(0.3, own.numbers[7, 1]))
+    stretches = each(servo_arm.played(data_set, own, numbers, noise=0.0).runs[0], 1.0, 3)
+    single = alone(own, stretches, 0.005).play([numbers])[0]
+    assert max(np.abs(one.measured - other).max() for one, other in zip(stretches, single, strict=True)) < 0.05

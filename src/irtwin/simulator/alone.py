@@ -85,6 +85,7 @@ class Alone:
         inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
         gives = step * inverse / (1 + step * damping * inverse)
         held_force, held_speed = inverse / (inverse + soft), back / (inverse + soft)
+        lower, upper = self._stops()
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
         followed, below, lets_move = q.copy(), -band, -friction
         moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
@@ -99,10 +100,24 @@ class Alone:
             held = force * held_force[row] + held_speed[row] * v
             force -= np.minimum(np.maximum(held, lets_move), friction)
             v += force * gives[row]
-            q += step * v
+            before, q = q, np.minimum(np.maximum(q + step * v, lower), upper)
+            v = (q - before) / step
             moved[row + 1, 0] = q
         moved[-1, 1:] = moved[-2, 1:]
         return moved
+
+    def _stops(self) -> np.ndarray:
+        """Return where joints stop, (2, n): at the model's ranges, or as far beyond as the robot was."""
+        compiled, dof = self.servos.model.compiled, self.servos.model.speeds
+        joints = compiled.dof_jntid[dof]
+        q = np.concatenate([one.q for one in self.stretches])
+        stops = np.array(
+            [
+                np.minimum(compiled.jnt_range[joints, 0], q.min(axis=0)),
+                np.maximum(compiled.jnt_range[joints, 1], q.max(axis=0)),
+            ]
+        )
+        return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
 
 
 def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:

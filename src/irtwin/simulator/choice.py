@@ -97,7 +97,7 @@ def choose(fit: Fit) -> Choice:
         best = fit.solved(best, differs | robots, _AGAIN)
     if differs.any():
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
-        best = fit.solved(best, differs | robots, _AGAIN)
+        fit, best, differs = _given_back(fit, fit.solved(best, differs | robots, _AGAIN))
     odds = np.full(differs.shape, -np.inf)
     for part in (one for one in _PARTS if (one & robots).any()):  # beside few numbers it shows whether it is needed
         back = _without(fit, best, part, differs | robots)

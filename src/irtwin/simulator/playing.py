@@ -18,11 +18,12 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import Choice, choose
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
-from irtwin.simulator.play import Stretch, each
+from irtwin.simulator.play import Stretch, each, play
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
+_FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls; s, of its stretches
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
@@ -70,7 +71,9 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     for line in _clipped(own, runs):
         tell(line)
     tell("Fitting numbers of servos")
-    stretches = _stretches(runs)
+    stretches = _stretches(runs, _LASTS)
+    if _falls(own, stretches):
+        stretches = _stretches(runs, _BRIEF)
     step = max(_STEP, model.compiled.opt.timestep)
     chosen = choose(unjudged(alone(own, stretches, step)))
     tell("Playing all runs")
@@ -87,11 +90,18 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     )
 
 
-def _stretches(runs: Sequence[Run]) -> list[Stretch]:
+def _stretches(runs: Sequence[Run], lasts: float) -> list[Stretch]:
     most = max(1, round(_STRETCHES / len(runs)))
     alone = runs[0].signals.time if len(runs) == 1 else None
-    lasts = _LASTS if alone is None else min(_LASTS, float(alone[-1] - alone[0]) / _LEAST)
+    lasts = lasts if alone is None else min(lasts, float(alone[-1] - alone[0]) / _LEAST)
     return [one for run in runs for one in each(run, lasts, most)]
+
+
+def _falls(own: Servos, stretches: Sequence[Stretch]) -> bool:
+    """Return whether the robot ends far from its model: too far for slopes to say which number does that."""
+    moved = play(own, [own.numbers], stretches)[0]
+    left = [one.q - played[:, 0] for one, played in zip(stretches, moved, strict=True)]
+    return bool(max(np.sqrt((one**2).mean(axis=0)).max() for one in left) > _FALLEN)
 
 
 def _check_commands(run: Run, robot: Robot) -> None:

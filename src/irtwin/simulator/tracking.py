@@ -67,13 +67,13 @@ class Parts:
         return np.asarray((squares / np.maximum(self.before.mean(axis=(0, 2)), _NONE)[:, None]).sum(axis=(1, 2)))
 
     def closed(self, names: Sequence[str], of: Sequence[Sequence[str]]) -> np.ndarray:
-        """Return what some names close (G,), summed over joints, averaged over the orders in which parts `of` join."""
-        others, found = [part for part in of if part != names], np.zeros(len(self.before))
+        """Return the mean squares (G, c, n) that some names close, on average over orders in which parts `of` join."""
+        others, found = [part for part in of if part != names], np.zeros_like(self.before)
         for count in range(len(others) + 1):
             weight = factorial(count) * factorial(len(others) - count) / factorial(len(of))
             for some in combinations(others, count):
                 there = frozenset(name for part in some for name in part)
-                found += weight * self.relative(self.squares[there] - self.squares[there | set(names)])
+                found += weight * (self.squares[there] - self.squares[there | set(names)])
         return found
 
 

@@ -75,7 +75,7 @@ def document(
     squares = [np.array([one.squares for one in some]) for some in (before, after)]
     names = sorted(parts.names, key=lambda name: -parts.relative(parts.without(name)).sum())
     causes = _causes(robot, chosen, parts, names)
-    findings = _findings(robot, dict(zip(names, causes, strict=True)), parts)
+    findings = _findings(robot, dict(zip(names, causes, strict=True)), parts, chosen.fit.floor)
     named = any(finding.matters for finding in findings)
     places, torques = [one[:, 0] for one in squares], [one[:, 1:] for one in squares]
     closed, interval = share((places[0] - places[1]).sum(axis=1), places[0].sum(axis=1))
@@ -238,13 +238,16 @@ def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:
     )
 
 
-def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> tuple[said.Finding, ...]:
-    """Return the causes by family, the one that closes most first."""
+def _findings(
+    robot: Robot, causes: Mapping[str, said.Cause], parts: Parts, floor: np.ndarray
+) -> tuple[said.Finding, ...]:
+    """Return the causes by family, the one that closes most first; `floor` (c, n) as of the fit."""
     of, whole = families(parts.names), parts.relative(parts.before)
     found = []
     for some in of:
         own = [cause for name, cause in causes.items() if name in some]
-        value, interval = share(parts.closed(some, of), whole)
+        closed = parts.closed(some, of)
+        value, interval = share(parts.relative(closed), whole)
         family = effects()[some[0]][1]
         on = tuple(joint for joint in robot.joint_names if any(joint in cause.joints for cause in own))
         found.append(
@@ -258,7 +261,7 @@ def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> t
                 share=value,
                 share_interval95=interval,
                 share_of=_SHARE_OF[parts.before.shape[1] - 1],
-                matters=value >= DEFAULT.matters.share,
+                matters=_matters(closed.mean(axis=0), parts.before.mean(axis=0), floor),
                 members=tuple(
                     said.Member(cause=one.id, effect=one.effect, family=family, confidence=one.confidence)
                     for one in own
@@ -266,6 +269,15 @@ def _findings(robot: Robot, causes: Mapping[str, said.Cause], parts: Parts) -> t
             )
         )
     return tuple(sorted(found, key=lambda one: -one.share))
+
+
+def _matters(closed: np.ndarray, before: np.ndarray, floor: np.ndarray) -> bool:
+    """Return whether mean squares `closed` (c, n) are at any joint enough of its gap, and more than noise.
+
+    A wrist is off by less than a shoulder: of all joints' error together its own can be a hundredth.
+    """
+    enough = closed >= DEFAULT.matters.share * before
+    return bool((enough & (closed >= (DEFAULT.matters.floors * floor) ** 2)).any())
 
 
 def _rms(squares: np.ndarray) -> float:
