@@ -82,9 +82,9 @@ class Case:
     torque: bool  # whether it is logged
 
 
-def plans(count: int, torque: bool) -> Iterator[Case]:
+def plans(count: int, torque: bool, split: int = 0) -> Iterator[Case]:
     """Yield cases in an order that tells nothing: nulls, pairs, and else one difference."""
-    seed = SEED + 1_000_000 * torque
+    seed = SEED + 1_000_000 * torque + 10_000_000 * split
     rng = np.random.default_rng(seed)
     nulls, pairs = round(NULLS * count), round(PAIRS * count)
     counts = rng.permutation([0] * nulls + [2] * pairs + [1] * (count - nulls - pairs))

@@ -1,9 +1,9 @@
-"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque]`: make sealed cases, then diagnose and score them.
+"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1]`: make sealed cases, then judge them.
 
 MODELS is where `pip download --no-deps robosuite gymnasium-robotics -d MODELS` put its wheels. The first call makes the
 cases, writes `labels.json` in FOLDER_labels and prints its SHA-256: commit that. The second diagnoses those that are
-not yet diagnosed, one after another, and writes `RESULTS_COMMANDED.md`, or where torque is logged, too,
-`RESULTS_COMMANDED_TORQUE.md`.
+not yet diagnosed, one after another, and writes `page.md` beside the labels. What was found stands in
+`RESULTS_COMMANDED.md`, and where torque was logged, too, in `RESULTS_COMMANDED_TORQUE.md`.
 """
 
 from __future__ import annotations
@@ -32,14 +32,13 @@ EFFECTS = {  # what each kind is called by a diagnosis
     "stiffness": "servo_stiffness", "payload": "payload", "delay": "command_delay", "backlash": "servo_dead_band",
     "torque_limit": "servo_torque_limit", "offset": "command_offset", "tilt": "base_tilt",
 }  # fmt: skip
-OUT = Path(__file__).parents[1]
 Label = Mapping[str, Any]
 
 
-def seal(models: Path, folder: Path, count: int, torque: bool) -> None:
+def seal(models: Path, folder: Path, count: int, torque: bool, split: int = 0) -> None:
     """Make the cases and apart their labels; print the checksum of these."""
     made, joints = {}, {}
-    for case in plans(count, torque):
+    for case in plans(count, torque, split):
         made[case.name] = case, make(case, models, folder)
         joints[case.name] = read_arm(models, case.arm).joints
         print(f"made {case.name}", flush=True)
@@ -144,10 +143,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--torque", action="store_true", help="log the servos' torque, too")
+    parser.add_argument("--split", type=int, default=0, help="which cases: others by each number")
     arguments = parser.parse_args()
     file = Path(f"{arguments.folder}_labels") / "labels.json"
     if not file.exists():
-        seal(arguments.models, arguments.folder, arguments.count, arguments.torque)
+        seal(arguments.models, arguments.folder, arguments.count, arguments.torque, arguments.split)
         return
     told, found = json.loads(file.read_text(encoding="utf-8")), {}
     for name in told:
@@ -160,8 +160,7 @@ def main() -> None:
                 continue
         found[name] = json.loads(out.read_text(encoding="utf-8"))
         print(name, score(told[name], found[name]), found[name]["left"], flush=True)
-        name_of_page = "RESULTS_COMMANDED_TORQUE.md" if arguments.torque else "RESULTS_COMMANDED.md"
-        (OUT / name_of_page).write_text(page(told, found, _sum(file)), encoding="utf-8")
+        file.with_name("page.md").write_text(page(told, found, _sum(file)), encoding="utf-8")
 
 
 if __name__ == "__main__":

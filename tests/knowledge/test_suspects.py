@@ -30,7 +30,8 @@ SHAPES = {  # what a shape says of ex:C and the shapes it names
     "node": "sh:property [ sh:path ex:p ; sh:node ex:small ] . ex:small a sh:NodeShape ; sh:maxInclusive 1 .",
     "beside": "sh:property [ sh:path ex:p ; sh:lessThan ex:q ] .",
     "either": "sh:or ( [ sh:class ex:E ] [ sh:property [ sh:path ex:p ; sh:minExclusive 1 ] ] ) .",
-    "pattern, which is not known": 'sh:property [ sh:path ex:p ; sh:pattern "^a" ] .',
+    "pattern": 'sh:property [ sh:path ex:p ; sh:pattern "^a" ] .',
+    "flags, which are not known": 'sh:property [ sh:path ex:p ; sh:pattern "^A" ; sh:flags "i" ] .',
     "query": """sh:sparql [ sh:message "no p" ;
         sh:select "SELECT $this WHERE { $this a ?kind FILTER NOT EXISTS { $this <https://example.org/p> ?v } }" ] .""",
 }

@@ -122,6 +122,8 @@ class _Writer:
             return f"{node} {_COMPARED[name]} {value}"
         if name == "minLength" and isinstance(value, Literal):
             return f"(!isBlank({node}) && STRLEN(STR({node})) >= {value})"
+        if name == "pattern" and isinstance(value, Literal):  # with `flags` it is not known
+            return f"(!isBlank({node}) && REGEX(STR({node}), {value}))"
         raise _Unknown(name)
 
     def _of_values(self, shape: Node, node: str) -> Iterator[str]:
