@@ -24,6 +24,7 @@ SERVED = (
     "robot",
     "run",
     "sparql",
+    "saving",
     "tables",
 )
 _IRI = re.compile(r"[^\x00-\x20<>\"{}|\\^`?#%]+")
