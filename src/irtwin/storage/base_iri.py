@@ -23,8 +23,8 @@ SERVED = (
     "reports",
     "robot",
     "run",
-    "sparql",
     "saving",
+    "sparql",
     "tables",
 )
 _IRI = re.compile(r"[^\x00-\x20<>\"{}|\\^`?#%]+")
