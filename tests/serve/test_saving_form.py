@@ -52,7 +52,7 @@ def writable(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 @pytest.mark.slow
-def test_what_was_done_is_kept_with_its_author_and_taken_back(writable: Server) -> None:
+def test_what_was_done_is_kept_with_its_author(writable: Server) -> None:
     def post(**said: str) -> httpx.Response:
         headers = {"Content-Type": "application/x-www-form-urlencoded"}
         return CLIENT.post(f"{writable.url}/saving", content=form(token=TOKEN, **said), headers=headers, timeout=300)
@@ -66,8 +66,6 @@ def test_what_was_done_is_kept_with_its_author_and_taken_back(writable: Server) 
     assert "0 runs before, 1 after" in page and '<form action="/saving" method="post"' in page
     table = CLIENT.get(f"{writable.url}/tables/actions.csv").text
     assert 'switch off while waiting,,"done, too few runs",2026-03-02,Anna <b>' in table
-    assert post(day="").status_code == 303
-    assert "done 2026-03-02" not in CLIENT.get(f"{writable.url}/").text
 
 
 @pytest.mark.slow
