@@ -11,6 +11,8 @@ import pytest
 from tests.endpoint import CLIENT, TOKEN, Server, serving
 from tests.plants import make_plant
 
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.saving_form import read_form
 
@@ -25,8 +27,14 @@ def form(**said: str) -> bytes:
 def test_a_day_replaces_the_one_before_and_none_takes_it_back() -> None:
     said = read_form(form())
     assert (said.author, said.authorization) == ("anna", "Bearer t")
-    assert '"2026-03-02"' in said.operation.text
-    assert "Done_On" not in read_form(form(day="")).operation.text
+    graph = KnowledgeGraph()
+    proposed = f"<{ACTION}> a irt:Saving_Action ; irt:saves_at id:robot\\/Arm_A ; irt:applies_Remedy <urn:off>"
+    graph.update(f"INSERT DATA {{ GRAPH <urn:rules> {{ {proposed} }} }}")
+    days = f"SELECT ?day {{ <{ACTION}> irt:Done_On ?day }}"
+    for day, told in (("2026-03-01", ["2026-03-01"]), ("2026-03-02", ["2026-03-02"]), ("", [])):
+        graph.update(read_form(form(day=day)).operation.text)
+        assert [row["day"] for row in graph.query(days).rows] == told
+    assert len(graph.triples(GRAPH_ASSERTED)) == 0 and len(graph.triples("urn:rules")) == 3
 
 
 @pytest.mark.parametrize(

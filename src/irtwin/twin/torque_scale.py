@@ -84,10 +84,9 @@ def _degree(part: str) -> int:
 def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -> TorqueScale | None:
     """Return how sure the scale is by what the data set states, and by power where that tells more.
 
-    motions: filtered alike, of which some have a torque, else None; torque: the real joint torque, (N, n) N m, of each
-    that explains what was logged. Power counts where
-    it was measured on the DC bus: that of the mains holds the efficiency of a supply. Nor does it count twice: where
-    the runs say no torque, power told the torque constants.
+    motions: filtered alike; None where none has a torque. torque: the real joint torque, (N, n) N m, of each that
+    explains what was logged. Power counts where it was measured on the DC bus: that of the mains holds the efficiency
+    of a supply. Nor does it count twice: where the runs say no torque, power told the torque constants.
     """
     if not any(motion.torque is not None for motion in motions):
         return None
