@@ -46,6 +46,20 @@ def test_noise_of_encoders_does_not_drown_the_acceleration():
     assert relative(found.ddq[inner], motion.ddq[inner]) < 0.02
 
 
+@pytest.mark.parametrize("step", [1e-7, 1e-4, 4e-4])
+def test_a_joint_stands_where_it_does_not_move_and_not_between_two_steps_of_its_encoder(step):
+    time = np.arange(0, 12, 1e-3)
+    moved = np.interp(time, [0, 3, 6, 9, 12], [0, 0.03, 0.03, 0.5, 0.5])  # 10 mrad/s, rest, 157 mrad/s, rest
+    moved[time > 9] += step * (np.arange((time > 9).sum()) % 2)  # the encoder flickers
+    motion = swing(arm(1), 5, seconds=12, rate=1000.0)
+    found = condition(as_run(replace(motion, q=np.round(moved[:, None] / step) * step)), arm(1)).standing[:, 0]
+    margin = 0.5 + step / 2e-3
+    rests = [(time > start + margin) & (time < stop - margin) for start, stop in ((3, 6), (9, 12))]
+    moves = [(time > start + margin) & (time < stop - margin) for start, stop in ((0, 3), (6, 9))]
+    assert all(found[inside].all() for inside in rests)
+    assert not any(found[inside].any() for inside in moves)
+
+
 @pytest.mark.slow
 @settings(max_examples=10)
 @given(jitter=st.floats(0, 0.3), seed=st.integers(0, 100))

@@ -24,6 +24,7 @@ _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is cho
 _STATES = ("q", "dq", "ddq")
 _STATES_WIDER = 3.0  # what is below the cutoff then passes unchanged
 _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
+_SAME = 1e-9  # rad or m: positions that differ by less are one
 STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
@@ -68,7 +69,7 @@ def condition(
         dq,
         ddq,
         run=run.name,
-        standing=_standing(interpolated(signals.time, signals.q, time), rate),
+        standing=_standing(interpolated(signals.time, signals.q, time), signals.q, rate),
         payload_mass=run.payload_mass,
         payload_com=run.payload_com,
         cutoff=cutoff,
@@ -108,9 +109,27 @@ def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
     return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5).derivative()(time))
 
 
-def _standing(q: np.ndarray, rate: float) -> np.ndarray:
-    """Return where unfiltered positions (N, n) do not move: a filter would lend them their surroundings' speed."""
-    return np.asarray(np.abs(np.gradient(q, axis=0)) * rate < STANDSTILL)
+def _standing(q: np.ndarray, logged: np.ndarray, rate: float) -> np.ndarray:
+    """Return where unfiltered positions (N, n) do not move: a filter would lend them their surroundings' speed.
+
+    They are watched for as long as a joint at `STANDSTILL` takes for a step of its encoder, by the positions (M, n) as
+    `logged`: between two steps, slow motion looks like rest.
+    """
+    found = np.zeros(q.shape, dtype=bool)
+    for joint, positions in enumerate(q.T):
+        half = round(_step(logged[:, joint]) / STANDSTILL * rate / 2) + 1
+        lowest, highest = (
+            extreme(positions, 2 * half + 1, mode="nearest")
+            for extreme in (scipy.ndimage.minimum_filter1d, scipy.ndimage.maximum_filter1d)
+        )
+        found[:, joint] = highest - lowest < STANDSTILL * 2 * half / rate
+    return found
+
+
+def _step(positions: np.ndarray) -> float:
+    """Return by how much two positions (N,) differ that are not the same, at least; 0 where all are the same."""
+    steps = np.diff(np.unique(positions))
+    return float(np.min(steps[steps > _SAME], initial=np.inf)) if np.any(steps > _SAME) else 0.0
 
 
 def _even_time(run: Run) -> np.ndarray:
