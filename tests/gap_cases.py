@@ -184,11 +184,6 @@ def with_findings(said: dict[str, Any]) -> dict[str, Any]:
     return said | {"findings": findings_of(said["causes"])}
 
 
-def _closeable(*given: float | None) -> dict[str, Any]:
-    shares = dict(zip(("closed", "closeable", "by_regression", "nameless"), given, strict=True))
-    return shares | {"of": "the gap above the floor"}
-
-
 def _by_cause(effect: str, scope: str, share: float, alone: list[float], without: list[float]) -> dict[str, Any]:
     return {
         "cause": f"{effect}@joint_a3",
@@ -218,7 +213,6 @@ def _shrink(closed: float | None, after: float, by_cause: list[dict[str, Any]]) 
         "energy_error_percent": {"before": 8.4, "after": 2.1, "noise_floor": None, "interval95_after": [1.0, 3.3]},
         "closed_fraction": None if closed is None else {"value": closed, "interval95": [closed - 0.05, closed + 0.04]},
         "by_cause": by_cause,
-        "yardstick": {"torque": _closeable(0.9, 0.95, 0.7, 0.04), "power": _closeable(None, None, None, None)},
     }
 
 
@@ -241,7 +235,6 @@ _CASES: dict[str, dict[str, Any]] = {
             "energy_error_percent": None,
             "closed_fraction": None,
             "by_cause": [],
-            "yardstick": {},
         },
         "not_testable": _UNTESTABLE,
     },

@@ -22,7 +22,6 @@ STEPS = {
     "estimate": "coefficients, weighed",
     "residual": "torque that is left of",
     "followed": "what torque follows at",
-    "closeable": "how much of torque could be closed",
 }
 
 

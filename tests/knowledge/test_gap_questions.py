@@ -112,7 +112,7 @@ def test_every_individual_says_who_made_it(diagnosed: tuple[str, KnowledgeGraph]
           VALUES ?kind { irt:Gap_Diagnosis irt:Gap_Size irt:Gap_Location irt:Gap_Disturbance
             irt:Gap_Disturbance_Quantity irt:Gap_Finding irt:Gap_Finding_Member
             irt:Gap_Cause irt:Gap_Cause_Parameter
-            irt:Gap_Competitor irt:Gap_Change irt:Gap_Shrinkage irt:Closeable_Gap irt:Untestable_Effect
+            irt:Gap_Competitor irt:Gap_Change irt:Gap_Shrinkage irt:Untestable_Effect
             irt:Next_Experiment irt:Experiment_Instruction irt:Experiment_Run irt:Experiment_Setting
             irt:Experiment_Question irt:Considered_Experiment }
           ?thing a ?kind

@@ -96,7 +96,6 @@ def shrink(run: str = "swing_3") -> dict[str, Any]:
         "energy_error_percent": None,
         "closed_fraction": {"value": 0.9, "interval95": [0.8, 1.0]},
         "by_cause": [],
-        "yardstick": {},
     }
 
 

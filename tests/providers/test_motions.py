@@ -117,7 +117,6 @@ NOTHING_CLOSED = Shrink(
     energy_error_percent=None,
     closed_fraction=None,
     by_cause=(),
-    yardstick={},
 )
 DIAGNOSIS = Document(
     verdict="attributed",

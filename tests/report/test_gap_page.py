@@ -132,14 +132,6 @@ def test_a_floor_that_no_channel_has_takes_no_column(tmp_path: Path, pages: dict
     assert "Noise floor" in with_floor and "Excess" in with_floor
 
 
-def test_the_gap_is_parted_into_causes_what_has_no_name_and_the_rest(pages: dict[str, Path]) -> None:
-    page = pages["attributed"].read_text().replace("\N{NO-BREAK SPACE}", " ")
-    assert "the causes close 90 % of the gap above the floor; another 4.0 % could be closed, but no known" in page
-    drawn = figures_of(pages["attributed"])["budget"]["data"]
-    assert [bar["x"][0] for bar in drawn] == pytest.approx([63, 27, 4, 6])
-    assert drawn[0]["name"].startswith("1. ")
-
-
 def test_the_next_experiment_is_said_and_drawn(pages: dict[str, Path]) -> None:
     page = html.unescape(pages["ambiguous"].read_text()).replace("\N{NO-BREAK SPACE}", " ")
     assert "The next experiment, to tell Stribeck friction from nonlinear viscous friction" in page

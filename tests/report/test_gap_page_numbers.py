@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import itertools
 import json
-import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -155,16 +154,6 @@ def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     alone, without = drawn["by_cause"]["data"]
     assert alone["x"] == ["1. Stribeck friction", "2. Stribeck friction"]
     assert alone["y"] == pytest.approx([0.65, 0.35]) and without["y"] == pytest.approx([5.85, 3.15])
-    assert [bar["x"][0] for bar in drawn["budget"]["data"][:2]] == pytest.approx([90 * 0.65, 90 * 0.35])
-
-
-def test_what_is_drawn_of_shares_adds_up(tmp_path: Path) -> None:
-    said = told_apart(gap_cases.diagnosis("attributed"), itertools.count())
-    page_of(tmp_path, said)
-    bars = figures_of(tmp_path / "p.html")["budget"]["data"]
-    assert math.fsum(bar["x"][0] for bar in bars) == pytest.approx(100)
-    closed = said["shrink"]["yardstick"]["torque"]["closed"]
-    assert math.fsum(bar["x"][0] for bar in bars[:2]) == pytest.approx(100 * closed)
 
 
 def without_numbers(value: Any) -> Any:

@@ -360,21 +360,6 @@ def _pooled(values: Sequence[float]) -> float:
     return math.sqrt(sum(value**2 for value in values) / len(values))
 
 
-@part("Closeable_Gap", table="gap_closeable", of="closeable_in")
-class Closeable:
-    """How much of a channel's gap could be closed at all, as shares 0 to 1 `of` something; None where there is no gap.
-
-    `closed`: by the causes, refitted to all runs; `by_regression`: by a flexible regression on the motion alone;
-    `nameless`: by one of what the causes leave; `closeable`: by the better of the two.
-    """
-
-    closed: float | None = told("Closed_By_Causes")
-    closeable: float | None = told("Closeable_At_All")
-    by_regression: float | None = told("Closed_By_Regression")
-    nameless: float | None = told("Closeable_Without_Name")
-    of: str = told("Closeable_Of", column="of_what")
-
-
 @part()
 class Shrink:
     """How far the gap shrinks on runs outside the fit: torque in N m, power in W, position in rad, energy in %."""
@@ -386,7 +371,6 @@ class Shrink:
     energy_error_percent: Change | None
     closed_fraction: ClosedFraction | None = told()
     by_cause: tuple[CauseChange, ...]
-    yardstick: Mapping[Channel, Closeable] = told("located_in_Channel")
     position_rmse: Change | None = None
 
     @property

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
 from irtwin.document.curves import Curves
-from irtwin.document.document import Closeable, Cutoff, Document, Location, Untestable, cause_ids
+from irtwin.document.document import Cutoff, Document, Location, Untestable, cause_ids
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
@@ -27,7 +27,6 @@ from irtwin.gap.isolation.finding import Finding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
-from irtwin.gap.localisation.flexible_regression import flexible_regression
 from irtwin.gap.next_experiment import next_experiment
 from irtwin.gap.not_repeating import NotRepeating, with_removed
 from irtwin.gap.regression.normal_equations import System
@@ -71,7 +70,6 @@ class Diagnosis:
     removed: tuple[Removed, ...] = ()  # what of it an effect explains
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
-    yardstick: dict[str, Closeable] = field(default_factory=dict)  # each channel's, what could be closed at all
     refusals: Refusals = NOTHING_REFUSED
     scale: TorqueScale | None = None  # of torque, where it was measured
     cutoff: Cutoff | None = None  # of the filter that all runs passed
@@ -110,9 +108,7 @@ class Diagnosis:
         causes = writing.folded(causes, found)
         judged = verdict_of(found)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
-        shrink = writing.shrink(
-            robot, self.runs, self.channels, self.floor, self.energies, ids_of, self.yardstick, self.seed
-        )
+        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, self.seed)
         return Document(
             verdict=verdict,
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
@@ -224,7 +220,6 @@ def diagnose(
         explained=[one.disturbance for one in taken],
     )
     located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
-    measures = {one.finding.name: flexible_regression(one, seed) for one in left}
     tell("Designing the next experiment")
     stacks = {"torque": search.stack, "power": search.power_stack}
     equations = channel_equations(stacks, case, search.below, torque or twin_torque)
@@ -254,7 +249,6 @@ def diagnose(
         removed=tuple(taken),
         against=case.against,
         thresholds=thresholds,
-        yardstick={name: one for name, one in measures.items() if one is not None},
         refusals=refusals,
         scale=scale,
         cutoff=case.cutoff,

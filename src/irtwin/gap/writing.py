@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from irtwin.document import document
-from irtwin.document.document import Closeable, cause_ids
+from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
@@ -195,7 +195,6 @@ def shrink(
     floor: Floor,
     energies: EnergyErrors | None,
     ids_of: Mapping[int, str],
-    yardstick: Mapping[str, Closeable],
     seed: int,
 ) -> document.Shrink:
     """Return how far the gap shrinks on runs that took no part in the fit; `ids_of` as in `findings`.
@@ -215,7 +214,6 @@ def shrink(
         by_cause=tuple(
             _by_cause(robot, finding, each, ids_of[id(each)]) for finding in findings for each in finding.causes
         ),
-        yardstick=yardstick,
     )
 
 

@@ -100,7 +100,6 @@ def document(
             energy_error_percent=None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
-            yardstick={},
             position_rmse=_together(*places),
         ),
         next_experiment=None,

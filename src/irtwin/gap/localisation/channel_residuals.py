@@ -31,8 +31,7 @@ _UNNAMED = 3  # places that no cause explains, drawn
 class ChannelResidual:
     """What the twin left of one channel in the observed runs, and what it leaves with the causes.
 
-    `before`, `after`: traces without and with the causes, and `seen` the map of the first; `refitted`: those without
-    them by a fit to all runs; `touched`: the joints that
+    `before`, `after`: traces without and with the causes, and `seen` the map of the first; `touched`: the joints that
     each cause acts on, none for the whole robot; `added`: what it adds to each trace, (N, g), and `acts` the map of all
     of it. `reference`: the map of the other runs, where the twin is the one that fits these. `level` (g, R): the mean
     square beyond which a gap lies; `least`: the share of it beyond which a run, or a gap, is worth a word.
@@ -40,7 +39,6 @@ class ChannelResidual:
 
     finding: Finding
     before: list[Trace]
-    refitted: list[Trace]
     after: list[Trace]
     touched: list[tuple[str, ...]]
     added: list[list[np.ndarray]]
@@ -84,7 +82,6 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
     return ChannelResidual(
         finding,
         before,
-        traces(case.seen, fitted_values(finding, reference=False)) if reference else before,
         after,
         [cause.touched(case.robot) for cause in finding.causes],
         added,

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from irtwin.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
-from irtwin.report.gap.verdict import effect_name, matters
+from irtwin.report.gap.verdict import matters
 from irtwin.report.questions import Answers, Row
 from irtwin.report.traces import Figure, axis, band, bars, beside, level, plain, trace
 
@@ -38,7 +38,6 @@ def figures(answers: Answers, curves: Curves) -> dict[str, Figure]:
         )
     drawn["horizons"] = horizons(answers["horizons"].rows)
     drawn["by_cause"] = by_cause(answers)
-    drawn["budget"] = budget(answers)
     if curves.experiment is not None:
         drawn["experiment"] = experiment(curves.experiment)
     return {name: figure for name, figure in drawn.items() if figure is not None}
@@ -184,37 +183,6 @@ def by_cause(answers: Answers) -> Figure | None:
     line, note = level(before, BEFORE), beside(before, "before", BEFORE, "right")
     layout = {"barmode": "group", "yaxis": axis("RMSE", unit), "shapes": [line], "annotations": [note]}
     return {"data": data, "layout": layout}
-
-
-def budget(answers: Answers) -> Figure | None:
-    """Draw where each channel's gap goes: closed by each cause, closeable without a name, and what is left."""
-    given = {row["channel"]: row for row in answers["closeable"].rows}
-    if not given:
-        return None
-    names, parts = list(given), {row["cause"]: row for row in answers["closed_by_cause"].rows}
-    data = []
-
-    def bar(name: str, of_channel: Mapping[str, float], colour: str) -> None:
-        data.append(
-            {
-                "type": "bar", "orientation": "h", "name": plain(name), "y": names, "marker": {"color": colour},
-                "x": [100 * of_channel.get(channel, 0.0) for channel in names],
-                "hovertemplate": f"{plain(name)} %{{x:.3~g}} %<extra></extra>",
-            }
-        )  # fmt: skip
-
-    for place, row in enumerate(answers["causes"].rows):
-        if closed := parts.get(row["cause"]):
-            of_channel = {closed["channel"]: closed["part"]}
-            bar(f"{place + 1}. {effect_name(row)}", of_channel, effect_colour(wording.local_name(row["effect"])))
-    bar("could be closed, cause unknown", {name: one["nameless"] for name, one in given.items()}, "#F0C9A0")
-    bar("not closed", {name: one["rest"] for name, one in given.items()}, "#C9D1D8")
-    xaxis = {"type": "linear", "range": [0, 100], "title": {"text": "part of the gap, %"}}
-    layout = {"barmode": "stack", "xaxis": xaxis, "yaxis": {"type": "category", "autorange": "reversed"}}
-    legend = {
-        "orientation": "h", "x": 0, "y": 1, "yanchor": "bottom", "xanchor": "left", "traceorder": "normal",
-    }  # fmt: skip
-    return {"data": data, "layout": {**layout, "hovermode": "closest", "bargap": 0.35, "legend": legend}}
 
 
 def experiment(curve: PlannedMotion) -> Figure:

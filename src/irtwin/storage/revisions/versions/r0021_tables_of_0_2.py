@@ -2,7 +2,6 @@
 
 revision = "0021"
 down_revision = None
-TABLES = "24aec3e6c34bbe20"  # of all columns, see tests/storage/test_migration.py
 
 
 def upgrade() -> None:
