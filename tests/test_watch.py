@@ -21,6 +21,7 @@ from irtwin.storage.database import Workspace
 from tests import rows
 from tests.data_sets import irtwin as in_this_process
 from tests.live.controller import Controller, serving
+from tests.live.opcua_robot import ServedRobot
 from tests.synthetic import arm
 from tests.trusting import trust_all
 
@@ -145,12 +146,29 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
     assert 96.0 < answer["watts"] < 144.0, asked.err
 
 
+def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
+    with Workspace(tmp_path / "w") as there:
+        ingest(there, DataSet(tmp_path, arm(6), (), None, None, "dc_bus", False, {}))
+        KnowledgeGraph(there.graph_folder).close()
+    served = ServedRobot()
+    served.start()
+    process = irtwin("live", "--opcua", served.address, "--robot", arm(6).name, "--workspace", tmp_path / "w")
+    assert process.stderr is not None
+    assert f"Following {served.address}: position (deg)" in process.stderr.readline()
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=120)
+    served.stop()
+    assert process.returncode == 0, said
+    assert int(said.partition(" samples stored")[0].rpartition("\n")[2]) > 20
+
+
 def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     for given, message in (
-        (("--rtde", "127.0.0.1:9"), "--robot goes with --replay or --rtde"),
+        (("--rtde", "127.0.0.1:9"), "--robot goes with --replay, --rtde or --opcua"),
         (
             ("--rtde", "127.0.0.1:9", "--robot", "KUKA KR6 R700", "--port", "0"),
-            "Give one of --port, --replay and --rtde.",
+            "Give one of --port, --replay, --rtde and --opcua.",
         ),
     ):
         told = in_this_process("live", *given, "--workspace", workspace)
@@ -163,11 +181,12 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--robot", "arm"], "--robot goes with --replay or --rtde"),
+        (["--robot", "arm"], "--robot goes with --replay, --rtde or --opcua"),
         (["--speed", "2"], "--speed is for --replay"),
-        (["--performs", "reach"], "--performs goes with --replay or --rtde; lines of a stream say it by themselves"),
-        (["--replay", "log.csv"], "--robot goes with --replay or --rtde"),
-        (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay and --rtde"),
+        (["--nodes", "n.toml"], "--nodes is for --opcua"),
+        (["--performs", "reach"], "--performs goes with --robot; lines of a stream say it by themselves"),
+        (["--replay", "log.csv"], "--robot goes with --replay, --rtde or --opcua"),
+        (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay, --rtde and --opcua"),
         (["--replay", "log.csv", "--robot", "arm", "--speed", "0"], "0.01<=x<=1000.0"),
     ],
 )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from irtwin.bring.unit import QUANTITIES, Unit, unit_of
 from irtwin.signals.channels import CHANNELS
+from irtwin.signals.unit import QUANTITIES, Unit, unit_of
 
 
 def word_set(text: str) -> frozenset[str]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from irtwin.bring.unit import Unit, units
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.sampling import interval
+from irtwin.signals.unit import Unit, units
 
 _BEYOND = 1.5  # times a joint's range that positions may span, and times its greatest position that they may reach
 _TURNED = 6 * np.pi  # rad: a wrist without an end counts its turns (that of a measured UR3 stood at 4 pi)

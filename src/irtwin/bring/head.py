@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.bring.unit import QUANTITIES, unit_of
+from irtwin.signals.unit import QUANTITIES, unit_of
 
 LOOKED_AT = 60  # rows that tell it
 MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-")  # in small letters: nothing was measured

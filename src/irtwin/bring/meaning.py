@@ -8,10 +8,10 @@ from irtwin.bring.column_name import said_by, word_set, words_of
 from irtwin.bring.recording import Recording
 from irtwin.bring.rtde_names import JOINTS, PAYLOAD, is_rtde, variable
 from irtwin.bring.told import Target
-from irtwin.bring.unit import Unit, unit_of
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel, by_column
+from irtwin.signals.unit import Unit, unit_of
 
 _GEARED = ("q", "dq", "ddq", "torque")  # fields that may be of the motor's side of the gear
 _METER = word_set("robot bus supply dc main mains total grid netz ac system sum gesamt meter zwischenkreis")

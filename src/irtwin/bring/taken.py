@@ -15,10 +15,10 @@ from irtwin.bring.evidence import Evidence, Motion
 from irtwin.bring.meaning import Meaning
 from irtwin.bring.rtde_names import POWER_AT, is_rtde
 from irtwin.bring.told import LEFT_OUT, Told
-from irtwin.bring.unit import MOTOR, Unit, units
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel
+from irtwin.signals.unit import MOTOR, Unit, units
 
 _EPOCH = (946_684_800.0, 4_102_444_800.0)  # s since 1970: of the years 2000 to 2099
 _CURRENT = (0.3, 100.0)  # A of a motor, at its greatest

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from irtwin.bring.unit import MOTOR, Unit, unit_of
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, by_column
+from irtwin.signals.unit import MOTOR, Unit, unit_of
 
 LEFT_OUT = "-"
 _POWER_AT = ("mains", "dc_bus")

@@ -79,6 +79,8 @@ def _announce(address: str) -> None:
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
 @click.option("--replay", type=PLACE, help="Play this log of a robot instead.")
 @click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
+@click.option("--opcua", metavar="URL", help="Follow a robot by its OPC UA server instead, opc.tcp://HOST:PORT.")
+@click.option("--nodes", type=PLACE, help="TOML file that names its nodes where that is no OPC 40010 server.")
 @click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the robot carries out.")
@@ -87,6 +89,8 @@ def live(
     port: int | None,
     replay: Path | None,
     rtde: str | None,
+    opcua: str | None,
+    nodes: Path | None,
     robot: str | None,
     speed: float,
     performs: str | None,
@@ -101,20 +105,36 @@ def live(
     \b
     Example: irtwin live < states.jsonl
     Example: irtwin live --rtde 192.168.0.20 --robot UR10
+    Example: irtwin live --opcua opc.tcp://192.168.0.30:4840 --robot KR6
     """
     from irtwin.live.watch import watch
     from irtwin.report.extensions import check
     from irtwin.resources import resources_of
     from irtwin.workflow import catch_up
 
-    if sum(source is not None for source in (port, replay, rtde)) > 1:
-        raise click.UsageError("Give one of --port, --replay and --rtde.")
-    if (robot is None) != (replay is None and rtde is None):
-        raise click.UsageError("--robot goes with --replay or --rtde: it says whose log or controller it is.")
+    of_one = {"replay": replay, "rtde": rtde, "opcua": opcua}
+    given = [source for source in (port, *of_one.values()) if source is not None]
+    if len(given) > 1:
+        raise click.UsageError("Give one of --port, --replay, --rtde and --opcua.")
+    if (robot is None) != all(source is None for source in of_one.values()):
+        raise click.UsageError("--robot goes with --replay, --rtde or --opcua: it says whose log or controller it is.")
     if speed != 1.0 and replay is None:
         raise click.UsageError("--speed is for --replay.")
+    if nodes is not None and opcua is None:
+        raise click.UsageError("--nodes is for --opcua.")
     if performs is not None and robot is None:
-        raise click.UsageError("--performs goes with --replay or --rtde; lines of a stream say it by themselves.")
+        raise click.UsageError("--performs goes with --robot; lines of a stream say it by themselves.")
     check(resources_of(location.folder))
     catch_up(location, say)  # while it watches, nobody else can
-    watch(location, port=port, replayed=replay, rtde=rtde, robot=robot, speed=speed, performs=performs, announce=say)
+    watch(
+        location,
+        port=port,
+        replayed=replay,
+        rtde=rtde,
+        opcua=opcua,
+        nodes=nodes,
+        robot=robot,
+        speed=speed,
+        performs=performs,
+        announce=say,
+    )

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 
 from irtwin.errors import InputError
-from irtwin.live.joint_stream import STREAMED, State, checked_time
+from irtwin.live.joint_stream import State, state_of
 from irtwin.robot.description import Robot
 
 PORT = 30004
@@ -195,19 +195,14 @@ class Rtde:
             values["temperature"] = said["joint_temperatures"]
         if self._has_power:
             values["power"] = (said["actual_robot_voltage"][0] * said["actual_robot_current"][0],)
-        for field, numbers in values.items():
-            greatest = STREAMED[field].greatest
-            if not all(-greatest <= number <= greatest for number in numbers):  # nor NaN
-                raise InputError(f"{self.address}: {STREAMED[field].label} is not a number within {greatest:g}")
         payload = said.get("payload", (math.nan,))[0]
-        return State(
+        return state_of(
             self.robot_id,
-            checked_time(offset + said["timestamp"][0], f"{self.address}: timestamp"),
-            tuple(
-                values.get(field, (math.nan,) * (_JOINTS if channel.per_joint else 1))
-                for field, channel in STREAMED.items()
-            ),
+            _JOINTS,
+            offset + said["timestamp"][0],
+            values,
             payload if 0 <= payload <= _HEAVIEST else None,
+            where=self.address,
         )
 
 

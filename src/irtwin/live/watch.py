@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check, check_mappings
@@ -30,12 +31,33 @@ SWITCH = 0.0005  # s that a thread may keep others from running: the graph's wai
 Announce = Callable[[str], None]
 
 
+class Controller(Protocol):
+    """A source that is connected to, of one robot; `what` says which values come."""
+
+    address: str
+
+    @property
+    def what(self) -> str:
+        """Which values come."""
+
+    def follow(
+        self,
+        take: Callable[[State], None],
+        refuse: Callable[[InputError], None],
+        done: threading.Event,
+        announce: Announce,
+    ) -> None:
+        """Give each state on until `done`."""
+
+
 def watch(
     location: Location,
     *,
     port: int | None = None,
     replayed: Path | None = None,
     rtde: str | None = None,
+    opcua: str | None = None,
+    nodes: Path | None = None,
     robot: str | None = None,
     speed: float = 1.0,
     performs: str | None = None,
@@ -45,7 +67,8 @@ def watch(
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
     With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
-    With `rtde`: what the controller there says of the robot of this name, until a signal comes.
+    With `rtde`: what the controller there says of the robot of this name, until a signal comes; with `opcua`, what the
+    OPC UA server there says, by a file of `nodes` where one is given.
     With `performs`: the first run of that robot carries out the plan of this name.
 
     Raises InputError for a fault in what extends the workspace, before a sample is read.
@@ -78,8 +101,9 @@ def watch(
             start = replay.start(after=twin.robots.times.end(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
             replay.play(_refusing(receive, refusals.refuse), done, start)
-        elif rtde is not None and robot is not None:
-            _follow(_arm(place, rtde, robot), receive, twin.check, refusals.refuse, done, announce)
+        elif robot is not None:
+            source = _controller(place, robot, rtde=rtde, opcua=opcua, nodes=nodes)
+            _follow(source, receive, twin.check, refusals.refuse, done, announce)
         else:
             _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refusals.count} lines refused")
@@ -116,19 +140,19 @@ def _read(
 
 
 def _follow(
-    arm: Rtde,
+    source: Controller,
     receive: Callable[[State], None],
     check: Callable[[], None],
     refuse: Callable[[InputError], None],
     done: threading.Event,
     announce: Announce,
 ) -> None:
-    def refuse_of_arm(error: InputError) -> None:
+    def refuse_of_it(error: InputError) -> None:
         refuse(error)
         check()  # whether it was refused as nothing can be stored any more
 
-    announce(f"Following {arm.address}: {arm.what}")
-    arm.follow(receive, refuse_of_arm, done, announce)
+    announce(f"Following {source.address}: {source.what}")
+    source.follow(receive, refuse_of_it, done, announce)
 
 
 def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
@@ -160,6 +184,11 @@ def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], N
     return take_with_plan
 
 
-def _arm(place: Workspace, address: str, robot: str) -> Rtde:
-    robot_id = find_robot(place, robot)
-    return Rtde(address, load_robot(place, robot_id), robot_id)
+def _controller(place: Workspace, name: str, *, rtde: str | None, opcua: str | None, nodes: Path | None) -> Controller:
+    robot_id = find_robot(place, name)
+    robot = load_robot(place, robot_id)
+    if opcua is None:
+        return Rtde(str(rtde), robot, robot_id)
+    from irtwin.live.opcua import OpcUa  # an extra
+
+    return OpcUa(opcua, robot, robot_id, nodes)

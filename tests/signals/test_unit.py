@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from irtwin.bring.unit import QUANTITIES, unit_of, units
 from irtwin.signals.channels import CHANNELS
+from irtwin.signals.unit import QUANTITIES, unit_of, units
 
 
 def test_each_channel_is_in_the_si_unit_of_a_quantity() -> None:
