@@ -22,6 +22,7 @@ from irtwin.location import Location
     "--allow-origin", "origins", metavar="ORIGIN", multiple=True, help="Site whose pages may ask the endpoint."
 )
 @click.option("--token-file", type=PLACE, help="File with the token that permits updates.")
+@click.option("--opcua", metavar="PORT", type=click.IntRange(1, 65535), help="Answer OPC UA clients on this port, too.")
 @click.option(
     "--mcp", is_flag=True, help="Serve tools of the Model Context Protocol instead, on standard input and output."
 )
@@ -33,6 +34,7 @@ def serve(
     memory: int,
     origins: tuple[str, ...],
     token_file: Path | None,
+    opcua: int | None,
     mcp: bool,
 ) -> None:
     """Serve the plant's pages at / and the graph as a SPARQL endpoint at /sparql.
@@ -48,6 +50,9 @@ def serve(
     With --graph the pages and the endpoint ask the server that keeps the graph. Functions of series are not there
     then, and a query that is cancelled may go on at that server, up to its own limit. --database is read at the
     start, as the graph must know of robots if the database does, and to catch up.
+
+    With --opcua energy, power, state and last gap of each robot can be read by OPC UA clients, below
+    Objects/Machines, by whoever reaches the port. Needs irtwin[opcua].
 
     With --mcp the named questions, SPARQL, explanations, diagnoses and predictions are tools that read and write
     nothing, of data sets below the current folder. Needs irtwin[mcp].
@@ -67,7 +72,7 @@ def serve(
 
     limits = Limits(seconds=timeout, memory=memory << 20)
     token = read_token(token_file)
-    serve_graph(location, host, port, token=token, limits=limits, announce=_announce, origins=origins)
+    serve_graph(location, host, port, token=token, limits=limits, announce=_announce, origins=origins, opcua=opcua)
 
 
 def _announce(address: str) -> None:

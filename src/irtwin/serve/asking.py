@@ -52,6 +52,11 @@ class Asking:
         ((head, body),) = await self._told(request, [(text, accept)])
         return head.media_type, body
 
+    async def rows(self, text: str) -> tuple[Row, ...]:
+        """Answer a question that the server itself has. Raises Refusal."""
+        ((_, body),) = await self._all("", [(text, _JSON)])
+        return _rows(body)
+
     async def standing(self) -> str | None:
         """Return how the graph stands, as `irtwin.asking` has it. Raises Refusal."""
         ((head, _),) = await self._all("", [("ASK {}", _JSON)])

@@ -9,7 +9,7 @@ import os
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -25,8 +25,10 @@ from starlette.routing import Route
 from irtwin.asking import checked
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
+from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.location import Location
+from irtwin.resources import Resources
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
 from irtwin.serve.catching_up import catch_up
@@ -59,8 +61,9 @@ def serve(
     limits: Limits,
     announce: Callable[[str], None],
     origins: Sequence[str] = (),
+    opcua: int | None = None,
 ) -> None:
-    """Serve a workspace's graph until SIGINT or SIGTERM.
+    """Serve a workspace's graph until SIGINT or SIGTERM; with `opcua` as an OPC UA server on that port, too.
 
     Pages of other sites may ask the endpoint where their origin is one of `origins`. Port 0 takes a free one;
     `announce` is told the endpoint's address once it answers. The graph is held against a database elsewhere first.
@@ -69,10 +72,21 @@ def serve(
     base = _base(location)  # what cannot be read is said here, once, rather than by each worker
     read_tariff(location.folder)  # likewise: later, a page would say it
     listening = _bind(host, port)
+    if opcua is not None:
+        import irtwin.serve.opcua  # noqa: F401, an extra: what it lacks is said now
+
+        _bind(host, opcua, "give --opcua another").close()
     bound = listening.getsockname()[1]
     address = f"http://{_in_url(host)}:{bound}/sparql"
     app = application(
-        location, host, token=token, limits=limits, base=base, opened=lambda: announce(address), origins=origins
+        location,
+        host,
+        token=token,
+        limits=limits,
+        base=base,
+        opened=lambda: announce(address),
+        origins=origins,
+        opcua=opcua,
     )
     config = uvicorn.Config(
         app,
@@ -159,6 +173,7 @@ def application(
     base: str = ID,
     opened: Callable[[], None] = lambda: None,
     origins: Sequence[str] = (),
+    opcua: int | None = None,
 ) -> Starlette:
     """Return the ASGI application; its workers live between its start-up and its shutdown.
 
@@ -176,11 +191,12 @@ def application(
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         try:
             await pool.open()
-            opened()
-            catching_up = asyncio.create_task(catch_up(asking, location))
-            yield
-            catching_up.cancel()
-            await asyncio.gather(catching_up, return_exceptions=True)
+            async with _opcua(asking, resources, host, opcua):
+                opened()
+                catching_up = asyncio.create_task(catch_up(asking, location))
+                yield
+                catching_up.cancel()
+                await asyncio.gather(catching_up, return_exceptions=True)
         finally:
             live.samples.close()
             await pool.close()
@@ -209,12 +225,20 @@ def application(
     return app
 
 
+def _opcua(asking: Asking, resources: Resources, host: str, port: int | None) -> AbstractAsyncContextManager[None]:
+    if port is None:
+        return nullcontext()
+    from irtwin.serve.opcua import answering  # an extra
+
+    return answering(asking, named_questions(resources)["plant_now"].text, host, port)
+
+
 def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, Refusal)
     return refused(error)
 
 
-def _bind(host: str, port: int) -> socket.socket:
+def _bind(host: str, port: int, instead: str = "--port 0 picks a free one") -> socket.socket:
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listening = socket.socket(family, kind, protocol)
@@ -223,7 +247,7 @@ def _bind(host: str, port: int) -> socket.socket:
         listening.listen()
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot listen on {host}, port {port}: {reason}; --port 0 picks a free one") from None
+        raise InputError(f"cannot listen on {host}, port {port}: {reason}; {instead}") from None
     return listening
 
 
