@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.alarms.settings import asks, read_receivers
+from irtwin.alarms.settings import asks, read_edge_nodes, read_receivers
 from irtwin.errors import InputError
 
 ENVIRONMENT = {
@@ -53,6 +53,9 @@ def test_webhooks_and_brokers_are_read_and_their_names_hold_no_secret(file: Path
         ),
         ('[[webhook]]\nurl = "http://a"\ntimeout_s = 0', "timeout_s should be a number of at least 0.1, not 0"),
         ('[[mqtt]]\nhost = "a"', "mqtt 1: topic is missing"),
+        ('[[sparkplug]]\nhost = "a"', "sparkplug 1: node is missing"),
+        ('[[sparkplug]]\nhost = "a"\nnode = "b"', "sparkplug 1: node should be GROUP/NODE, not 'b'"),
+        ('[[sparkplug]]\nhost = "a"\nnode = "b/+"', "sparkplug 1: node should be that of one place"),
         ('[[mqtt]]\nhost = "a"\ntopic = "plant/#"', "topic should be that of one place"),
         ('[[mqtt]]\nhost = "a"\ntopic = "b"\nport = "1883"', "port should be a whole number of 1 to 65535, not '1883'"),
         ('[[mqtt]]\nhost = "a"\ntopic = "b"\ntls = 1', "tls should be true or false, not 1"),
@@ -71,6 +74,7 @@ def test_mistakes_are_named(file: Path, text: str, message: str) -> None:
     file.write_text(text)
     with pytest.raises(InputError, match=message) as refused:
         read_receivers(file, ENVIRONMENT)
+        read_edge_nodes(file, ENVIRONMENT)
     assert str(refused.value).startswith(f"{file}: ")
     assert "me:pass" not in str(refused.value)
 

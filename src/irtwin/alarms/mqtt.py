@@ -34,9 +34,19 @@ class Broker:
         """How long a message may take in all: to connect, to be let in, and to be acknowledged, s."""
         return 3 * self.timeout + 1.0
 
+    def client(self) -> paho.Client:
+        """Return a client that is not connected yet."""
+        client = paho.Client(CallbackAPIVersion.VERSION2)
+        client.connect_timeout = self.timeout
+        if self.user is not None:
+            client.username_pw_set(self.user, self.password)
+        if self.tls:
+            client.tls_set()
+        return client
+
     def send(self, line: bytes) -> None:
         """Publish a message and wait until the broker has it. Raises Undelivered."""
-        client = paho.Client(CallbackAPIVersion.VERSION2)
+        client = self.client()
         answered, refused = threading.Event(), []
 
         def connected(_client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
@@ -44,11 +54,6 @@ class Broker:
             answered.set()
 
         client.on_connect = connected
-        client.connect_timeout = self.timeout
-        if self.user is not None:
-            client.username_pw_set(self.user, self.password)
-        if self.tls:
-            client.tls_set()
         try:
             client.connect(self.host, self.port)
         except OSError as error:

@@ -16,6 +16,10 @@ user = "irtwin"                         # optional, as are the next
 password_env = "IRTWIN_MQTT_PASSWORD"
 tls = true
 timeout_s = 5
+
+[[sparkplug]]                           # not alarms, but the robots, by Sparkplug B; with the optional keys of mqtt
+host = "broker.plant"
+node = "plant/irtwin"                   # GROUP/NODE
 """
 
 from __future__ import annotations
@@ -24,8 +28,9 @@ import os
 import re
 from collections.abc import Callable, Container, Mapping
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from irtwin.alarms.delivery import Receiver
@@ -33,14 +38,18 @@ from irtwin.errors import InputError
 from irtwin.signals.toml_file import TomlTable, shown
 from irtwin.toml_text import read_toml
 
+if TYPE_CHECKING:
+    from irtwin.alarms.mqtt import Broker
+
 NAME = "alarms.toml"
 _VARIABLE = re.compile(r"IRTWIN_[A-Z0-9_]{1,100}")
 _OWN = ("IRTWIN_DATABASE", "IRTWIN_GRAPH", "IRTWIN_GRAPH_TOKEN", "IRTWIN_TOKEN")  # that give access to irtwin itself
 _TIMEOUT = 5.0  # s
 _SHORTEST = 0.1  # s
+_PLACES = {"mqtt": "topic", "sparkplug": "node"}  # the key that says what a broker is told, by kind
 _KEYS = {
     "webhook": ("url", "url_env", "token_env", "timeout_s"),
-    "mqtt": ("host", "port", "topic", "user", "password_env", "tls", "timeout_s"),
+    **{kind: ("host", "port", place, "user", "password_env", "tls", "timeout_s") for kind, place in _PLACES.items()},
 }
 
 
@@ -51,23 +60,39 @@ def read_receivers(
 
     Raises InputError, naming file, table and key, on all that is wrong.
     """
-    return [make(table, environment) for asked, make, table in _asked(file) if may is None or asked in may]
+    return [make(table, environment) for kind, make, table in _allowed(file, may) if kind != "sparkplug"]
+
+
+def read_edge_nodes(
+    file: Path, environment: Mapping[str, str] = os.environ, may: Container[str] | None = None
+) -> list[Broker]:
+    """Return the brokers that are told of robots by Sparkplug B, each with GROUP/NODE as its topic, likewise."""
+    return [_broker(kind, table, environment) for kind, _, table in _allowed(file, may) if kind == "sparkplug"]
 
 
 def asks(file: Path) -> list[str]:
     """Return what a file asks for, by name. Raises InputError as `read_receivers`."""
-    return [asked for asked, _, _ in _asked(file)]
+    return [_asked(kind, table) for kind, _, table in _tables(file)]
 
 
 _Maker = Callable[[TomlTable, Mapping[str, str]], Receiver]
 
 
-def _asked(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
-    """Return each receiver of a file: the name by which it is asked for, and what makes it of which table."""
+def _asked(kind: str, table: TomlTable) -> str:
+    """Return the name by which a receiver is asked for."""
+    return f"{NAME}: {_where(kind, table)}"
+
+
+def _allowed(file: Path, may: Container[str] | None) -> list[tuple[str, _Maker, TomlTable]]:
+    return [it for it in _tables(file) if may is None or _asked(it[0], it[2]) in may]
+
+
+def _tables(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
+    """Return each receiver of a file: its kind, and what makes it of which table."""
     document = read_toml(file)
     _check(file, "", document, tuple(_KEYS))
     asked: list[tuple[str, _Maker, TomlTable]] = []
-    makers: dict[str, _Maker] = {"webhook": _webhook, "mqtt": _mqtt}
+    makers: Mapping[str, _Maker] = {"webhook": _webhook, **{kind: partial(_broker, kind) for kind in _PLACES}}
     for kind, make in makers.items():
         tables = document.get(kind, [])
         if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
@@ -75,23 +100,26 @@ def _asked(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
         for number, values in enumerate(tables, start=1):
             table = TomlTable(file, f"{kind} {number}:", values)
             _check(file, table.name, values, _KEYS[kind])
-            asked.append((f"{NAME}: {_where(kind, table)}", make, table))
+            asked.append((kind, make, table))
     if not asked:
-        raise InputError(f"{file}: names nobody; write [[webhook]] with url, or [[mqtt]] with host and topic")
+        raise InputError(
+            f"{file}: names nobody; write [[webhook]] with url, [[mqtt]] with host and topic, or "
+            "[[sparkplug]] with host and node"
+        )
     return asked
 
 
 def _where(kind: str, table: TomlTable) -> str:
     """Say where the messages of a table go, and which variables with them; paths of webhooks are often secrets."""
     url = table.text("url")
-    place = _broker(table) if kind == "mqtt" else _host(table, url)
+    place = _host(table, url) if kind == "webhook" else _port(kind, table)
     variables = [name for key in ("url_env", "token_env", "password_env") if (name := table.text(key)) is not None]
     return f"{kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
 
 
-def _broker(table: TomlTable) -> str:
+def _port(kind: str, table: TomlTable) -> str:
     port = table.values.get("port", 8883 if table.values.get("tls") is True else 1883)
-    return f"{table.text('host')}:{port}, topic {table.text('topic')}"
+    return f"{table.text('host')}:{port}, {_PLACES[kind]} {table.text(_PLACES[kind])}"
 
 
 def _host(table: TomlTable, url: str | None) -> str:
@@ -115,10 +143,12 @@ def _webhook(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
     return Webhook(url, token, timeout)
 
 
-def _mqtt(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
-    host, topic = (_needed(table, key) for key in ("host", "topic"))
+def _broker(kind: str, table: TomlTable, environment: Mapping[str, str]) -> Broker:
+    host, topic = (_needed(table, key) for key in ("host", _PLACES[kind]))
+    if kind == "sparkplug" and [bool(part) for part in topic.split("/")] != [True, True]:
+        raise InputError(f"{table.file}: {table.name} node should be GROUP/NODE, not {shown(topic)}")
     if any(sign in topic for sign in "+#\0") or len(topic.encode()) > 65535:
-        raise InputError(f"{table.file}: {table.name} topic should be that of one place, without + and #")
+        raise InputError(f"{table.file}: {table.name} {_PLACES[kind]} should be that of one place, without + and #")
     tls = table.values.get("tls", False)
     if not isinstance(tls, bool):
         raise InputError(f"{table.file}: {table.name} tls should be true or false, not {shown(tls)}")

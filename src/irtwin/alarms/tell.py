@@ -5,19 +5,25 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
 from irtwin.alarms.delivery import Delivery, Receiver
 from irtwin.alarms.follow import follow, told_in
-from irtwin.alarms.settings import NAME, asks, read_receivers
+from irtwin.alarms.settings import NAME, asks, read_edge_nodes, read_receivers
 from irtwin.asking import checked, open_graph
+from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.table import Table
 from irtwin.location import Location
 from irtwin.storage.files import inside
 from irtwin.trust import how, trusted
+
+if TYPE_CHECKING:
+    from irtwin.alarms.mqtt import Broker
+    from irtwin.alarms.sparkplug import EdgeNode
 
 
 def listed(location: Location, robot: str | None = None) -> Table:
@@ -34,23 +40,26 @@ def tell(
 ) -> None:
     """Tell each alarm when it begins and when it is over, on standard output and to whom `config` names.
 
+    Brokers that ask for Sparkplug B are told of the robots instead, as often as the graph is looked at.
     `config` is `alarms.toml` of the workspace by default, if that is there, and as far as the user trusts it.
     `announce` is told what is amiss. Ends with SIGINT or SIGTERM, and gives messages on their way some seconds.
     """
     workspace, done = location.folder, threading.Event()
-    look = partial(_alarms, location, robot)
-    alarms = look()  # before anything is made: there may be no workspace
+    alarms = _alarms(location, robot)  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
-    receivers = read_receivers(config) if config is not None else _of_workspace(workspace, announce)
+    receivers, brokers = _named(config, None) if config is not None else _of_workspace(workspace, announce)
     with told_in(workspace) as told:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: done.set())
         deliveries = [Delivery(receiver, announce) for receiver in receivers]
-        names = ["standard output", *(receiver.name for receiver in receivers)]
+        nodes = _edge_nodes(brokers, announce)
+        names = ["standard output", *(receiver.name for receiver in [*receivers, *brokers])]
         announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in alarms)} active now")
         try:
-            follow(look, told, _write, deliveries, done, announce, sparql)
+            follow(partial(_alarms, location, robot, nodes), told, _write, deliveries, done, announce, sparql)
         finally:
+            for node in nodes:
+                node.close()
             for delivery in deliveries:
                 delivery.close()
     lost = sum(delivery.lost for delivery in deliveries)
@@ -58,20 +67,34 @@ def tell(
         announce(f"{lost} message{'s' * (lost != 1)} could not be delivered")
 
 
-def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> list[Receiver]:
+def _edge_nodes(brokers: Sequence[Broker], announce: Callable[[str], None]) -> list[EdgeNode]:
+    if not brokers:
+        return []
+    from irtwin.alarms.sparkplug import EdgeNode  # an extra
+
+    return [EdgeNode(broker, announce) for broker in brokers]
+
+
+def _named(file: Path, may: frozenset[str] | None) -> tuple[list[Receiver], list[Broker]]:
+    return read_receivers(file, may=may), read_edge_nodes(file, may=may)
+
+
+def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Receiver], list[Broker]]:
     """Return whom the workspace's own file may tell; say whom it would tell, too."""
     file = inside(workspace, NAME)
     if not file.exists():
-        return []
+        return [], []
     may = trusted(workspace)
     for asked in asks(file):
         if asked not in may:
             announce(f"{workspace}: not told: {asked.removeprefix(f'{NAME}: ')}; {how(workspace)}")
-    return read_receivers(file, may=may)
+    return _named(file, may)
 
 
-def _alarms(location: Location, robot: str | None) -> list[Alarm]:
+def _alarms(location: Location, robot: str | None, nodes: Sequence[EdgeNode] = ()) -> list[Alarm]:
     with open_graph(location) as graph:
+        for node in nodes:
+            node.tell(ask(graph, "plant_now", robot))
         return alarms(graph, robot)
 
 

@@ -1,0 +1,147 @@
+"""The plant as an edge node of Sparkplug B: births, data and deaths of robots, each a device, over MQTT.
+
+A robot's metrics are what the question `plant_now` says of it. No package is taken to encode them: those that are
+kept want versions of paho-mqtt that are over, and a payload needs few of protobuf's kinds of fields.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from itertools import count
+from typing import Any
+
+import paho.mqtt.client as paho
+
+from irtwin.alarms.mqtt import Broker
+
+METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
+_REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
+_NO_ID = re.compile(r"[/+#\0]")  # what the id of a device must not have
+_UINT64, _DOUBLE, _BOOLEAN, _STRING = 8, 10, 11, 12  # Sparkplug's types of metrics
+_PATIENCE = 2.0  # s for the death to leave at the end
+
+Metric = tuple[str, int, Any]  # name, type, value; None: not known
+Row = Mapping[str, Any]
+
+
+class EdgeNode:
+    """Tells a broker of robots. Who sends its commands is answered by new births: nothing else can be commanded."""
+
+    def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
+        """Connect in the background, again and again; `broker.topic` is GROUP/NODE."""
+        self._broker, self._announce = broker, announce
+        self._group, _, self._node = broker.topic.partition("/")
+        self._lock = threading.RLock()
+        self._robots: dict[str, tuple[Metric, ...]] = {}
+        self._born = False
+        self._deaths, self._sequence = count(), count()
+        self._fault = ""
+        self._client = broker.client()
+        self._client.on_pre_connect = self._bequeath
+        self._client.on_connect, self._client.on_disconnect = self._connected, self._disconnected
+        self._client.on_message = lambda *_: self._be_born()
+        self._client.connect_async(broker.host, broker.port)
+        self._client.loop_start()
+
+    def tell(self, rows: Iterable[Row]) -> None:
+        """Tell what is new of robots since the last time: births of new ones, data, deaths of those that are gone."""
+        now = {_NO_ID.sub("_", row["robot"]): _metrics(row) for row in rows}
+        with self._lock:
+            before, self._robots = self._robots, now
+            if not self._born:
+                return
+            for robot in before.keys() - now.keys():
+                self._publish("DDEATH", (), robot)
+            for robot, metrics in now.items():
+                if robot not in before:
+                    self._publish("DBIRTH", metrics, robot)
+                elif news := [metric for metric in metrics if metric not in before[robot]]:
+                    self._publish("DDATA", news, robot)
+
+    def close(self) -> None:
+        """Say that the node ends, and disconnect."""
+        with self._lock:
+            if self._born:
+                self._client.publish(self._topic("NDEATH"), self._death, qos=1).wait_for_publish(_PATIENCE)
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _bequeath(self, *_: Any) -> None:
+        """Leave a death with the broker, of the same number as the birth that follows."""
+        self._death_number = next(self._deaths) % 256
+        self._death = payload([(_BD_SEQ, _UINT64, self._death_number)])
+        self._client.will_set(self._topic("NDEATH"), self._death, qos=1)
+
+    def _connected(self, _client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure:
+            self._tell_fault(f"it refuses the connection: {reason}")
+            return
+        self._fault = ""
+        self._client.subscribe(self._topic("NCMD"), qos=1)
+        self._be_born()
+
+    def _disconnected(self, _client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        with self._lock:
+            self._born = False
+        if reason.is_failure:
+            self._tell_fault(f"the connection is lost: {reason}; trying again")
+
+    def _tell_fault(self, fault: str) -> None:
+        if fault != self._fault:
+            self._announce(f"{self._broker.name}: {fault}")
+        self._fault = fault
+
+    def _be_born(self) -> None:
+        with self._lock:
+            self._born, self._sequence = True, count()
+            self._publish("NBIRTH", [(_BD_SEQ, _UINT64, self._death_number), (_REBIRTH, _BOOLEAN, False)])
+            for robot, metrics in self._robots.items():
+                self._publish("DBIRTH", metrics, robot)
+
+    def _publish(self, kind: str, metrics: Iterable[Metric], robot: str | None = None) -> None:
+        self._client.publish(self._topic(kind, robot), payload(metrics, next(self._sequence) % 256))
+
+    def _topic(self, kind: str, robot: str | None = None) -> str:
+        return "/".join(["spBv1.0", self._group, kind, self._node, *([] if robot is None else [robot])])
+
+
+def _metrics(row: Row) -> tuple[Metric, ...]:
+    kinds = {column: _STRING if column == "state" else _DOUBLE for column in METRICS}
+    return tuple((name, kinds[column], row[column]) for column, name in METRICS.items())
+
+
+def payload(metrics: Iterable[Metric], sequence: int | None = None) -> bytes:
+    """Return a payload of Sparkplug B, a message of protobuf; a death has no sequence number."""
+    now = int(time.time() * 1000)
+    told = _number(1, now)
+    for name, kind, value in metrics:
+        told += _bytes(2, _bytes(1, name.encode()) + _number(3, now) + _number(4, kind) + _value(kind, value))
+    return told if sequence is None else told + _number(3, sequence)
+
+
+def _value(kind: int, value: Any) -> bytes:
+    if value is None:
+        return _number(7, 1)  # is_null
+    if kind == _DOUBLE:
+        return _varint(13 << 3 | 1) + struct.pack("<d", value)
+    return _bytes(15, value.encode()) if kind == _STRING else _number(14 if kind == _BOOLEAN else 11, int(value))
+
+
+def _bytes(field: int, content: bytes) -> bytes:
+    return _varint(field << 3 | 2) + _varint(len(content)) + content
+
+
+def _number(field: int, value: int) -> bytes:
+    return _varint(field << 3) + _varint(value)
+
+
+def _varint(value: int) -> bytes:
+    parts = bytearray()
+    while value > 127:
+        parts.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*parts, value])

@@ -1,0 +1,108 @@
+"""Sparkplug B: what a broker and a decoder that others wrote get of the plant."""
+
+from __future__ import annotations
+
+import queue
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import paho.mqtt.client as paho
+import pytest
+from paho.mqtt.enums import CallbackAPIVersion
+from sparkplub_b_packets.core.sparkplug_b_pb2 import Payload
+from tests.alarms.test_mqtt import MOSQUITTO, free_port
+
+from irtwin.alarms.mqtt import Broker
+from irtwin.alarms.sparkplug import EdgeNode, payload
+
+ARM = {"robot": "Arm/1", "energy_Wh": 12.5, "power_W": None, "state": "moving"}
+
+
+def decoded(message: bytes) -> tuple[int | None, dict[str, Any]]:
+    """Return sequence number and metrics by name; None: null."""
+    told = Payload()
+    told.ParseFromString(message)
+    assert abs(told.timestamp / 1000 - time.time()) < 60.0
+    values = {8: "long_value", 10: "double_value", 11: "boolean_value", 12: "string_value"}
+    metrics = {it.name: None if it.is_null else getattr(it, values[it.datatype]) for it in told.metrics}
+    return told.seq if told.HasField("seq") else None, metrics
+
+
+@pytest.fixture
+def port(tmp_path: Path) -> Iterator[int]:
+    if MOSQUITTO is None:
+        pytest.skip("needs mosquitto (Debian: apt install mosquitto)")
+    port, settings = free_port(), tmp_path / "mosquitto.conf"
+    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\nuser root\n")
+    broker = subprocess.Popen([MOSQUITTO, "-c", settings], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(500):
+        with socket.socket() as trying:
+            if trying.connect_ex(("127.0.0.1", port)) == 0:
+                break
+        time.sleep(0.02)
+    yield port
+    broker.terminate()
+    broker.wait()
+
+
+class Host:
+    """A host that hears all of Sparkplug."""
+
+    def __init__(self, port: int) -> None:
+        self.got: queue.Queue[tuple[str, tuple[int | None, dict[str, Any]]]] = queue.Queue()
+        ready: queue.Queue[None] = queue.Queue()
+        self.client = paho.Client(CallbackAPIVersion.VERSION2)
+        self.client.on_connect = lambda client, *_: client.subscribe("spBv1.0/#", qos=1)
+        self.client.on_subscribe = lambda *_: ready.put(None)
+        self.client.on_message = self._take
+        self.client.connect("127.0.0.1", port)
+        self.client.loop_start()
+        ready.get(timeout=30)
+
+    def _take(self, _client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:
+        if "NCMD" not in message.topic:
+            self.got.put((message.topic.removeprefix("spBv1.0/plant/"), decoded(message.payload)))
+
+    def next(self) -> tuple[str, tuple[int | None, dict[str, Any]]]:
+        return self.got.get(timeout=30)
+
+
+@pytest.mark.system
+def test_births_data_and_deaths_reach_a_host_in_order(port: int) -> None:
+    host, said = Host(port), []
+    born = {"Energy/Wh": 12.5, "Power/W": None, "State": "moving"}
+    node = EdgeNode(Broker("127.0.0.1", port, "plant/irtwin"), said.append)
+    assert host.next() == ("NBIRTH/irtwin", (0, {"bdSeq": 0, "Node Control/Rebirth": False}))
+    node.tell([ARM])
+    assert host.next() == ("DBIRTH/irtwin/Arm_1", (1, born))
+    node.tell([ARM])
+    node.tell([ARM | {"power_W": 300.0}])
+    assert host.next() == ("DDATA/irtwin/Arm_1", (2, {"Power/W": 300.0}))
+    host.client.publish("spBv1.0/plant/NCMD/irtwin", payload([("Node Control/Rebirth", 11, True)]))
+    assert host.next()[0] == "NBIRTH/irtwin"
+    assert host.next() == ("DBIRTH/irtwin/Arm_1", (1, born | {"Power/W": 300.0}))
+    node.tell([])
+    assert host.next() == ("DDEATH/irtwin/Arm_1", (2, {}))
+    node._client.socket().shutdown(socket.SHUT_RDWR)  # it breaks: the broker tells the death that was left with it
+    assert host.next() == ("NDEATH/irtwin", (None, {"bdSeq": 0}))
+    assert host.next() == ("NBIRTH/irtwin", (0, {"bdSeq": 1, "Node Control/Rebirth": False}))
+    assert "the connection is lost" in said[0]
+    node.close()
+    assert host.next() == ("NDEATH/irtwin", (None, {"bdSeq": 1}))
+    host.client.disconnect()
+    host.client.loop_stop()
+
+
+def test_a_broker_that_is_not_there_holds_nobody_up() -> None:
+    node = EdgeNode(Broker("127.0.0.1", 9, "plant/irtwin"), print)
+    node.tell([ARM])
+    node.close()
+
+
+def test_large_numbers_and_letters_beyond_ascii_are_read_back() -> None:
+    metrics = [("Käfer", 12, "läuft"), ("n", 8, 2**63 + 5), ("x", 10, -1e300)]
+    assert decoded(payload(metrics, 255)) == (255, {"Käfer": "läuft", "n": 2**63 + 5, "x": -1e300})
