@@ -163,6 +163,7 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
 @click.option("--urdf", type=FILE, help="URDF file to write: a robot's twin.")
 @click.option("--mjcf", type=FILE, help="The same for MuJoCo.")
 @click.option("--sdf", type=FILE, help="The same for Gazebo and Drake.")
+@click.option("--aas", type=FILE, help="FILE.aasx or FILE.json to write: a robot as an Asset Administration Shell.")
 @click.option("--mcap", type=FILE, help="MCAP file to write: a run, for ROS 2.")
 @click.option("--bag", type=PLACE, help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
 @click.option("--robot", metavar="NAME", help="The robot; not needed where there is one alone.")
@@ -179,6 +180,7 @@ def export(
     urdf: Path | None,
     mjcf: Path | None,
     sdf: Path | None,
+    aas: Path | None,
     mcap: Path | None,
     bag: Path | None,
     robot: str | None,
@@ -196,13 +198,15 @@ def export(
     the format has them; what it has no place for is said. Of the URDF all else stays as it was. The package of --ros
     has them too, where the robot has a twin.
 
+    --aas writes an Asset Administration Shell with nameplate, carbon footprint and energy a day. Needs irtwin[aas].
+
     --mcap and --bag write a run: positions, speeds and torques as /joint_states, each other column as a topic of
     numbers, such as /power. Needs irtwin[ros].
 
     \b
     Example: irtwin export --mjcf kr6.xml --robot KUKA_KR6_R700
     """
-    every = {"owl": owl, "ros": ros, "urdf": urdf, "mjcf": mjcf, "sdf": sdf, "mcap": mcap, "bag": bag}
+    every = {"owl": owl, "ros": ros, "urdf": urdf, "mjcf": mjcf, "sdf": sdf, "aas": aas, "mcap": mcap, "bag": bag}
     form, out = _asked(every)
     if (run_name is not None) != (form in ("mcap", "bag")):
         raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
@@ -216,17 +220,17 @@ def export(
         if robot is not None:
             raise click.UsageError("--owl writes the whole graph; leave --robot out.")
         asking.export(owl, location)
+    elif aas is not None:
+        from irtwin.report.aas import export_shell
+
+        export_shell(aas, location, robot)
     elif ros is not None:
         from irtwin.ros.export import export_package
 
         for line in export_package(ros, location, robot):
             say(f"irtwin: {line}")
     elif run_name is not None:
-        from irtwin.ros.export import export_bag
-
-        if mcap is not None and mcap.suffix.lower() != ".mcap":
-            raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
-        export_bag(out, location, run_name, robot)
+        _export_run(form, out, location, run_name, robot)
     click.echo(out)
 
 
@@ -249,6 +253,14 @@ def _export_model(form: str, out: Path, location: Location, robot: str | None, t
         known = modelling.read_twin(twin)
     for line in modelling.write_model(known, form, out):
         say(f"irtwin: {line}")
+
+
+def _export_run(form: str, out: Path, location: Location, run: str, robot: str | None) -> None:
+    from irtwin.ros.export import export_bag
+
+    if form == "mcap" and out.suffix.lower() != ".mcap":
+        raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
+    export_bag(out, location, run, robot)
 
 
 @graph.command("map")
