@@ -279,6 +279,11 @@ def plain(folder: Path, **changes: np.ndarray) -> Path:
 @pytest.mark.parametrize(
     ("columns", "options", "question", "gives"),
     [
+        (
+            {"t": "time"} | {f"T{k}": f"tau_joint_a{k}" for k in range(1, 7)}, Options(),
+            "columns T1 to T6 could be torques or temperatures", "--map 'T*=tau' or --map 'T*=temp'",
+        ),
+        ({"P": "power"}, Options(), "column P: nothing says whether power was measured", "--power-at mains or"),
         ({"power": "power"}, Options(), "column power: nothing says whether power was measured", "--power-at mains or"),
         (
             {f"speed{k}": "time" for k in range(1, 7)}, Options(), r"speed1 \(speed\) could be in rad/s or deg/s",

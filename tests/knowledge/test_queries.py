@@ -22,6 +22,12 @@ def test_unknown_name_is_met_with_the_nearest(graph: KnowledgeGraph) -> None:
         ask(graph, "xyzzy")
 
 
+def test_a_term_that_the_ontology_lacks_is_told_where_nothing_is_found(graph: KnowledgeGraph) -> None:
+    asked = ask(graph, "SELECT ?run { ?run irt:Energy_Consumtion ?energy ; irt:run_of ?robot }")
+    assert list(asked.faults) == ["the ontology has no irt:Energy_Consumtion: did you mean irt:Energy_Consumption?"]
+    assert not ask(graph, "SELECT ?run { ?run irt:Run_Name 'none' }").faults
+
+
 TABLE = Table(
     ("name", "value", "time", "nothing"),
     (

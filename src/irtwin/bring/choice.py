@@ -155,6 +155,12 @@ def _of_robot(recording: Recording, field: str, found: Sequence[Meaning], robot:
     unused = [each.unused(f"{label} of a part; the log format has the whole robot's") for each in of_joints]
     rest = [each for each in rest if each not in of_joints]
     if field == "time" and not given:
+        numbered = [each for each in rest if each.numbers]  # T1 is no time where t is
+        if 0 < len(numbered) < len(rest):
+            if len(numbered) == len(robot.joints):
+                raise _torque_or_temperature(recording, numbered)
+            unused += [each.unused("numbered, beside a time that is not") for each in numbered]
+            rest = [each for each in rest if each not in numbered]
         first = [each for name in _TIMES for each in rest if each.column.strip().lower() == name]
         given = first[:1]
     if given:
@@ -171,6 +177,17 @@ def _of_robot(recording: Recording, field: str, found: Sequence[Meaning], robot:
         unused += [each.unused(f"{measured[0].column} was taken") for each in rest if each != measured[0]]
         rest = measured
     return [*(replace(each, field=field) for each in rest), *unused]
+
+
+def _torque_or_temperature(recording: Recording, found: Sequence[Meaning]) -> DoubtError:
+    columns = [each.column for each in found]
+    pattern = _pattern(columns[0])
+    ways = [pattern] if [name for name in recording.columns if fits(pattern, name)] == columns else columns
+    answers = [
+        Answer(f"{words} of the joints", tuple(("--map", f"{way}={CHANNELS[field].prefix}") for way in ways))
+        for field, words in (("torque", "torques"), ("temperature", "temperatures"))
+    ]
+    return DoubtError(f"{recording.path}: columns {_shown(columns)} could be torques or temperatures", answers)
 
 
 def _several(recording: Recording, field: str, sets: Sequence[Sequence[str]]) -> DoubtError:

@@ -67,6 +67,8 @@ def said_by(name: str, unit_text: str | None = None) -> Said:
     words = tuple(token for token in tokens if not token.isdigit())
     numbers = tuple(int(token) for token in tokens if token.isdigit() and len(token) < 10)
     field = next((_FIELD[word] for word in reversed(words) if word in _FIELD), None)
+    if words == ("p",) and not numbers:
+        field = "power"  # p1 could be a position, or a pressure
     unit = _unit(field, unit_text or text) if field is not None else None
     if unit is None and field is not None and (found := _unit_within(bare, field)) is not None:
         rest, unit = found

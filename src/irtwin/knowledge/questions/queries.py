@@ -7,8 +7,8 @@ import io
 import json
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from datetime import date
 from difflib import get_close_matches
 from functools import lru_cache
@@ -20,10 +20,12 @@ from irtwin.input_file import read_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.vocabulary import IRT
 from irtwin.resources import MOST_BYTES, Files, Resources, shipped
 
 _HEADER = re.compile(r"^# (title|question|theme|of|concluded): (.+)$", re.MULTILINE)
 THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
+_TERM = re.compile(r"\birt:([A-Za-z]\w*)")
 _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|delete)\b", re.IGNORECASE)
 
 
@@ -59,14 +61,25 @@ def _questions(files: Files) -> Mapping[str, Question]:
 def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table:
     """Answer a named question, of all robots or of the one called `robot`, or a question in SPARQL.
 
-    InputError where the question or the robot is unknown, or the question is not one of a single robot.
+    Where SPARQL has no answer, its faults name terms that the ontology lacks. InputError where the question or the
+    robot is unknown, or the question is not one of a single robot.
     """
     if robot is None:
-        return graph.query(_text(question, graph.resources))
+        answer = graph.query(_text(question, graph.resources))
+        return answer if len(answer) else replace(answer, faults=[*answer.faults, *_unknown_terms(graph, question)])
     named = named_questions(graph.resources).get(question)
     if named is None or not named.of_robot:
         raise InputError(f"{question!r} does not ask about one robot; leave --robot out")
     return graph.query(named.text, {"arm": robot_named(graph, robot)})
+
+
+def _unknown_terms(graph: KnowledgeGraph, text: str) -> Iterator[str]:
+    """Say which terms of a query the ontology lacks, each with the nearest that it has."""
+    rows = graph.query(f"SELECT DISTINCT ?term {{ ?term a ?kind FILTER(STRSTARTS(STR(?term), '{IRT}')) }}")
+    known = [row["term"].removeprefix(IRT) for row in rows]
+    for name in sorted(set(_TERM.findall(text)) - set(known)):
+        near = get_close_matches(name, known, 1)
+        yield f"the ontology has no irt:{name}" + (f": did you mean irt:{near[0]}?" if near else "")
 
 
 def robot_named(graph: KnowledgeGraph, name: str | None) -> str:
