@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +17,8 @@ from pathlib import Path
 import pytest
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.live import watch
+from irtwin.live.rtde import Rtde
 from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
@@ -161,6 +165,19 @@ def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
     served.stop()
     assert process.returncode == 0, said
     assert int(said.partition(" samples stored")[0].rpartition("\n")[2]) > 20
+
+
+def test_a_full_disk_ends_what_follows_an_arm_and_is_no_lost_connection() -> None:
+    with serving(Controller()) as port:
+        followed = Rtde(f"127.0.0.1:{port}", arm(6), "arm")
+        said: list[str] = []
+
+        def full(_: object) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        with pytest.raises(OSError, match="No space left"):
+            watch._follow(followed, full, lambda: None, print, threading.Event(), said.append)
+    assert not any("lost" in line for line in said)
 
 
 def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:

@@ -147,12 +147,31 @@ def _follow(
     done: threading.Event,
     announce: Announce,
 ) -> None:
-    def refuse_of_it(error: InputError) -> None:
+    failures: list[BaseException] = []
+
+    def receive_or_end(state: State) -> None:
+        try:
+            receive(state)
+        except InputError:
+            raise
+        except BaseException as error:  # a full disk, which the source would take for a connection that is lost
+            end(error)
+
+    def refuse_or_end(error: InputError) -> None:
         refuse(error)
-        check()  # whether it was refused as nothing can be stored any more
+        try:
+            check()  # whether it was refused as nothing can be stored any more
+        except BaseException as failure:
+            end(failure)
+
+    def end(failure: BaseException) -> None:
+        failures.append(failure)
+        done.set()
 
     announce(f"Following {source.address}: {source.what}")
-    source.follow(receive, refuse_of_it, done, announce)
+    source.follow(receive_or_end, refuse_or_end, done, announce)
+    if failures:
+        raise failures[0]
 
 
 def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
