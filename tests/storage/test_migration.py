@@ -25,6 +25,7 @@ from irtwin.storage import engine as engines
 from irtwin.storage import migration
 from irtwin.storage.database import Workspace
 from irtwin.storage.revisions.versions import r0021_tables_of_0_2 as first
+from irtwin.storage.revisions.versions import r0022_no_yardstick as second
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -172,6 +173,16 @@ def test_killed_ten_times_at_any_moment_it_leaves_old_or_new_tables(tmp_path: Pa
 def said(place: Workspace) -> list[tuple[object, ...]]:
     with place.engine.connect() as connection:
         return [tuple(row) for row in connection.execute(text("SELECT * FROM run ORDER BY run_id"))]
+
+
+def test_a_workspace_of_0_2_loses_what_is_told_no_more(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, place.engine.begin() as connection:
+        connection.execute(text("CREATE TABLE gap_closeable (activity_id VARCHAR, closed FLOAT)"))
+        connection.execute(text(f"UPDATE alembic_version SET version_num = '{second.down_revision}'"))
+    with Workspace(tmp_path) as place:
+        assert not inspect(place.engine).has_table("gap_closeable")
+        with place.engine.connect() as connection:
+            assert migration.revision(connection) == migration.newest()
 
 
 OLDER = f"UPDATE alembic_version SET version_num = '{int(first.revision) - 1:04}'"
