@@ -80,6 +80,10 @@ def test_the_page_of_a_workspace_says_it_too(told):
     page = (told[1].parent / "w" / "reports" / "arm.gap.html").read_text()
     for said in ("Tracking error of each run", "differs from the simulator’s", "servo stiffness", "Simulator</th>"):
         assert said in page
+    assert page.count('class="ia-picture"') == 2
+    off = re.findall(r"<figcaption>(The simulator as it is|With the robot’s numbers): ([\d.]+)\s*mm off", page)
+    assert [one for one, _ in off] == ["The simulator as it is", "With the robot’s numbers"]
+    assert float(off[0][1]) > 5 * float(off[1][1])
     said = irtwin("improve", "arm", "--workspace", told[1].parent / "w")
     assert said.status == 2
     assert "its diagnosis (attributed) added nothing to the twin" in said.err

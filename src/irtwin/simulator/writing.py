@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from irtwin.document import document as said
-from irtwin.document.curves import Curves, RunError
+from irtwin.document.curves import Apart, Curves, RunError
 from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.closing import share
@@ -117,8 +117,24 @@ def _sizes(robot: Robot, squares: np.ndarray) -> Mapping[str, said.Size]:
 
 
 def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Curves:
-    """Return what a page draws: the tracking error of each run."""
-    return Curves(follows=(), runs=tuple(_errors(robot, runs, before, after)), experiment=None)
+    """Return what a page draws: the tracking error of each run, and robot and model where they are farthest apart."""
+    every = tuple(_errors(robot, runs, before, after))
+    return Curves(follows=(), runs=every, experiment=None, apart=_apart(runs, before, after))
+
+
+def _apart(runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Apart:
+    run = int(np.argmax([one.off.max() for one in before]))
+    one, other = before[run], after[run]
+    at = int(one.off.argmax())
+    return Apart(
+        run=runs[run],
+        time=float(one.time[at]),
+        robot=tuple(one.robot[at].tolist()),
+        before=tuple(one.model[at].tolist()),
+        after=tuple(other.model[at].tolist()),
+        off_before=float(one.off[at]),
+        off_after=float(other.off[at]),
+    )
 
 
 def _errors(
