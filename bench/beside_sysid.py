@@ -51,9 +51,11 @@ def split(data_set: DataSet, model: Model, names: list[str]) -> None:
             )
             file.write_bytes(text)
             begin = time.perf_counter()
-            said = subprocess.run([sys.executable, str(file)], check=True, capture_output=True, text=True).stdout
+            with file.with_suffix(".log").open("w") as log:
+                subprocess.run([sys.executable, str(file)], check=True, stdout=log)
             took = time.perf_counter() - begin
-            print(f"  {told}: {next(line for line in said.splitlines() if line.startswith('Tracking'))}")
+            said = file.with_suffix(".log").read_text().splitlines()
+            print(f"  {told}: {next(line for line in said if line.startswith('Tracking'))}")
             _tell(told, file.with_name(f"{file.stem}-fitted.xml"), took, data_set, names)
 
 

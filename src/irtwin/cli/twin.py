@@ -216,7 +216,7 @@ def diagnose(
         if table:
             click.echo()
             show(table, counted=False)
-    for said in summary.not_held(not_held(found.document)) if simulator else ():
+    for said in summary.not_held(not_held(found.document), found.document) if simulator else ():
         click.echo(f"\n{said}")
     for said in summary.next_steps(found.document):
         click.echo(f"\n{said}")

@@ -26,7 +26,8 @@ MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"
 FREE: Sequence[tuple[str, str, list[float], list[float], list[float], list[float]]] = ()
 # what the robot has and no number of the model can say
 LACKS: Sequence[str] = ()
-SECONDS = 15.0  # that are played before the model begins anew where the robot is
+# stretches of all runs, evenly spread, and how long each is played from where the robot is
+STRETCHES, SECONDS = 16, 15.0
 
 
 def change(spec: mujoco.MjSpec, parameter: sysid.Parameter, of: str, number: str) -> None:
@@ -87,16 +88,18 @@ def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
 
 
 def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> sysid.ModelSequences:
-    """Return the observed runs, SECONDS at a time."""
+    """Return stretches of the observed runs."""
     model, joints = spec.compile(), data_set.robot.joint_names
     places = [model.jnt_qposadr[model.joint(one).id] for one in joints]
     speeds = [model.jnt_dofadr[model.joint(one).id] for one in joints]
     drives = [next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(one).id) for one in joints]
     names, states, controls, measured = [], [], [], []
-    for run in (one for one in data_set.runs if one.role == "observed"):
-        signals, commands = run.signals, np.asarray(run.signals.command)
-        for place in range(max(1, int(np.ptp(signals.time) // SECONDS))):
-            begin = signals.time[0] + place * SECONDS
+    runs = [one for one in data_set.runs if one.role == "observed"]
+    for run in runs:
+        signals, commands, lasts = run.signals, np.asarray(run.signals.command), np.ptp(run.signals.time)
+        count = max(1, min(int(lasts // SECONDS), round(STRETCHES / len(runs))))
+        for place in range(count):
+            begin = signals.time[0] + max(0.0, (place + 0.5) * lasts / count - SECONDS / 2)
             rows = (signals.time >= begin) & (signals.time < begin + SECONDS)
             time, q = signals.time[rows] - signals.time[rows][0], signals.q[rows]
             qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)

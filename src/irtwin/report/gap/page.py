@@ -147,6 +147,7 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": of_cause(cause, answers, "cause_parameters"),
+        "kept": _kept(cause, answers),
         "evidence": [
             ("channel", row["channel"]),
             *((one["name"], _said(one["value"], one["unit"])) for one in of_cause(cause, answers, "evidence")),
@@ -154,6 +155,13 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
             ("runs", ", ".join(one["run_name"] for one in of_cause(cause, answers, "cause_runs"))),
         ],
     }
+
+
+def _kept(cause: str, answers: Answers) -> Row | None:
+    """Return what is left of a tracking error without a cause that no number of the simulator holds."""
+    held = any(one["simulator"] is not None for one in of_cause(cause, answers, "cause_parameters"))
+    left = (row for row in of_cause(cause, answers, "changes_by_cause") if row["part"] == "without")
+    return None if held else next((row for row in left if row["measure"] == "position_rmse"), None)
 
 
 def _competitors(rows: Sequence[Row]) -> str:
