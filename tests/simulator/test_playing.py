@@ -16,6 +16,7 @@ from tests.data_sets import irtwin
 from irtwin.document.document import Change, Document
 from irtwin.report.gap.headline import line
 from irtwin.simulator.playing import diagnose
+from irtwin.simulator.writing import together
 
 
 def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), seconds=4, **numbers):
@@ -87,6 +88,16 @@ def test_the_page_of_a_workspace_says_it_too(told):
     said = irtwin("improve", "arm", "--workspace", told[1].parent / "w")
     assert said.status == 2
     assert "its diagnosis (attributed) added nothing to the twin" in said.err
+
+
+def test_what_is_left_is_within_its_interval_in_any_unit():
+    """Also where squares are above one, as of torques in N m."""
+    squares = np.array([[4.0, 6.0], [8.0, 10.0], [5.0, 3.0]])
+    small, large = (together(4 * scale * squares, scale * squares) for scale in (1e-6, 1.0))
+    assert large.after == pytest.approx(6**0.5)
+    assert large.interval95_after[0] < large.after < large.interval95_after[1]
+    assert large.interval95_after == pytest.approx([1e3 * end for end in small.interval95_after])
+    assert together(squares[:1], squares[:1]).interval95_after is None
 
 
 def test_a_simulator_that_is_right_agrees():

@@ -95,12 +95,12 @@ def document(
         shrink=said.Shrink(
             held_out_runs=tuple(runs) if len(runs) > 1 else (),
             noise_floor_from=None,
-            torque_rmse=_together(*(one[:, 0] for one in torques)) if torques[0].size else None,
+            torque_rmse=together(*(one[:, 0] for one in torques)) if torques[0].size else None,
             power_rmse=None,
             energy_error_percent=None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
-            position_rmse=_together(*places),
+            position_rmse=together(*places),
         ),
         next_experiment=None,
         unexplained_because="much_is_left" if verdict == "unexplained" else None,
@@ -157,16 +157,16 @@ def _verdict(named: bool, closed: float, before: float, after: float) -> str:
     return "attributed" if closed >= _ATTRIBUTED or after < AGREES else "unexplained"
 
 
-def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
-    """Return how far tracking error falls, of mean squares (runs, n)."""
+def together(before: np.ndarray, after: np.ndarray) -> said.Change:
+    """Return how far an error falls, of mean squares (runs, n), with Student's interval over runs of what is left."""
     of_run = after.mean(axis=1)
-    lower, upper = share(of_run, np.ones(len(of_run)))[1]
-    ends = [float(np.sqrt(max(end, 0.0))) for end in (lower, upper)]
+    half = scipy.special.stdtrit(len(of_run) - 1, 0.975) * scipy.stats.sem(of_run) if len(of_run) > 1 else 0.0
+    lower, upper = (float(np.sqrt(max(of_run.mean() + side * half, 0.0))) for side in (-1, 1))
     return said.Change(
         before=_rms(before),
         after=_rms(after),
         noise_floor=None,
-        interval95_after=(ends[0], ends[1]) if len(after) > 1 else None,
+        interval95_after=(lower, upper) if len(of_run) > 1 else None,
     )
 
 
