@@ -134,6 +134,8 @@ class _Files:
         if model and self.simulator:
             for file, content in zip((self.simulator, *self.draws), _models(found, model, seed), strict=False):
                 write(file, content)
+            if isinstance(found, Playing) and (lacking := found.unwritten):
+                announce(f"  {self.simulator} has no place for {', '.join(lacking)}: these stay as they are")
         if self.sysid is not None:
             _write_script(data_set, found, self.sysid, announce)
         if self.json is not None:
@@ -198,10 +200,10 @@ def _played(data_set: DataSet, model: Model) -> Playing | None:
 
 def _check_playable(data_set: DataSet, model: Model | None, asked: bool) -> None:
     """Raise InputError where nothing is played that MuJoCo's own system identification could fit."""
-    if asked or model is None or not (data_set.is_commanded or _can_play(data_set, model)):
+    if asked or model is None or model.gains or not (data_set.is_commanded or _can_play(data_set, model)):
         raise InputError(
             f"{data_set.folder}: a script for mujoco.sysid fits what is played: it needs commands (cmd_JOINT) in all "
-            "runs, and a simulator's model with position servos"
+            "runs, and a simulator's model with position servos of its own"
         )
 
 
