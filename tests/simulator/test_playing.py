@@ -39,8 +39,9 @@ def told(tmp_path_factory):
     data, model = logs(folder, stiffness=(20.0, 10.0))
     new, out = folder / "new.xml", folder / "out.json"
     said = irtwin(
-        "diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out, "--workspace", folder / "w"
-    )
+        "diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out, "--workspace", folder / "w",
+        "--save-sysid", folder / "fit.py",
+    )  # fmt: skip
     return said, data, model, new, out
 
 
@@ -57,6 +58,9 @@ def test_the_number_that_differs_is_told_and_written(told):
     changed = servo_arm.read(data, new)[2].numbers
     assert changed[0] == pytest.approx([20.0, 10.0], rel=0.02)
     assert len(set(model.read_text().splitlines()) - set(new.read_text().splitlines())) == 1
+    handed_over = (model.parent / "fit.py").read_text()
+    assert handed_over.count("('elbow', 'kp', [15.0], [") == 1
+    assert "MODEL, LOGS, FITTED = 'arm.xml', 'data', 'fit-fitted.xml'" in handed_over
 
 
 @pytest.mark.slow
