@@ -28,6 +28,7 @@ FREE: Sequence[tuple[str, str, list[float], list[float], list[float], list[float
 LACKS: Sequence[str] = ()
 # stretches of all runs, evenly spread, and how long each is played from where the robot is
 STRETCHES, SECONDS = 16, 15.0
+ITERATIONS = 50  # of the optimiser, at most
 
 
 def change(spec: mujoco.MjSpec, parameter: sysid.Parameter, of: str, number: str) -> None:
@@ -181,7 +182,15 @@ def main() -> None:
     residual = sysid.build_residual_fn(
         models_sequences=[sequences], custom_rollout=played_late, modify_residual=difference
     )
-    fitted, result = sysid.optimize(free, residual, optimizer="mujoco", verbose=False, x_scale="jac")
+    fitted, result = sysid.optimize(
+        free,
+        residual,
+        verbose=False,
+        x_scale="jac",  # numbers are of many units
+        gtol=1e-4,  # rad: a tenth of the noise of encoders
+        max_iters=ITERATIONS,
+        mu_factor=10.0,  # at the end, where nothing is won, it tries all it has
+    )
     left = [residual(x, free.copy())[0] for x in (free.as_nominal_vector(), free.as_vector(), result.x)]
     rms = [1e3 * np.sqrt(np.mean(np.concatenate([one.ravel() for one in some]) ** 2)) for some in left]
     print("Tracking error, mrad (mm): model {:.2f}, by irtwin {:.2f}, fitted {:.2f}".format(*rms))
