@@ -25,6 +25,7 @@ _CALLED = {  # by what a model's file calls it, and MuJoCo's specification
     "delay": "delay",
     "torque_limit": "forcerange",
 }
+_LEAST = 0.1  # of the smaller side, of what may not: motion alone hardly tells the scale of a joint without gravity
 _SIGNED = {  # what may be below zero, and how far beyond both sides it is sought at least: rad, m, m/s^2
     "offset": (0.0,),
     "mass": (np.nan, 0.5, 0.5, 0.5),  # a mass may not, its centre may
@@ -84,7 +85,7 @@ def _bounded(of: str, number: str, model: np.ndarray, robot: np.ndarray) -> Free
     reach = np.array(_SIGNED.get(number, (np.nan,)))
     width = np.fmax(np.maximum(ends[1] - ends[0], np.abs(ends).max(axis=0) / 2), reach)
     least = ends[0] - width
-    least = np.where(np.isnan(reach), np.maximum(least, ends[0] / 2), least)
+    least = np.where(np.isnan(reach), np.maximum(least, _LEAST * ends[0]), least)
     most = np.minimum(ends[1] + width, HOLDS if number == "solimpfriction" else np.inf)
     return of, number, model.tolist(), robot.tolist(), least.tolist(), most.tolist()
 
