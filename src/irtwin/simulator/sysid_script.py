@@ -188,6 +188,7 @@ def main() -> None:
         verbose=False,
         x_scale="jac",  # numbers are of many units
         gtol=1e-4,  # rad: a tenth of the noise of encoders
+        xtol=1e-5,  # of all numbers together
         max_iters=ITERATIONS,
         mu_factor=10.0,  # at the end, where nothing is won, it tries all it has
     )
