@@ -28,7 +28,7 @@ from irtwin.simulator.play import play, whole
 from irtwin.simulator.playing import Playing, diagnose
 from irtwin.simulator.servos import NAMES, Servos, servos
 
-_FITTED = 8
+FITTED = 8
 _SITE, _TABLE = "gripperframe", -0.038  # m, below which the gripper is when it cannot go on down
 _NOISE = 1e-3  # rad, of positions that are made
 _CHANGES = (  # number, joint, what it is times the model's, or more than it
@@ -52,14 +52,14 @@ def farthest(runs: Sequence[Run]) -> list[str]:
 def split(data_set: DataSet, model: Model, names: Sequence[str]) -> None:
     """Fit some runs; print what the written model leaves of the others, mrad, and the time."""
     begin = time.perf_counter()
-    found = diagnose(_of(data_set, names), model)
+    found = diagnose(runs_of(data_set, names), model)
     took = time.perf_counter() - begin
     with TemporaryDirectory() as folder:
         file = Path(folder) / "robot.xml"
         file.write_bytes(found.written())
         own = servos(read_model(file, data_set.robot))
         others = [run for run in data_set.runs if run.name not in names]
-        left, clear = ({run.name: _left(own, run, until) for run in others} for until in (False, True))
+        left, clear = ({run.name: tracking_error(own, run, until) for run in others} for until in (False, True))
     print(f"  {took:.0f} s; fitted {', '.join(names)}")
     for said, found_left in (("whole", left), ("until the table", clear)):
         print(f"  {said}: " + ", ".join(f"{name} {rms:.1f}" for name, rms in found_left.items()))
@@ -69,7 +69,7 @@ def split(data_set: DataSet, model: Model, names: Sequence[str]) -> None:
 def halves(data_set: DataSet, model: Model) -> None:
     """Print what is named on every second run, and on the others, and on both."""
     names = [run.name for run in data_set.runs]
-    told = [_named(diagnose(_of(data_set, names[half::2]), model)) for half in (0, 1)]
+    told = [_named(diagnose(runs_of(data_set, names[half::2]), model)) for half in (0, 1)]
     both = told[0] & told[1]
     print(f"  {len(told[0])} and {len(told[1])} numbers, {len(both)} in both; effects in both: ", end="")
     print(", ".join(sorted({name for _, name in both})))
@@ -119,11 +119,11 @@ def _named(found: Playing) -> set[tuple[str, str]]:
     return {(one.joint, one.name) for cause in found.document.causes for one in cause.parameters}
 
 
-def _of(data_set: DataSet, names: Sequence[str]) -> DataSet:
+def runs_of(data_set: DataSet, names: Sequence[str]) -> DataSet:
     return replace(data_set, runs=tuple(run for run in data_set.runs if run.name in names))
 
 
-def _left(own: Servos, run: Run, until_table: bool = False) -> float:
+def tracking_error(own: Servos, run: Run, until_table: bool = False) -> float:
     left = run.signals.q - play(own, [own.numbers], [whole(run)])[0][0][:, 0]
     return 1e3 * float(np.sqrt((left[: _touches(own.model, run) if until_table else None] ** 2).mean()))
 
@@ -144,11 +144,11 @@ def main() -> None:
     data_set = read_data_set(sys.argv[1], commanded=True)
     model = read_model(Path(sys.argv[2]), data_set.robot)
     print("simulator as published, mrad")
-    print("  " + ", ".join(f"{run.name} {_left(servos(model), run):.1f}" for run in data_set.runs))
+    print("  " + ", ".join(f"{run.name} {tracking_error(servos(model), run):.1f}" for run in data_set.runs))
     print("within: fitted to those that go farthest", flush=True)
-    split(data_set, model, farthest(data_set.runs)[:_FITTED])
+    split(data_set, model, farthest(data_set.runs)[:FITTED])
     print("first: fitted to the first eight", flush=True)
-    split(data_set, model, [run.name for run in data_set.runs[:_FITTED]])
+    split(data_set, model, [run.name for run in data_set.runs[:FITTED]])
     print("halves", flush=True)
     halves(data_set, model)
     print("known changes", flush=True)

@@ -27,6 +27,7 @@ from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
+from irtwin.simulator.sysid import script
 from irtwin.storage.files import check_place, write
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
@@ -46,6 +47,7 @@ def diagnose(
     report: Path | str | None = None,
     twin_file: Path | str | None = None,
     motion_file: Path | str | None = None,
+    sysid_file: Path | str | None = None,
     simulator_file: Path | str | None = None,
     draws: int = 0,
     announce: Announce = lambda line: None,
@@ -59,13 +61,14 @@ def diagnose(
     leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace`
     the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each
     whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added,
-    `motion_file` the motion of the next experiment, where one is designed, `simulator_file` the simulator's model with
-    the numbers that the robot has, and beside it as many `draws` of what these could be, FILE-1 and so on.
+    `motion_file` the motion of the next experiment, where one is designed, `sysid_file` a Python script that fits
+    what differs by `mujoco.sysid`, `simulator_file` the simulator's model with the numbers that the robot has, and
+    beside it as many `draws` of what these could be, FILE-1 and so on.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
     location = None if workspace is None else Location.of(workspace)
-    files = _Files.checked(json_file, report, twin_file, motion_file, simulator_file, draws=draws)
+    files = _Files.checked(json_file, report, twin_file, motion_file, sysid_file, simulator_file, draws=draws)
     if location is not None or files.report is not None:
         from irtwin.report.extensions import check
 
@@ -76,6 +79,8 @@ def diagnose(
     model = None if simulator is None else read_model(Path(simulator), data_set.robot)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
+    if sysid_file is not None:
+        _check_playable(data_set, model, asked)
     data_set = _with_cutoff(data_set, cutoff)
     if location is not None:
         from irtwin.workflow import as_asserted
@@ -102,6 +107,7 @@ class _Files:
     report: Path | None
     twin: Path | None
     motion: Path | None
+    sysid: Path | None
     simulator: Path | None
     draws: tuple[Path, ...] = field(kw_only=True)
 
@@ -128,6 +134,10 @@ class _Files:
         if model and self.simulator:
             for file, content in zip((self.simulator, *self.draws), _models(found, model, seed), strict=False):
                 write(file, content)
+            if isinstance(found, Playing) and (lacking := found.unwritten):
+                announce(f"  {self.simulator} has no place for {', '.join(lacking)}: these stay as they are")
+        if self.sysid is not None:
+            _write_script(data_set, found, self.sysid, announce)
         if self.json is not None:
             write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
         if self.twin is not None and found.twin is not None:
@@ -142,6 +152,13 @@ class _Files:
             announce("Writing the report")
             resources = resources_of(None if location is None else location.folder)
             render_alone(data_set, found.document, found.curves, self.report, resources)
+
+
+def _write_script(data_set: DataSet, found: Diagnosis | Playing, file: Path, announce: Announce) -> None:
+    if isinstance(found, Playing) and found.chosen.differs.any():
+        write(file, script(found.chosen, found.document, data_set.folder, file))
+    else:
+        announce(f"  no number of the servos differs: there is nothing for {file} to fit")
 
 
 def _models(found: Diagnosis | Playing, model: Model, seed: int) -> Iterator[bytes]:
@@ -179,6 +196,15 @@ def _played(data_set: DataSet, model: Model) -> Playing | None:
         return None
     played = diagnose_by_playing(data_set, model)
     return None if played.is_open else played
+
+
+def _check_playable(data_set: DataSet, model: Model | None, asked: bool) -> None:
+    """Raise InputError where nothing is played that MuJoCo's own system identification could fit."""
+    if asked or model is None or model.gains or not (data_set.is_commanded or _can_play(data_set, model)):
+        raise InputError(
+            f"{data_set.folder}: a script for mujoco.sysid fits what is played: it needs commands (cmd_JOINT) in all "
+            "runs, and a simulator's model with position servos of its own"
+        )
 
 
 def _can_play(data_set: DataSet, model: Model) -> bool:

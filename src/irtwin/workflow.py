@@ -120,8 +120,15 @@ def keep_diagnosis(location: Location, data_set: DataSet, diagnosis: Diagnosis |
                 record(apart, robot_id, diagnosis.document, diagnosis.curves, closed, motion)
             renew(place, graph, announce)
         with open_graph(place.location) as graph:
-            out = place.gap_report_path(robot_id)
-            render_gap(graph, graph.iri(robot_iri(robot_id)), place.read_document, out, place.resources)
+            robot, out = graph.iri(robot_iri(robot_id)), place.gap_report_path(robot_id)
+            render_gap(
+                graph,
+                robot,
+                place.read_document,
+                out,
+                place.resources,
+                lambda: (data_set.robot, meshes_of_graph(graph, robot, place.read_document)),
+            )
 
 
 def adopt(robot: str, workspace: Location | Path | str = WORKSPACE, *, announce: Announce = lambda line: None) -> Path:

@@ -236,6 +236,16 @@ def test_of_many_joints_the_foremost_curves_are_shown(tmp_path: Path) -> None:
     assert "has 3 more curves" in page
 
 
+def test_what_no_file_of_the_simulator_holds_is_said_with_what_that_leaves(tmp_path: Path) -> None:
+    said = gap_cases.diagnosis("attributed")
+    said["shrink"]["by_cause"][0] |= {"channel": "position", "rmse_when_left_out": [2.1e-3, 2.1e-3]}
+    page = page_of(tmp_path, said).replace("\N{NO-BREAK SPACE}", " ")
+    assert page.count("No number of the simulator’s file holds it") == 1
+    assert "0.00210 rad of the tracking error are left" in page
+    said["causes"][0]["parameters"][0] |= {"simulator": 1.0, "robot": 2.82}
+    assert "No number of the simulator’s file" not in page_of(tmp_path / "held", said)
+
+
 def test_a_robot_without_diagnosis_is_an_error(tmp_path: Path) -> None:
     with Workspace(tmp_path / "w") as workspace:
         six_axis(workspace)

@@ -25,6 +25,16 @@ def test_the_filter_is_said_where_it_is_known():
     assert summary.filtered(gap_cases.document("ambiguous")) == []
 
 
+def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
+    said = gap_cases.diagnosis("attributed")
+    both = [2.1e-3, 2.1e-3], [3e-4, 3e-4]
+    said["shrink"]["by_cause"][0] |= {"channel": "position", "rmse_when_left_out": both[0], "rmse_with_all": both[1]}
+    document = Document.from_json(said)
+    played, measured = summary.not_held(document.causes[:2], document)
+    assert "keeps that difference, 2.1 mrad (mm) RMS where 0.3 are left with irtwin.simulator.callback." in played
+    assert measured.endswith("the simulator's model keeps that difference.")
+
+
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     rows = summary.causes(gap_cases.document("attributed")).rows
     assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [

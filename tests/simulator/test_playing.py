@@ -16,6 +16,7 @@ from tests.data_sets import irtwin
 from irtwin.document.document import Change, Document
 from irtwin.report.gap.headline import line
 from irtwin.simulator.playing import diagnose
+from irtwin.simulator.writing import together
 
 
 def logs(folder, change=None, text=servo_arm.MODEL, runs=("a", "b"), seconds=4, **numbers):
@@ -38,8 +39,9 @@ def told(tmp_path_factory):
     data, model = logs(folder, stiffness=(20.0, 10.0))
     new, out = folder / "new.xml", folder / "out.json"
     said = irtwin(
-        "diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out, "--workspace", folder / "w"
-    )
+        "diagnose", data, "--simulator", model, "--save-simulator", new, "--json", out, "--workspace", folder / "w",
+        "--save-sysid", folder / "fit.py",
+    )  # fmt: skip
     return said, data, model, new, out
 
 
@@ -56,6 +58,9 @@ def test_the_number_that_differs_is_told_and_written(told):
     changed = servo_arm.read(data, new)[2].numbers
     assert changed[0] == pytest.approx([20.0, 10.0], rel=0.02)
     assert len(set(model.read_text().splitlines()) - set(new.read_text().splitlines())) == 1
+    handed_over = (model.parent / "fit.py").read_text()
+    assert handed_over.count("('elbow', 'kp', [15.0], [") == 1
+    assert "MODEL, LOGS, FITTED = 'arm.xml', 'data', 'fit-fitted.xml'" in handed_over
 
 
 @pytest.mark.slow
@@ -80,9 +85,23 @@ def test_the_page_of_a_workspace_says_it_too(told):
     page = (told[1].parent / "w" / "reports" / "arm.gap.html").read_text()
     for said in ("Tracking error of each run", "differs from the simulator’s", "servo stiffness", "Simulator</th>"):
         assert said in page
+    assert page.count('class="ia-picture"') == 2
+    off = re.findall(r"<figcaption>(The simulator as it is|With the robot’s numbers): ([\d.]+)\s*mm off", page)
+    assert [one for one, _ in off] == ["The simulator as it is", "With the robot’s numbers"]
+    assert float(off[0][1]) > 5 * float(off[1][1])
     said = irtwin("improve", "arm", "--workspace", told[1].parent / "w")
     assert said.status == 2
     assert "its diagnosis (attributed) added nothing to the twin" in said.err
+
+
+def test_what_is_left_is_within_its_interval_in_any_unit():
+    """Also where squares are above one, as of torques in N m."""
+    squares = np.array([[4.0, 6.0], [8.0, 10.0], [5.0, 3.0]])
+    small, large = (together(4 * scale * squares, scale * squares) for scale in (1e-6, 1.0))
+    assert large.after == pytest.approx(6**0.5)
+    assert large.interval95_after[0] < large.after < large.interval95_after[1]
+    assert large.interval95_after == pytest.approx([1e3 * end for end in small.interval95_after])
+    assert together(squares[:1], squares[:1]).interval95_after is None
 
 
 def test_a_simulator_that_is_right_agrees():

@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests import servo_arm
 
 from irtwin.errors import InputError
+from irtwin.simulator.play import play, whole
+from irtwin.simulator.servos import has_servos
 
 SWING = {"a": servo_arm.swings(4, 1)}
 
@@ -67,3 +72,57 @@ def test_an_actuator_that_is_no_position_servo_is_refused(tmp_path, servo):
 def test_commands_beyond_the_models_range_are_counted(tmp_path):
     own = arm(tmp_path)[2]
     assert own.clipped(np.array([[0.0, 1.0], [0.0, 1.6], [0.0, -1.7], [1.0, 0.0]])) == {"elbow": 0.5}
+
+
+GAINS = "[robot.joint.lift]\nkp = 20.0\nkd = 0.8\n[robot.joint.elbow]\nkp = 15.0\nkd = 0.6\n"
+OWN = '<dynamics damping="0.1" friction="0.05"/>'
+BARE = servo_arm.MODEL.replace('armature="0.02"', 'armature="0"').replace(' forcerange="-5 5"', "")
+UNDRIVEN = re.sub("(?s)<actuator>.*</actuator>", "", BARE)
+
+
+def with_gains(tmp_path, model_text, suffix):
+    """Return the data set that tells a controller's gains, and the servos of a model that has none."""
+    data, _ = servo_arm.write(tmp_path, {"a": servo_arm.swings(4, 0)}, BARE)
+    file = data / "dataset.toml"
+    file.write_text(file.read_text().replace("[[run]]", f"{GAINS}[[run]]", 1), encoding="utf-8")
+    model = tmp_path / f"told{suffix}"
+    model.write_text(model_text, encoding="utf-8")
+    return servo_arm.read(data, model)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [UNDRIVEN, re.sub('<position joint="(.*?)" [^>]*>', r'<motor joint="\1" gear="50"/>', BARE)],
+)
+def test_gains_that_are_told_make_servos_as_those_of_a_model(tmp_path, text):
+    data_set, model, own = with_gains(tmp_path, text, ".xml")
+    assert list(model.gains) == ["lift", "elbow"]
+    servos_of_file = servo_arm.read(data_set.folder, tmp_path / "arm.xml")[2]
+    runs = [whole(run) for run in data_set.runs]
+    told, wanted = (play(one, [one.numbers], runs)[0][0] for one in (own, servos_of_file))
+    np.testing.assert_allclose(told, wanted, atol=1e-9)
+
+
+def test_a_urdf_with_gains_is_played_and_has_its_damping_written(tmp_path):
+    text = servo_arm.URDF.replace("</joint>", f"{OWN}</joint>")
+    _, model, own = with_gains(tmp_path, text, ".urdf")
+    assert has_servos(model)
+    np.testing.assert_allclose(own.numbers[:3], [[20.0, 15.0], [0.9, 0.7], [0.05, 0.05]])
+    robots = servo_arm.changed(own, stiffness=(25.0, 15.0), damping=(0.9, 1.0), armature=(0.1, 0.0))
+    new = own.written(robots, robots != own.numbers).decode()
+    assert new == text[::-1].replace('damping="0.1"'[::-1], 'damping="0.4"'[::-1], 1)[::-1]
+    assert own.unwritten(robots != own.numbers) == ["stiffness of lift", "armature of lift"]
+
+
+def test_a_commanded_speed_takes_away_what_damping_of_a_controller_lags(tmp_path):
+    data_set, _, own = with_gains(tmp_path, UNDRIVEN, ".xml")
+    (run,) = data_set.runs
+    time = run.signals.time
+    told = 0.5 * np.sin(3 * time[:, None] * np.ones(2))
+    speed = 1.5 * np.cos(3 * time[:, None] * np.ones(2))
+    left = []
+    for more in (None, speed):
+        signals = replace(run.signals, q=told, command=told, command_speed=more)
+        stretch = whole(replace(run, signals=signals))
+        left.append(np.abs(play(own, [own.numbers], [stretch])[0][0][50:, 0] - told[50:]).max())
+    assert left[1] < left[0] / 2

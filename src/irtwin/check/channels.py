@@ -41,7 +41,7 @@ def _columns(robot: Robot, moving: Moving) -> Iterator[str]:
     """Yield the columns that all runs have, of joints that move and of the whole robot."""
     names = [name for name, moves in zip(robot.joint_names, moving.joints, strict=True) if moves]
     every = set.intersection(*(set(run.signals.logged()) for run in moving.runs))
-    for field in sorted(every - {"time", "ddq", "temperature", "command"}):
+    for field in sorted(every - {"time", "ddq", "temperature", "command", "command_speed"}):
         yield from CHANNELS[field].columns(names)
 
 

@@ -148,6 +148,13 @@ def demo(location: Location, no_open: bool, case_study: bool, **asked: Any) -> N
     help="File to write that model to, with the numbers that the robot has; all else stays as it is.",
 )
 @click.option(
+    "--save-sysid",
+    "sysid_file",
+    metavar="FILE.py",
+    type=FILE,
+    help="Script to write that fits the numbers that differ by MuJoCo's own system identification, mujoco.sysid.",
+)
+@click.option(
     "--draws",
     type=click.IntRange(0, 10_000),
     default=0,
@@ -187,8 +194,9 @@ def diagnose(
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
-    if simulator_file and not simulator:
-        raise click.UsageError("--save-simulator writes the model of --simulator: give that too")
+    for option, file in (("--save-simulator writes", simulator_file), ("--save-sysid fits", asked["sysid_file"])):
+        if file and not simulator:
+            raise click.UsageError(f"{option} the model of --simulator: give that too")
     if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
         raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     if asked["draws"] and not simulator_file:
@@ -208,7 +216,7 @@ def diagnose(
         if table:
             click.echo()
             show(table, counted=False)
-    for said in summary.not_held(not_held(found.document)) if simulator else ():
+    for said in summary.not_held(not_held(found.document), found.document) if simulator else ():
         click.echo(f"\n{said}")
     for said in summary.next_steps(found.document):
         click.echo(f"\n{said}")

@@ -93,6 +93,23 @@ class PlannedMotion:
     q: tuple[Numbers, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Apart:
+    """The moment of all runs at which a simulator's flange is farthest from the robot's: `time` s of a run.
+
+    Joint positions (n,), rad or m, of the robot, of the simulator `before` and `after` it has the robot's numbers; what
+    its flange is off then, m.
+    """
+
+    run: str
+    time: float
+    robot: Known
+    before: Known
+    after: Known
+    off_before: float
+    off_after: float
+
+
 @dataclass(frozen=True)
 class FrictionNumber:
     """A parameter of a friction effect, with its 95 % interval."""
@@ -139,7 +156,7 @@ class Curves:
     """All that is drawn; no map where no torque was measured.
 
     `friction`: of each joint by the twin with its causes, and of those whose friction changed as it was before; None
-    where it is not known.
+    where it is not known. `apart`: of a simulator that was played.
     """
 
     follows: tuple[Followed, ...]
@@ -147,6 +164,7 @@ class Curves:
     heat_map: ExcessMap | None = told(default=None)
     experiment: PlannedMotion | None
     friction: tuple[FrictionCurve, ...] | None = None
+    apart: Apart | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the curves as JSON."""

@@ -343,10 +343,10 @@ class CauseChange:
     @property
     def changes(self) -> tuple[ChangeBy, ...]:
         """What it changes alone, and all others without it: pooled over joints."""
-        before, measure = _pooled(self.rmse_before), f"{self.channel}_rmse"
+        before, measure = pooled(self.rmse_before), f"{self.channel}_rmse"
         left = {"alone": self.rmse_alone, "without": self.rmse_when_left_out}
         changes = {
-            part: Change(before=before, after=_pooled(after), noise_floor=None, interval95_after=None)
+            part: Change(before=before, after=pooled(after), noise_floor=None, interval95_after=None)
             for part, after in left.items()
         }
         return tuple(
@@ -355,7 +355,7 @@ class CauseChange:
         )
 
 
-def _pooled(values: Sequence[float]) -> float:
+def pooled(values: Sequence[float]) -> float:
     """Return the root of the mean square over joints."""
     return math.sqrt(sum(value**2 for value in values) / len(values))
 

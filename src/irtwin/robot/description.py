@@ -16,6 +16,7 @@ class Joint:
     """A moving joint. Lengths and angles in m or rad by `kind`; None where nobody said.
 
     `rotor_inertia` (kg m^2), `torque_constant` (N m/A) are reflected to the joint; `winding_resistance` in ohm.
+    `kp`, `kd`: gains of its controller, N m/rad (N/m) and N m s/rad (N s/m) of the joint.
     `friction_width` (rad/s or m/s) and `friction_exponent`: over which speed, and how, dry friction turns at zero
     (`effects.friction.turn`); None: at once. `friction_widest`: the wider of two such widths, where runs show two.
     """
@@ -31,6 +32,8 @@ class Joint:
     rotor_inertia: float | None = None
     torque_constant: float | None = None
     winding_resistance: float | None = None
+    kp: float | None = None
+    kd: float | None = None
     friction_width: float | None = None
     friction_exponent: float | None = None
     friction_widest: float | None = field(default=None, compare=False)  # no number of a twin

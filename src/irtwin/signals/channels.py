@@ -78,6 +78,9 @@ class Signals:
     command: Annotated[Logged, Channel("cmd", "rad", 1e4, "commanded position", sliding="m", device="controller")] = (
         None
     )
+    command_speed: Annotated[
+        Logged, Channel("dcmd", "rad/s", 1e4, "commanded speed", sliding="m/s", device="controller")
+    ] = None
     temperature: Annotated[
         Logged, Channel("temp", "degC", 1e3, "temperature", streamed="temperature", device="thermometer")
     ] = None

@@ -23,7 +23,7 @@ from irtwin.toml_text import read_toml
 
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
 ROLES = ("observed", "reference", "simulated", PLANNED)
-SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration")
+SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration", "kp", "kd")
 _POWER_AT = ("mains", "dc_bus")
 # what the tables of dataset.toml may hold, besides notes
 DATA_SET_KEYS = ("robot", "run", "twin", "topics")

@@ -54,7 +54,13 @@ class Alone:
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
         steps = self.load.shape[1]
         begin = np.arange(steps) * self.step
-        told = np.array([[one.commands(begin, self.step, each) for one in self.stretches] for each in numbers])
+        leads = [self.servos.lead(each) for each in numbers]
+        told = np.array(
+            [
+                [one.commands(begin, self.step, each, lead) for one in self.stretches]
+                for each, lead in zip(numbers, leads, strict=True)
+            ]
+        )
         moved = self._moved(numbers, np.moveaxis(told, 2, 0))
         at = [one.time / self.step for one in self.stretches]
         return [

@@ -24,8 +24,12 @@ if TYPE_CHECKING:
     import mujoco
 
 _SECOND = " beside its servo"
+_GAINS = " by its controller's gains"
 _APART = 1e-3  # m, frames that are at one place
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
+
+
+Gains = Mapping[str, tuple[float, float]]  # of joints: N m/rad, N m s/rad
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class Model:
     speeds: np.ndarray  # (n,) in qvel
     others: tuple[str, ...]
     delays: np.ndarray  # (number of actuators,), s; the compiled model has none
+    gains: Gains  # of joints whose servos are not the file's
 
     @property
     def name(self) -> str:
@@ -100,13 +105,14 @@ class Model:
 
 
 def read_model(path: Path, robot: Robot) -> Model:
-    """Read a model of the robot.
+    """Read a model of the robot. A joint without a position servo has one by its controller's gains, if these are told.
 
     Raises InputError where the file is no model, a mesh that gives a body its inertia is missing, or the robot's joints
     are not among the model's.
     """
     file = read_model_file(path)
-    compiled, delays = _compiled(file)
+    told = {one.name: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
+    compiled, delays, gains = _compiled(file, told)
     places, others = joints_of(compiled, robot.joint_names, str(path))
     return Model(
         file,
@@ -116,6 +122,7 @@ def read_model(path: Path, robot: Robot) -> Model:
         compiled.jnt_dofadr[places],
         others,
         delays,
+        gains,
     )
 
 
@@ -142,13 +149,16 @@ class Paired:
 
 def pair(model: Model) -> Paired:
     """Return a model with second actuators."""
-    compiled, _ = _compiled(model.file, model.joints)
+    compiled, *_ = _compiled(model.file, model.gains, model.joints)
     second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints]
     return Paired(compiled, np.array(second), np.array([compiled.joint(joint).id for joint in model.joints]))
 
 
-def _compiled(file: ModelFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray]:
-    """Return the compiled model without the delays of its actuators, and these; `paired`: joints with a second one."""
+def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray, Gains]:
+    """Return the compiled model without the delays of its actuators, these, and the gains that make servos of it.
+
+    `paired`: joints with a second actuator.
+    """
     try:
         import mujoco
     except ModuleNotFoundError as error:
@@ -156,6 +166,7 @@ def _compiled(file: ModelFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjMod
     try:
         spec = mujoco.MjSpec.from_file(str(file.path))
         _drop_pictures(spec, mujoco, file.is_urdf)
+        added = {joint: both for joint, both in gains.items() if _add_servo(spec, joint, both, mujoco)}
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
         for one in spec.actuators:
             one.delay, one.nsample = 0.0, 0
@@ -166,9 +177,23 @@ def _compiled(file: ModelFile, paired: Sequence[str] = ()) -> tuple[mujoco.MjMod
                 spec.add_sensor(
                     type=mujoco.mjtSensor.mjSENS_JOINTACTFRC, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint.name
                 )
-        return spec.compile(), delays
+        return spec.compile(), delays, added
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
+
+
+def _add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float], mujoco: Any) -> bool:
+    """Give a joint a position servo in place of its motors; return whether it has none of its own."""
+    own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
+    if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
+        return False
+    for one in drives:
+        spec.delete(one)
+    servo = spec.add_actuator(name=f"{joint}{_GAINS}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servo.gainprm[0], servo.biasprm[:3] = gains[0], (0.0, -gains[0], -gains[1])
+    servo.forcelimited, servo.forcerange = own.actfrclimited, own.actfrcrange
+    return True
 
 
 def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:

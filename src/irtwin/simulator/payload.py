@@ -22,7 +22,7 @@ def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray)
     import mujoco
 
     body = flange.body
-    whole, centre, inertia = _together(compiled, flange, mass, off)
+    whole, centre, inertia = together(compiled, flange, mass, off)
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] *= np.linalg.det(axes)
     compiled.body_mass[body], compiled.body_ipos[body], compiled.body_inertia[body] = whole, centre, moments
@@ -44,13 +44,13 @@ def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Tag, dict[str
     tag = model.file.inertial(model.compiled.body(model.flange.body).name)
     if tag is None:
         return {}
-    whole, centre, inertia = _together(model.compiled, model.flange, mass, off)
+    whole, centre, inertia = together(model.compiled, model.flange, mass, off)
     told: dict[str, float | str | None] = dict.fromkeys(_OTHER_FORMS)
     told |= {"mass": float(whole), "pos": " ".join(map(repr, centre.tolist()))}
     return {tag: told | {"fullinertia": " ".join(repr(float(inertia[at])) for at in _UPPER)}}
 
 
-def _together(
+def together(
     compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Return mass, centre (3,) and the inertia (3, 3) about it, in the body's frame, of body and mass."""

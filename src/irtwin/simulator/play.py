@@ -60,13 +60,17 @@ class Stretch:
         position, speed = np.linalg.lstsq(columns, q[near], rcond=None)[0]
         return position, speed
 
-    def commands(self, begin: np.ndarray, step: float, numbers: np.ndarray) -> np.ndarray:
+    def commands(
+        self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0
+    ) -> np.ndarray:
         """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
 
-        Each command is in force until the next comes; delay and offset of `numbers` (k, n) are in them.
+        Each command is in force until the next comes; delay and offset of `numbers` (k, n) are in them, and so is a
+        commanded speed over `lead` (n,) s, where one was logged.
         """
-        time, told = self.run.signals.time, self.run.signals.command
+        time, told, speed = self.run.signals.time, self.run.signals.command, self.run.signals.command_speed
         assert told is not None
+        told = told if speed is None else told + lead * speed
         ends = np.concatenate([[time[0] - 1e4], time, [time[-1] + 1e4]])
         held = np.vstack([told[:1], told])  # before the first sample: the first
         summed = np.vstack([np.zeros(told.shape[1]), np.cumsum(held * np.diff(ends)[:, None], axis=0)])
@@ -127,7 +131,7 @@ def _played(
         some = pairs[first : first + at_once]
         told = np.zeros((len(some), steps, compiled.nu))
         for row, (one, place) in enumerate(some):
-            commands = stretches[place].commands(begin, step, numbers[one])
+            commands = stretches[place].commands(begin, step, numbers[one], servos.lead(numbers[one]))
             for drives in (servos.actuators, *([servos.paired.second] if paired else [])):
                 told[row][:, drives] = commands
         begun = np.array([states[at] for _, at in some])

@@ -50,6 +50,11 @@ class Playing:
         """Return the model's file with the robot's numbers."""
         return self.chosen.fit.servos.written(self.chosen.numbers, self.chosen.differs)
 
+    @property
+    def unwritten(self) -> list[str]:
+        """Which of the robot's numbers that file has no place for."""
+        return self.chosen.fit.servos.unwritten(self.chosen.differs)
+
     def drawn(self, rng: np.random.Generator) -> bytes:
         """Return the model's file with the robot's numbers as they could be."""
         return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)

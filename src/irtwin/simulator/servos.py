@@ -24,6 +24,7 @@ PARTS = {"payload": ("payload", "payload_x", "payload_y", "payload_z"), "base_ti
 OF_ROBOT = tuple(name for names in PARTS.values() for name in names)  # the same at all joints
 NAMES = (*OF_JOINTS, *OF_ROBOT)
 _IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
+_IN_SERVO = ("stiffness", "offset", "delay", "torque_limit")  # and damping, of some
 _UNLIMITED = np.array([[-1e12], [1e12]])  # N m
 _FARTHEST = 2 * np.pi  # rad that a joint is off: a servo without limit gives no more torque than there
 HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more: the most that MuJoCo takes
@@ -70,6 +71,15 @@ class Servos:
         found = np.repeat(np.isin(NAMES, OF_JOINTS)[:, None], self.numbers.shape[1], axis=1)
         found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
         return found
+
+    @cached_property
+    def in_file(self) -> np.ndarray:
+        """Whether the servo of each joint (n,) is the model's file's, not one by its controller's gains."""
+        return np.array([joint not in self.model.gains for joint in self.model.joints])
+
+    def lead(self, numbers: np.ndarray) -> np.ndarray:
+        """Return how many s (n,) of a commanded speed controllers of told gains add to a commanded position."""
+        return np.where(self.in_file, 0.0, self.dampings(numbers[1])[1] / numbers[0])
 
     @cached_property
     def paired(self) -> Paired:
@@ -121,14 +131,17 @@ class Servos:
         return one
 
     def dampings(self, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the damping (n,) in joint and in servo: the servo's changes where it has any, the joint's else."""
+        """Return the damping (n,) in joint and in servo: that of a servo of the file changes where it has any."""
         joint = self.model.compiled.dof_damping[self.model.speeds]
         servo = -self.model.compiled.actuator_biasprm[self.actuators, 2]
-        kept = np.where(servo > 0, np.minimum(joint, damping), damping)
+        kept = np.where((servo > 0) & self.in_file, np.minimum(joint, damping), np.maximum(damping - servo, 0.0))
         return kept, damping - kept
 
     def written(self, numbers: np.ndarray, differs: np.ndarray) -> bytes:
-        """Return the model's file with those of numbers (k, n) that differ (k, n); all else stays, byte for byte."""
+        """Return the model's file with those of numbers (k, n) that differ (k, n); all else stays, byte for byte.
+
+        What the file has no place for stays out: a URDF's friction that creeps and armature, and gains that are told.
+        """
         changes: dict[Tag, dict[str, float | str | None]] = {}
         file = self.model.file
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
@@ -141,9 +154,10 @@ class Servos:
             of_joint |= {key: told[name] for key, name in _IN_JOINT.items() if own[name]}
             if own["holding"]:
                 of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
-            if of_joint:
-                changes[file.tag(["joint"], "name", joint)] = of_joint
-            if any(own[name] for name in ("stiffness", "damping", "offset", "delay", "torque_limit")):
+            for key in filter(file.holds, of_joint):
+                tag, attribute = file.number(joint, key)
+                changes.setdefault(tag, {})[attribute] = of_joint[key]
+            if self.in_file[place] and any(own[name] for name in ("damping", *_IN_SERVO)):
                 tag = file.tag(["position", "general"], "joint", joint)
                 changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
         mass, *off = numbers[len(OF_JOINTS) :, 0]
@@ -153,6 +167,16 @@ class Servos:
         if option and differs[NAMES.index("tilt_x")].any():
             changes[option] = {"gravity": " ".join(map(repr, tilted(self.model.compiled, off[3:]).tolist()))}
         return file.changed(changes)
+
+    def unwritten(self, differs: np.ndarray) -> list[str]:
+        """Return which numbers that differ (k, n) the file has no place for, in words."""
+        told = []
+        for row, name in enumerate(OF_JOINTS):
+            lacks = ~self.in_file if name in _IN_SERVO else np.zeros(len(self.in_file), dtype=bool)
+            lacks |= self.model.file.is_urdf and name in ("holding", "armature")
+            told += [f"{name} of {self.model.joints[place]}" for place in np.flatnonzero(differs[row] & lacks)]
+        parts = [part for part in PARTS if self.model.file.is_urdf and differs[row_of(part)].any()]
+        return told + [part.replace("_", " ") for part in parts]
 
     def _of_servo(
         self, tag: Tag, place: int, told: Mapping[str, float], own: Mapping[str, bool], damping: float

@@ -28,10 +28,21 @@ OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
 
 @dataclass(frozen=True)
 class Tracked:
-    """Tracking error of a run played as a whole: mean `squares` (c, n), rad^2 and N^2 m^2; `flange`, m, RMS."""
+    """A run played as a whole: the tracking error's mean `squares` (c, n), rad^2 and N^2 m^2.
+
+    At some times (P,), s: positions of robot and model (P, n), and how far apart they have the flange, `off` (P,) m.
+    """
 
     squares: np.ndarray
-    flange: float
+    time: np.ndarray
+    robot: np.ndarray
+    model: np.ndarray
+    off: np.ndarray
+
+    @property
+    def flange(self) -> float:
+        """The error of the flange's place, m, RMS."""
+        return float(np.sqrt((self.off**2).mean()))
 
 
 @dataclass(frozen=True)
@@ -96,9 +107,10 @@ def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> l
         every = whole(run)
         left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
         some = slice(None, None, max(1, len(left) // _POSES))
-        places = [placements(robot, q[some])[:, :3, 3] for q in (every.q, every.q - left[:, 0])]
-        flange = float(np.sqrt(((places[0] - places[1]) ** 2).sum(axis=1).mean()))
-        found.append(Tracked((left**2).mean(axis=0), flange))
+        poses = every.q[some], (every.q - left[:, 0])[some]
+        places = [placements(robot, q)[:, :3, 3] for q in poses]
+        off = np.linalg.norm(places[0] - places[1], axis=1)
+        found.append(Tracked((left**2).mean(axis=0), run.signals.time[some], *poses, off))
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from irtwin.document import document as said
-from irtwin.document.curves import Curves, RunError
+from irtwin.document.curves import Apart, Curves, RunError
 from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.closing import share
@@ -95,12 +95,12 @@ def document(
         shrink=said.Shrink(
             held_out_runs=tuple(runs) if len(runs) > 1 else (),
             noise_floor_from=None,
-            torque_rmse=_together(*(one[:, 0] for one in torques)) if torques[0].size else None,
+            torque_rmse=together(*(one[:, 0] for one in torques)) if torques[0].size else None,
             power_rmse=None,
             energy_error_percent=None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
-            position_rmse=_together(*places),
+            position_rmse=together(*places),
         ),
         next_experiment=None,
         unexplained_because="much_is_left" if verdict == "unexplained" else None,
@@ -117,8 +117,24 @@ def _sizes(robot: Robot, squares: np.ndarray) -> Mapping[str, said.Size]:
 
 
 def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Curves:
-    """Return what a page draws: the tracking error of each run."""
-    return Curves(follows=(), runs=tuple(_errors(robot, runs, before, after)), experiment=None)
+    """Return what a page draws: the tracking error of each run, and robot and model where they are farthest apart."""
+    every = tuple(_errors(robot, runs, before, after))
+    return Curves(follows=(), runs=every, experiment=None, apart=_apart(runs, before, after))
+
+
+def _apart(runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Apart:
+    run = int(np.argmax([one.off.max() for one in before]))
+    one, other = before[run], after[run]
+    at = int(one.off.argmax())
+    return Apart(
+        run=runs[run],
+        time=float(one.time[at]),
+        robot=tuple(one.robot[at].tolist()),
+        before=tuple(one.model[at].tolist()),
+        after=tuple(other.model[at].tolist()),
+        off_before=float(one.off[at]),
+        off_after=float(other.off[at]),
+    )
 
 
 def _errors(
@@ -141,16 +157,16 @@ def _verdict(named: bool, closed: float, before: float, after: float) -> str:
     return "attributed" if closed >= _ATTRIBUTED or after < AGREES else "unexplained"
 
 
-def _together(before: np.ndarray, after: np.ndarray) -> said.Change:
-    """Return how far tracking error falls, of mean squares (runs, n)."""
+def together(before: np.ndarray, after: np.ndarray) -> said.Change:
+    """Return how far an error falls, of mean squares (runs, n), with Student's interval over runs of what is left."""
     of_run = after.mean(axis=1)
-    lower, upper = share(of_run, np.ones(len(of_run)))[1]
-    ends = [float(np.sqrt(max(end, 0.0))) for end in (lower, upper)]
+    half = scipy.special.stdtrit(len(of_run) - 1, 0.975) * scipy.stats.sem(of_run) if len(of_run) > 1 else 0.0
+    lower, upper = (float(np.sqrt(max(of_run.mean() + side * half, 0.0))) for side in (-1, 1))
     return said.Change(
         before=_rms(before),
         after=_rms(after),
         noise_floor=None,
-        interval95_after=(ends[0], ends[1]) if len(after) > 1 else None,
+        interval95_after=(lower, upper) if len(of_run) > 1 else None,
     )
 
 

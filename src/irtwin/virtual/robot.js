@@ -4,7 +4,7 @@
 //   irtwinRobot.makeViewer(pane, view) a viewer in an element, its camera on `data.view`; `plain` draws fast, without
 //                                     shadows and smooth edges
 //   irtwinRobot.bySoftware()          whether the processor draws, which takes ten times as long
-//   irtwinRobot.build(viewer, data)   the robot of virtual/robot_data.py in it, which has
+//   irtwinRobot.build(viewer, data, name) the robot of virtual/robot_data.py in it, one of each name, which has
 //     .pose(q)         stand at the joint positions, rad or m
 //     .colour(shares)  colour what each joint moves by a share of -1 to 1; null gives it its own colours again
 //     .flange(q)       where the flange then is, m
@@ -64,11 +64,11 @@ window.irtwinRobot = (function () {
     return mesh;
   }
 
-  function build(viewer, data) {
+  function build(viewer, data, name = "robot") {
     const paths = [];
-    data.joints.forEach((joint, index) => paths.push([...(joint.parent < 0 ? ["robot"] : paths[joint.parent]), "joint " + index]));
+    data.joints.forEach((joint, index) => paths.push([...(joint.parent < 0 ? [name] : paths[joint.parent]), "joint " + index]));
     const drawn = data.parts.map((part, index) => {
-      const mesh = draw(part, data.meshes), path = [...(part.joint < 0 ? ["robot"] : paths[part.joint]), "part " + index];
+      const mesh = draw(part, data.meshes), path = [...(part.joint < 0 ? [name] : paths[part.joint]), "part " + index];
       viewer.set_object(path, mesh);
       viewer.set_transform(path, part.placement);
       return { joint: part.joint, material: mesh.material, own: mesh.material.color.clone() };

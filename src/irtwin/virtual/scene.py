@@ -42,7 +42,7 @@ def scene_html(
         "opens": opens,
     }
     scripts = packed_scripts([viewer_script(), *(asset(name) for name in _SCRIPTS)])
-    html = _template().render(
+    html = template("scene.html.jinja").render(
         title=title,
         robot=robot.name,
         runs=[run.name for run in runs],
@@ -57,8 +57,9 @@ def scene_html(
 
 
 @cache
-def _template() -> jinja2.Template:
+def template(name: str) -> jinja2.Template:
+    """Return a template of this room."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return environment.from_string(asset("scene.html.jinja"))
+    return environment.from_string(asset(name))

@@ -7,7 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from irtwin.document.curves import Curves
+import numpy as np
+
+from irtwin.document.curves import Apart, Curves
 from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.errors import InputError
 from irtwin.json_text import parse_json
@@ -15,6 +17,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.packing import Fragment
 from irtwin.providers.gap import unrecorded
 from irtwin.providers.records import identifier, robot_iri
 from irtwin.report import wording
@@ -28,20 +31,29 @@ from irtwin.report.gap.verdict import effect_name, of_cause
 from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
+from irtwin.robot.description import Robot
+from irtwin.robot.meshes import Mesh
 from irtwin.signals.log import DataSet
 from irtwin.storage.files import write
 from irtwin.storage.in_memory import in_memory
+from irtwin.virtual.apart import apart_html
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
+DescribeRobot = Callable[[], tuple[Robot, Mapping[str, Mesh]]]  # with its meshes
 
 
 def render_gap(
-    graph: Graph, robot: str, read_document: ReadDocument, out: Path, resources: Resources | None = None
+    graph: Graph,
+    robot: str,
+    read_document: ReadDocument,
+    out: Path,
+    resources: Resources | None = None,
+    describe: DescribeRobot | None = None,
 ) -> None:
     """Write the gap report of a robot (its IRI) to `out`.
 
     Numbers and sentences come from the questions in `reports/gap`, curves from the evidence file that the graph names,
-    with friction's numbers.
+    with friction's numbers. `describe` says what the robot looks like, if it is to be drawn beside its simulator.
     `resources` are the questions and templates to take, those that ship if None.
     Raises InputError where the graph has no diagnosis of the robot.
     """
@@ -53,7 +65,16 @@ def render_gap(
     bindings = {"robot": robot, "diagnosis": diagnosis["diagnosis"]}
     answers = ask(graph, questions, bindings)
     curves = Curves.from_json(parse_json(read_document(diagnosis["evidence_file"], diagnosis["evidence_checksum"])))
-    write(out, _page(resources, answers, bindings, curves).encode())
+    picture = None if describe is None or curves.apart is None else _picture(curves.apart, *describe())
+    write(out, _page(resources, answers, bindings, curves, picture).encode())
+
+
+def _picture(apart: Apart, robot: Robot, meshes: Mapping[str, Mesh]) -> Fragment:
+    before, after = (wording.quantity(1e3 * off, "mm", 2) for off in (apart.off_before, apart.off_after))
+    poses = {f"The simulator as it is: {before} off": np.array(apart.before)}
+    if apart.after != apart.before:
+        poses[f"With the robot’s numbers: {after} off"] = np.array(apart.after)
+    return apart_html(robot, np.array(apart.robot), poses, meshes)
 
 
 def render_alone(
@@ -67,10 +88,12 @@ def render_alone(
         graph.replace(map_database(engine, graph.resources.paths("mappings")), GRAPH_SOURCE, GRAPH_ACTIVITY)
     reason(graph)
     robot = graph.iri(robot_iri(identifier(data_set.robot.name)))
-    render_gap(graph, robot, lambda path, checksum: documents[path], out, graph.resources)
+    render_gap(graph, robot, lambda path, checksum: documents[path], out, graph.resources, lambda: (data_set.robot, {}))
 
 
-def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves) -> str:
+def _page(
+    resources: Resources, answers: Answers, bindings: Mapping[str, str], curves: Curves, picture: Fragment | None
+) -> str:
     follows = gap_figures.foremost_curves(curves.follows, answers)
     drawn = gap_figures.figures(answers, replace(curves, follows=tuple(follows)))
     friction = gap_friction.figures(curves.friction or ())
@@ -102,7 +125,9 @@ def _page(resources: Resources, answers: Answers, bindings: Mapping[str, str], c
         data=page_data(drawn | {f"friction_{k}": one for k, one in enumerate(friction.values())}),
         style=style(resources),
         scripts=scripts.html,
-        policy=content_policy(scripts.scripts),
+        moment=curves.apart,
+        picture=None if picture is None else picture.html,
+        policy=content_policy([*scripts.scripts, *(picture.scripts if picture else ())]),
     )  # fmt: skip
 
 
@@ -122,6 +147,7 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),
         "parameters": of_cause(cause, answers, "cause_parameters"),
+        "kept": _kept(cause, answers),
         "evidence": [
             ("channel", row["channel"]),
             *((one["name"], _said(one["value"], one["unit"])) for one in of_cause(cause, answers, "evidence")),
@@ -129,6 +155,13 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
             ("runs", ", ".join(one["run_name"] for one in of_cause(cause, answers, "cause_runs"))),
         ],
     }
+
+
+def _kept(cause: str, answers: Answers) -> Row | None:
+    """Return what is left of a tracking error without a cause that no number of the simulator holds."""
+    held = any(one["simulator"] is not None for one in of_cause(cause, answers, "cause_parameters"))
+    left = (row for row in of_cause(cause, answers, "changes_by_cause") if row["part"] == "without")
+    return None if held else next((row for row in left if row["measure"] == "position_rmse"), None)
 
 
 def _competitors(rows: Sequence[Row]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
-from irtwin.document.document import Cause, Document
+from irtwin.document.document import Cause, Document, pooled
 from irtwin.knowledge.store.table import Row, Table
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -99,13 +99,22 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
             first = dict.fromkeys(first)  # said once
 
 
-def not_held(causes: Sequence[Cause]) -> list[str]:
-    """Return a line for each cause that no number of the simulator's model can hold."""
+def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:
+    """Return a line for each cause that no number of the simulator's model can hold, and what it keeps of a gap."""
     return [
         f"No number of a joint holds {cause.effect.replace('_', ' ')} ({', '.join(cause.joints) or 'whole robot'}): "
-        "the simulator's model keeps that difference."
+        f"the simulator's model keeps that difference{_kept(cause, diagnosis)}."
         for cause in causes
     ]
+
+
+def _kept(cause: Cause, diagnosis: Document) -> str:
+    """Return what a model leaves of its tracking error that has all numbers of the robot but a cause's."""
+    for change in diagnosis.shrink.by_cause:
+        if change.cause == cause.id and change.channel == "position":
+            left, all_ = (1e3 * pooled(some) for some in (change.rmse_when_left_out, change.rmse_with_all))
+            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with irtwin.simulator.callback"
+    return ""
 
 
 def next_steps(diagnosis: Document) -> list[str]:

@@ -1,0 +1,95 @@
+"""A diagnosis by playing, handed over to MuJoCo's own system identification as a script that is ready to run."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from irtwin.document.document import Document
+from irtwin.simulator.choice import Choice
+from irtwin.simulator.differences import not_held
+from irtwin.simulator.payload import together
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, tilted
+
+_SCRIPT = Path(__file__).with_name("sysid_script.py")
+_CALLED = {  # by what a model's file calls it, and MuJoCo's specification
+    "stiffness": "kp",
+    "friction": "frictionloss",
+    "holding": "solimpfriction",
+    "armature": "armature",
+    "offset": "offset",
+    "delay": "delay",
+    "torque_limit": "forcerange",
+}
+_LEAST = 0.1  # of the smaller side, of what may not: motion alone hardly tells the scale of a joint without gravity
+_SIGNED = {  # what may be below zero, and how far beyond both sides it is sought at least: rad, m, m/s^2
+    "offset": (0.0,),
+    "mass": (np.nan, 0.5, 0.5, 0.5),  # a mass may not, its centre may
+    "gravity": (1.0, 1.0),
+}
+
+Free = tuple[str, str, list[float], list[float], list[float], list[float]]  # as FREE of the script
+
+
+def script(chosen: Choice, document: Document, logs: Path, out: Path) -> bytes:
+    """Return the script that fits what a diagnosis says differs to `logs`, a data set, to be written to `out`."""
+    lacking = [f"{one.effect} of {', '.join(one.joints)}" for one in not_held(document)]
+    return written(free(chosen), lacking, chosen.fit.servos.model.file.path, logs, out)
+
+
+def written(some: Iterable[Free], lacking: Iterable[str], model: Path, logs: Path, out: Path) -> bytes:
+    """Return the script that frees some numbers of a model; it names files from where it is."""
+    files = [os.path.relpath(one.absolute(), out.absolute().parent) for one in (model, logs)]
+    told = {
+        "MODEL, LOGS, FITTED": ", ".join(map(repr, [*files, f"{out.stem}-fitted.xml"])),
+        "FREE": _lines(some),
+        "LACKS": _lines(lacking),
+    }
+    text = _SCRIPT.read_text(encoding="utf-8")
+    for name, value in told.items():
+        default = re.search(rf"^{name}\b.*? = (.*)$", text, re.MULTILINE)
+        assert default is not None
+        text = text[: default.start(1)] + value + text[default.end(1) :]
+    return text.encode()
+
+
+def free(chosen: Choice) -> Iterator[Free]:
+    """Yield what differs: joint or body, number, the model's, the robot's, and bounds, as far beyond as they differ."""
+    own, robots = chosen.fit.servos.numbers, chosen.numbers
+    model = chosen.fit.servos.model
+    ways = [np.array(chosen.fit.servos.dampings(some[NAMES.index("damping")])) for some in (own, robots)]
+    for row, name in enumerate(OF_JOINTS):
+        for place in np.flatnonzero(chosen.differs[row]):
+            joint = model.joints[place]
+            if name == "damping":
+                which = int(ways[0][1, place] > 0)
+                yield _bounded(joint, ("damping", "kv")[which], *(some[which, place] for some in ways))
+            elif name in _CALLED:
+                yield _bounded(joint, _CALLED[name], own[row, place], robots[row, place])
+    mass, *off = robots[len(OF_JOINTS) :, 0]
+    if chosen.differs[NAMES.index("payload")].any():
+        bare, laden = (together(model.compiled, model.flange, each, np.array(off[:3])) for each in (0.0, mass))
+        body = model.compiled.body(model.flange.body).name
+        yield _bounded(body, "mass", *(np.array([one[0], *one[1]]) for one in (bare, laden)))
+    if chosen.differs[NAMES.index("tilt_x")].any():
+        yield _bounded("world", "gravity", *(tilted(model.compiled, some)[:2] for some in ([0.0, 0.0], off[3:])))
+
+
+def _bounded(of: str, number: str, model: np.ndarray, robot: np.ndarray) -> Free:
+    model, robot = np.atleast_1d(model, robot)
+    ends = np.sort([model, robot], axis=0)
+    reach = np.array(_SIGNED.get(number, (np.nan,)))
+    width = np.fmax(np.maximum(ends[1] - ends[0], np.abs(ends).max(axis=0) / 2), reach)
+    least = ends[0] - width
+    least = np.where(np.isnan(reach), np.maximum(least, _LEAST * ends[0]), least)
+    most = np.minimum(ends[1] + width, HOLDS if number == "solimpfriction" else np.inf)
+    return of, number, model.tolist(), robot.tolist(), least.tolist(), most.tolist()
+
+
+def _lines(values: Iterable[object]) -> str:
+    told = [f"    {value!r},\n" for value in values]
+    return "".join(["(\n", *told, ")"]) if told else "()"

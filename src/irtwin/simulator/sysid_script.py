@@ -1,0 +1,206 @@
+"""Fit a model's numbers to a robot's log by MuJoCo's own system identification, beginning where irtwin ended.
+
+    pip install irtwin "mujoco[sysid]"
+    python THIS_FILE
+
+FREE has the numbers that `irtwin diagnose` found to be others. Change what you doubt, and run it again: where a number
+begins, its bounds, a line more or less. What is fitted is printed beside what was found, and written to FITTED.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import sysid
+
+from irtwin import DataSet, read_data_set
+
+# files, from where this one is
+MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"
+# joint or body, number, the model's, the robot's, and bounds
+FREE: Sequence[tuple[str, str, list[float], list[float], list[float], list[float]]] = ()
+# what the robot has and no number of the model can say
+LACKS: Sequence[str] = ()
+# stretches of all runs, evenly spread, and how long each is played from where the robot is
+STRETCHES, SECONDS = 16, 15.0
+ITERATIONS = 50  # of the optimiser, at most
+
+
+def change(spec: mujoco.MjSpec, parameter: sysid.Parameter, of: str, number: str) -> None:
+    """Give a model's specification a number of a joint, of its servo, of a body, or of gravity."""
+    value, joint, servo = parameter.value, spec.joint(of), servo_of(spec, of)
+    match number:
+        case "kp":
+            servo.biasprm[0] *= value[0] / servo.gainprm[0]  # an offset of its command stays
+            servo.gainprm[0], servo.biasprm[1] = value[0], -value[0]
+        case "kv":
+            servo.biasprm[2] = -value[0]
+        case "offset":  # rad (m), added to its command
+            servo.biasprm[0] = servo.gainprm[0] * value[0]
+        case "forcerange":
+            servo.forcelimited, servo.forcerange = True, (-value[0], value[0])
+        case "damping":
+            joint.damping[0] = value[0]
+        case "frictionloss" | "armature":
+            setattr(joint, number, value[0])
+        case "solimpfriction":  # how firmly dry friction holds
+            joint.solimp_friction[:2] = value[0]
+        case "mass":  # and where its centre is
+            sysid.apply_body_inertia(spec, of, parameter)
+        case "gravity":  # along x and y: a tilted base
+            length = np.linalg.norm(spec.option.gravity)
+            spec.option.gravity = *value, np.copysign(np.sqrt(length**2 - value @ value), spec.option.gravity[2])
+
+
+def servo_of(spec: mujoco.MjSpec, joint: str) -> Any:
+    """Return the servo of a joint, None where it is none's."""
+    return next((one for one in spec.actuators if one.target == joint), None)
+
+
+def parameters() -> sysid.ParameterDict:
+    """Return what is free: nominal is the model's number, the value to begin from the robot's."""
+    found = sysid.ParameterDict()
+    for of, number, model, robot, least, most in FREE:
+        modifier = None if number == "delay" else partial(change, of=of, number=number)
+        one = sysid.Parameter(f"{of} {number}", model, least, most, modifier=modifier)
+        one.value = np.array(robot, dtype=float, ndmin=1)
+        one.inertia_type, one.scale_rot_inertia = sysid.InertiaType.MassIpos, False  # of a mass
+        found.add(one)
+    return found
+
+
+def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
+    """Return a model's specification whose sensors are the positions of the robot's joints."""
+    spec = mujoco.MjSpec.from_file(str(model))
+    for sensor in list(spec.sensors):
+        spec.delete(sensor)
+    for joint in joints:
+        spec.add_sensor(type=mujoco.mjtSensor.mjSENS_JOINTPOS, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
+        spec.sensors[-1].name = joint
+    for of, number, *_ in FREE:
+        if number == "delay":  # commands have it while they are played
+            servo_of(spec, of).delay = 0.0
+    return spec
+
+
+def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> sysid.ModelSequences:
+    """Return stretches of the observed runs."""
+    model, joints = spec.compile(), data_set.robot.joint_names
+    places = [model.jnt_qposadr[model.joint(one).id] for one in joints]
+    speeds = [model.jnt_dofadr[model.joint(one).id] for one in joints]
+    drives = [next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(one).id) for one in joints]
+    names, states, controls, measured = [], [], [], []
+    runs = [one for one in data_set.runs if one.role == "observed"]
+    for run in runs:
+        signals, commands, lasts = run.signals, np.asarray(run.signals.command), np.ptp(run.signals.time)
+        count = max(1, min(int(lasts // SECONDS), round(STRETCHES / len(runs))))
+        for place in range(count):
+            begin = signals.time[0] + max(0.0, (place + 0.5) * lasts / count - SECONDS / 2)
+            rows = (signals.time >= begin) & (signals.time < begin + SECONDS)
+            time, q = signals.time[rows] - signals.time[rows][0], signals.q[rows]
+            qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
+            few = time <= time[1] + 0.1
+            qvel[speeds], qpos[places] = np.polyfit(time[few], q[few], 1)
+            told = np.zeros((len(time), model.nu))
+            told[:, drives] = commands[rows]
+            steps = np.arange(0.0, time[-1], model.opt.timestep)
+            held = sysid.TimeSeries(time, told).resample(steps, method="zero_order_hold")
+            names.append(f"{run.name} from {begin:g} s")
+            states.append(sysid.create_initial_state(model, qpos, qvel))
+            controls.append(sysid.TimeSeries.from_control_names(held.times, held.data, model))
+            measured.append(sysid.TimeSeries.from_names(time, q, model))
+    return sysid.ModelSequences("robot", spec, names, states, controls, measured)
+
+
+def difference(
+    params: sysid.ParameterDict,
+    predicted: sysid.TimeSeries,
+    measured: sysid.TimeSeries,
+    model: mujoco.MjModel,
+    return_pred_all: bool,
+    state: np.ndarray,
+) -> tuple[np.ndarray, sysid.TimeSeries, sysid.TimeSeries]:
+    """Return what the robot's positions have beyond the model's, rad (m), all joints alike.
+
+    By the states: MuJoCo's sensors are a step late.
+    """
+    places = [1 + model.jnt_qposadr[joint] for joint in model.sensor_objid]
+    moved = sysid.TimeSeries(state[:, 0], state[:, places], measured.signal_mapping).resample(measured.times)
+    return measured.data - moved.data, moved, measured
+
+
+def played_late(
+    models: Sequence[mujoco.MjModel],
+    control_signal: Sequence[sysid.TimeSeries],
+    param_dicts: Sequence[sysid.ParameterDict],
+    **others: Any,
+) -> Sequence[sysid.SystemTrajectory]:
+    """Play commands, each joint's as late as its `delay` says."""
+    late = []
+    for place, control in enumerate(control_signal):
+        of = param_dicts[place * len(param_dicts) // len(models)]
+        told = control.data.copy()
+        for drive in range(told.shape[1]):
+            delay = f"{joint_of(models[place], drive)} delay"
+            if delay in of:
+                told[:, drive] = np.interp(control.times - of[delay].value[0], control.times, told[:, drive])
+        late.append(sysid.TimeSeries(control.times, told, control.signal_mapping))
+    found: Sequence[sysid.SystemTrajectory] = sysid.sysid_rollout(models=models, control_signal=late, **others)
+    return found
+
+
+def joint_of(model: mujoco.MjModel, drive: int) -> str:
+    """Return the name of the joint that an actuator drives."""
+    return str(model.joint(model.actuator(drive).trnid[0]).name)
+
+
+def written(fitted: sysid.ParameterDict, model: Path) -> str:
+    """Return the model with what was fitted, as MJCF."""
+    spec = mujoco.MjSpec.from_file(str(model))
+    for (of, number, *_), one in zip(FREE, fitted.values(), strict=True):
+        one.apply_modifier(spec)
+        if number == "delay":
+            servo = servo_of(spec, of)
+            servo.delay = one.value[0]
+            servo.nsample = int(np.ceil(servo.delay / spec.option.timestep)) + 1
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def main() -> None:
+    """Fit, print and write."""
+    here = Path(__file__).parent
+    for line in LACKS:
+        print(f"The model cannot say: {line}")
+    data_set, free = read_data_set(here / LOGS, commanded=True), parameters()
+    sequences = stretches(data_set, specification(here / MODEL, data_set.robot.joint_names))
+    residual = sysid.build_residual_fn(
+        models_sequences=[sequences], custom_rollout=played_late, modify_residual=difference
+    )
+    fitted, result = sysid.optimize(
+        free,
+        residual,
+        verbose=False,
+        x_scale="jac",  # numbers are of many units
+        gtol=1e-4,  # rad: a tenth of the noise of encoders
+        xtol=1e-5,  # of all numbers together
+        max_iters=ITERATIONS,
+        mu_factor=10.0,  # at the end, where nothing is won, it tries all it has
+    )
+    left = [residual(x, free.copy())[0] for x in (free.as_nominal_vector(), free.as_vector(), result.x)]
+    rms = [1e3 * np.sqrt(np.mean(np.concatenate([one.ravel() for one in some]) ** 2)) for some in left]
+    print("Tracking error, mrad (mm): model {:.2f}, by irtwin {:.2f}, fitted {:.2f}".format(*rms))
+    _, spread = sysid.calculate_intervals([one.ravel() for one in left[-1]], result.jac)
+    names = [f"{one.name} {k or ''}" for one in free.values() for k in range(one.size)]
+    for row in zip(names, free.as_nominal_vector(), free.as_vector(), fitted.as_vector(), spread, strict=True):
+        print("{:32} model {:10.4g}  by irtwin {:10.4g}  fitted {:10.4g} +- {:.2g}".format(*row))
+    (here / FITTED).write_text(written(fitted, here / MODEL), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
