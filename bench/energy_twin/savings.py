@@ -1,4 +1,4 @@
-"""`python -m energy_twin.savings [--seeds N] [--only WORD]`: savings that are said, and those when it is executed.
+"""`python -m energy_twin.savings [--seeds N...] [--only WORD]`: savings that are said, and those when it is executed.
 
 Runs that took no part in the fit are timed anew, in a quarter more time and with pauses that may shrink.
 """
@@ -58,7 +58,7 @@ def _energy(case: Case, motion: Motion) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m energy_twin.savings", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--only", default="", help="cases whose name has this word")
     arguments = parser.parse_args()
     print("| case | run | takes, J | saves: said | executed |\n| --- | --- | --- | --- | --- |")
