@@ -62,10 +62,10 @@ def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ..
     shown = added(case, [cause for finding in found for cause in finding.causes])
     left_open = {effect: places for finding in found for effect, places in _open(case, finding).items()}
     choices = tuple(one for finding in found for one in _choices(case, finding))
-    return (*case.effects, *shown, *_elsewhere(shown, left_open)), choices
+    return (*case.effects, *shown, *elsewhere(shown, left_open)), choices
 
 
-def _elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Iterator[Effect]:
+def elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Iterator[Effect]:
     """Yield effects that some joints show, for the joints that leave them open."""
     for effect in {one.id: one for one in shown if isinstance(one, JointEffect)}.values():
         has = {joint for one in shown if one.id == effect.id for joint in one.joints or ()}
