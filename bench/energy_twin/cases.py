@@ -15,18 +15,19 @@ import numpy as np
 
 from blind.motions import exciting, work
 from energy_twin.truth import Parts, Truth, drives, mechanical, numbers, power_of
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Machine, build
+from irtwin.demo.plant.motion import Motion
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
-from plant.arm import Payload
+from plant.drawings import read_drawings
 from plant.effects import Effect
 from plant.fleet import Fleet, Traces
 from plant.logger import coloured, lagged
 from plant.logger import released as brakes_released
 from plant.logger import torque as shown
-from plant.machine import Machine, build, read_drawings
-from plant.motion import Motion
 
 ROBOTS = {"kuka_kr6_r700": "KR6", "elbow6": "UR10-like", "slim7": "Panda-like"}
 LAYOUT = "xwxwxxwxwwxw"  # exciting motions, and work with pauses

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from energy_twin.cases import STEP, Case, cases
+from irtwin.demo.plant.motion import Motion as Programmed
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for
@@ -22,7 +23,6 @@ from irtwin.planning.programme import programme_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill, stretches
 from irtwin.twin.price import Figure, with_standing
-from plant.motion import Motion as Programmed
 
 LONGER, PAUSE = 1.25, 0.1
 

@@ -7,12 +7,12 @@ from itertools import product
 
 import numpy as np
 
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Machine
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
 from irtwin.signals.motion import Motion
-from plant.arm import Payload
 from plant.fleet import Traces
-from plant.machine import Machine
 
 Parts = dict[str, np.ndarray]  # by effect
 Place = tuple[str, str | None]  # effect and joint, None for the whole robot
