@@ -90,6 +90,13 @@ def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
     assert "is not empty; remove it, or name a new folder by --workspace" in again.err
 
 
+def test_a_task_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_study, "identify", lambda *given: None)  # so there is no robot to plan with
+    with pytest.raises(InputError):
+        case_study.case_study(Location(tmp_path / "new"))
+    assert not (tmp_path / "new").exists()
+
+
 def test_without_the_planners_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case_study, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r'pip install "irtwin\[plan,mujoco\]"'):

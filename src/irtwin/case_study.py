@@ -46,7 +46,8 @@ def case_study(
     """Carry the case study out in a new workspace; return the page's path. `announce` is told each step.
 
     `task`: what the process is, the usual one if None; `base`: as of `workflow.run`. Raises InputError where the folder
-    is not empty, an extra is not installed, or the robot cannot do the task.
+    is not empty, an extra is not installed, or the robot cannot do the task;
+    then nothing is left.
     """
     folder = location.folder
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -54,11 +55,19 @@ def case_study(
     if any(find_spec(module) is None for module in _NEEDED):
         extras = ",".join(dict.fromkeys(_NEEDED.values()))
         raise InputError(f'the case study plans and simulates; install what that takes: pip install "irtwin[{extras}]"')
+    try:
+        return _carried_out(location, task or task_of(), base, announce)
+    except InputError:
+        shutil.rmtree(folder)
+        raise
+
+
+def _carried_out(location: Location, task: Task, base: str | None, announce: Announce) -> Path:
     announce(f"1. The twin: identified from {len(_RUNS)} runs, two of them held out")
-    data_set = unpack(folder)
+    data_set = unpack(location.folder)
     identify(data_set, location, base)
     announce("2. The process: planned from the initial to the final configuration, priced and kept")
-    plan, kept = plans.plan(ROBOT, task or task_of(), location, name=PLANNED)
+    plan, kept = plans.plan(ROBOT, task, location, name=PLANNED)
     announce(f"   {plan.seconds:.2f} s; {kept.price}")
     announce("3. The measurement: a simulated robot carries the plan out, and a random motion of joints 2 to 4")
     measure(data_set, plan, announce)

@@ -98,7 +98,7 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 )
 @click.option("--from", "start", metavar="POSE", help="Where its process starts, as of `irtwin plan`.")
 @click.option("--to", "goal", metavar="POSE", help="Where it ends.")
-@click.option("--seconds", type=Number(min=0.0, min_open=True), help="How long it takes, s.")
+@click.option("--seconds", type=Number(min=0.0, min_open=True), help="How long it takes, s. Default: 1.2.")
 def demo(
     location: Location,
     no_open: bool,
