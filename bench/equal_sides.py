@@ -26,7 +26,7 @@ from irtwin.signals.log import read_data_set
 from irtwin.simulator import playing
 from irtwin.simulator.model import read_model
 from own_simulator import SECONDS, simulate
-from plant.machine import read_drawings
+from plant.drawings import read_drawings
 
 ROBOTS = ("elbow6", "pall4", "slim7")
 RUNS = 4

@@ -23,11 +23,11 @@ import pyarrow.parquet as pq
 from blind.cases import Case, Plan, write_runs
 from blind.catalogue import Draw, draw
 from blind.motions import exciting
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.motion import Motion
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import read_data_set
-from plant.arm import Payload
-from plant.machine import Drawings
-from plant.motion import Motion
 
 SECONDS = 8.0
 RUNS = 5  # of the simulator

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import irtwin as irtwin_package
 from irtwin import case_study
 from irtwin.asking import ask
 from irtwin.errors import InputError
@@ -17,6 +18,7 @@ from irtwin.location import Location
 from irtwin.planning.plan import Plan
 from irtwin.report.case_study.page import individuals
 from irtwin.report.wording import percent
+from irtwin.resources import folder
 from irtwin.signals.log import read_data_set
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
@@ -24,7 +26,7 @@ from tests.screens import faults, narrow_and_dark
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not (find_spec("ompl") and find_spec("toppra")), reason="needs irtwin[plan]"),
+    pytest.mark.skipif(not all(map(find_spec, ("ompl", "toppra", "mujoco"))), reason="needs irtwin[plan,mujoco]"),
 ]
 
 Done = tuple[Said, Path]
@@ -51,6 +53,7 @@ def test_the_command_says_each_step_and_where_the_page_is(done: Done) -> None:
 
 
 def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not_fitted(done: Done, text: str) -> None:
+    assert re.search(r"\n +0\.3 s +\d+ W +\d+ J\n", done[0].err)  # as it moves
     (row,) = ask("planned_against_measured", done[1]).rows
     assert (row["plan"], row["run"]) == (case_study.PLANNED, case_study.MEASURED)
     assert abs(row["difference_percent"]) < 6.54
@@ -61,7 +64,8 @@ def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not
 
 
 @pytest.mark.parametrize(
-    "figure", ["figure 9 and equations 13 to 15", "figure 10", "figure 11", "figure 12", "figure 13"]
+    "figure",
+    ["figures 7 and 8", "figure 9 and equations 13 to 15", "figure 10", "figure 11", "figure 12", "figure 13"],
 )
 def test_each_figure_of_the_seed_has_its_counterpart(text: str, figure: str) -> None:
     assert f"Seed, {figure}" in text
@@ -86,21 +90,47 @@ def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
     assert "is not empty; remove it, or name a new folder by --workspace" in again.err
 
 
-def test_without_the_planners_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(case_study, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r'pip install "irtwin\[plan\]"'):
+def test_a_task_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_study, "identify", lambda *given: None)  # so there is no robot to plan with
+    with pytest.raises(InputError):
         case_study.case_study(Location(tmp_path / "new"))
     assert not (tmp_path / "new").exists()
 
 
-def test_a_log_of_another_motion_is_refused(tmp_path: Path) -> None:
+def test_without_the_planners_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_study, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r'pip install "irtwin\[plan,mujoco\]"'):
+        case_study.case_study(Location(tmp_path / "new"))
+    assert not (tmp_path / "new").exists()
+
+
+def test_the_task_may_be_given_and_must_be_one() -> None:
+    task = case_study.task_of(goal="1,-1,1.2,0,0.5,0", seconds=2.0)
+    assert np.degrees(task.start).tolist() == pytest.approx([0, -90, 90, 0, 0, 0])
+    assert list(task.goal) == [1, -1, 1.2, 0, 0.5, 0] and task.seconds == 2.0
+    with pytest.raises(InputError, match="--from"):
+        case_study.task_of(start="1,2")
+    said = irtwin("demo", "--seconds", "2")
+    assert said.status == 2 and "give --case-study, too" in said.err
+
+
+def test_what_the_plant_cannot_follow_is_said(tmp_path: Path) -> None:
     data_set = case_study.unpack(tmp_path)
-    still = np.zeros((101, 6))
-    motion = Motion(np.linspace(0, 1.2, 101), still, still, still, run="still")
-    robot = read_data_set(data_set).robot
-    with pytest.raises(InputError, match=r"is the log of another motion, .* rad off"):
-        case_study.add_measurement(data_set, Plan(robot, motion, None, 0.0, True, (), 1.2))
-    assert case_study.MEASURED not in (data_set / "dataset.toml").read_text()
+    time, still = np.linspace(0, 1.2, 121), np.zeros((121, 6))
+    far = Motion(time, still + 9 * time[:, None], still, still, run="far")
+    with pytest.raises(InputError, match=r"cannot carry process_measured out: joint 2 passes its position limit"):
+        case_study.measure(data_set, Plan(read_data_set(data_set).robot, far, None, 0.0, True, (), 1.2), print)
+
+
+def test_each_equation_of_the_seed_has_its_number_in_source_ontology_and_page(text: str) -> None:
+    source = " ".join(file.read_text(encoding="utf-8") for file in Path(irtwin_package.__file__).parent.rglob("*.py"))
+    said = [re.findall(r"\d+", each) for each in re.findall(r"Yan 2018,\s+eqs?\.\s+([\d, ]*(?:to \d+)?)", source)]
+    spans = [range(int(one[0]), int(one[-1]) + 1) for one in said]
+    assert {number for span in spans for number in span} == set(range(1, 16))
+    ontology = " ".join(file.read_text(encoding="utf-8") for file in folder("ontology").glob("*.ttl"))
+    for number in range(1, 16):
+        assert f'"Yan et al. (2018), equation ({number})"' in ontology
+        assert f" ({number}) " in text
 
 
 @pytest.mark.system

@@ -24,13 +24,14 @@ import pyarrow.parquet as pq
 from blind.catalogue import LOCAL, POWER, REGIMES, SLIGHT, TORQUE, UNKNOWN_EFFECTS, WHOLE_ROBOT, Draw, draw
 from blind.motions import exciting, work
 from blind.projection import STRIDE, Basis, low_pass
-from plant.arm import Payload
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.friction import LAWS, NearZero
+from irtwin.demo.plant.machine import Machine, build
+from plant.drawings import read_drawings
 from plant.effects import POWER as POWER_EFFECTS
 from plant.effects import SENSED, TRANSMISSION, Effect
 from plant.fleet import Fleet, Traces
-from plant.friction import LAWS, NearZero
 from plant.logger import coloured, power, torque, winding_rise
-from plant.machine import Machine, build, read_drawings
 
 ROBOTS = ("pall4", "elbow6", "slim7")
 SEEDS = {

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.demo.plant.machine import Machine
 from plant.effects import UNKNOWN, Effect
-from plant.machine import Machine
 
 TORQUE = (
     "stribeck_friction",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from plant.machine import Drawings
-from plant.motion import Motion, programme
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.motion import Motion, programme
 
 HARMONICS = 5
 JERK_TIME = 0.08  # s

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import scipy
 
-from plant.arm import Arm
-from plant.friction import NearZero
+from irtwin.demo.plant.arm import Arm
+from irtwin.demo.plant.friction import NearZero
 
 BAND = 10.0  # Hz, above it a twin's filter leaves little
 STRIDE = 4

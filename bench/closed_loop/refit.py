@@ -7,8 +7,8 @@ import numpy as np
 from blind.projection import Basis
 from closed_loop.machine import Machine
 from closed_loop.simulation import Trace
-from plant.arm import Arm, Payload
-from plant.friction import NearZero
+from irtwin.demo.plant.arm import Arm, Payload
+from irtwin.demo.plant.friction import NearZero
 
 COARSE = 0.008  # s, between the samples that are fitted
 

@@ -6,7 +6,7 @@ a controller in MuJoCo, whose laws of iron, inverter, friction and brakes are ot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -14,19 +14,20 @@ from pathlib import Path
 import numpy as np
 
 from blind.motions import exciting, work
+from energy_twin.truth import Parts, Truth, drives, mechanical, numbers, power_of
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Machine, build
+from irtwin.demo.plant.motion import Motion
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
-from plant.arm import Payload
+from plant.drawings import read_drawings
 from plant.effects import Effect
 from plant.fleet import Fleet, Traces
-from plant.logger import coloured
-from plant.logger import power as meter
+from plant.logger import coloured, lagged
 from plant.logger import released as brakes_released
 from plant.logger import torque as shown
-from plant.machine import Machine, build, read_drawings
-from plant.motion import Motion
 
 ROBOTS = {"kuka_kr6_r700": "KR6", "elbow6": "UR10-like", "slim7": "Panda-like"}
 LAYOUT = "xwxwxxwxwwxw"  # exciting motions, and work with pauses
@@ -38,7 +39,7 @@ MORE = ("holding_brakes", "stribeck_friction", "load_dependent_friction")
 
 @dataclass(frozen=True)
 class Case:
-    """A data set and its truth: the `effects` beyond the baseline, `standby` W, energy of copper a run, J.
+    """A data set and its truth; `effects`: those beyond the baseline.
 
     `plant`: what a motion takes when it is executed, (N,) W each `STEP`, before any sensor.
     """
@@ -46,14 +47,13 @@ class Case:
     name: str
     data_set: DataSet
     effects: tuple[str, ...]
-    standby: float
-    copper: dict[str, float]
+    truth: Truth
     plant: Callable[[Motion], np.ndarray]
 
 
-def cases(seeds: int, only: str = "") -> Iterator[Case]:
+def cases(seeds: Sequence[int], only: str = "") -> Iterator[Case]:
     """Yield each robot of each plant, with and without what is more than losses of drives; `only` in their names."""
-    for exact, robot, more, seed in product((True, False), ROBOTS, (False, True), range(seeds)):
+    for exact, robot, more, seed in product((True, False), ROBOTS, (False, True), seeds):
         name = f"{'exact' if exact else 'plant'} {ROBOTS[robot]}{' more' if more else ''} {seed}"
         if only in name:
             yield _case(name, robot, seed, exact=exact, more=more)
@@ -70,22 +70,29 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     ]
     effects = _effects(machine, len(motions), more)
 
-    def executed(motions: list[Motion]) -> tuple[Traces, np.ndarray, np.ndarray]:
-        """Return what motions do, their power and that of copper, (T, R) W."""
+    def executed(motions: list[Motion]) -> tuple[Traces, np.ndarray, Parts]:
+        """Return what motions do, their power, (T, R) W, and its parts, (T, R) W or a joint's, (T, R, n)."""
         told = np.stack([motion.dq for motion in motions], axis=1)
         released = _released(told) if more else np.ones(told.shape[:2])
-        traces = (
+        traces, friction = (
             _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng, 1 - released)
         )
         driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
-        copper = (machine.drive.resistance * (driven.torque / machine.drive.joint_torque_constant) ** 2).sum(axis=2)
-        if exact:
-            return traces, _power(machine, driven, copper) + BRAKES * released * more, copper
-        losses = tuple(effect for effect in effects if effect.id != "holding_brakes")
-        coils = BRAKES * more * brakes_released(replace(traces, dq=told), STEP)
-        return traces, meter(driven, machine, losses, STEP) + coils, copper
+        parts = {
+            **mechanical(machine, driven, {name: own * released[:, :, None] for name, own in friction.items()}),
+            **drives(machine, driven, exact=exact),
+        }
+        parts["no_regeneration"] = np.maximum(-power_of(parts), 0.0)
+        parts["standby_power"] = np.full(told.shape[:2], machine.drawings.supply.standby)
+        drawn = power_of(parts)
+        if not exact:
+            drawn = lagged(drawn, drawings.sensors.meter_time_constant, STEP)
+        if more:
+            parts["holding_brakes"] = BRAKES * (released if exact else brakes_released(replace(traces, dq=told), STEP))
+            drawn = drawn + parts["holding_brakes"]
+        return traces, drawn, parts
 
-    traces, drawn, copper = executed(motions)
+    traces, drawn, parts = executed(motions)
     sensed = shown(traces, machine, (), STEP)[::STRIDE]
     sensors, cut = drawings.sensors, slice(None, None, STRIDE)
     noise = np.random.default_rng([9, seed])
@@ -99,8 +106,10 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     ]
     listed = (*SUPPLY, *(MORE if more else ()))
     known = DataSet(Path(robot), _described(machine), tuple(runs), None, None, "dc_bus", True, {})
-    heat = {run.name: float(np.trapezoid(copper[:, k], dx=STEP)) for k, run in enumerate(runs)}
-    return Case(name, known, listed, drawings.supply.standby, heat, lambda motion: executed([motion])[1][:, 0])
+    logged = {part: np.trapezoid(watts[cut], dx=STEP * STRIDE, axis=0) for part, watts in parts.items()}
+    energies = {run.name: {part: joules[k] for part, joules in logged.items()} for k, run in enumerate(runs)}
+    truth = Truth(drawings.joints, machine, numbers(machine, exact=exact, more=more), energies, plain=not more)
+    return Case(name, known, listed, truth, lambda motion: executed([motion])[1][:, 0])
 
 
 def _run(name: str, signals: Signals) -> Run:
@@ -134,38 +143,36 @@ def _effects(machine: Machine, runs: int, more: bool) -> tuple[Effect, ...]:
 
 def _simulated(
     machine: Machine, motions: list[Motion], effects: tuple[Effect, ...], rng: np.random.Generator, braked: np.ndarray
-) -> Traces:
+) -> tuple[Traces, Parts]:
+    """Return what a controller in MuJoCo makes of motions, and its friction, (T, R, n) N m, where laws are simple."""
     runs, n = len(motions), len(machine.drawings.joints)
     jitter = 1 + machine.drawings.tolerance.friction_per_run * rng.standard_normal((runs, 2, n)).clip(-2, 2)
-    return Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked).run(
+    traces = Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked).run(
         effects
     )
+    if any(effect.id == "stribeck_friction" for effect in effects):
+        return traces, {}
+    dry, oil = machine.friction.coulomb * jitter[:, 0], machine.friction.viscous * jitter[:, 1]
+    return traces, {"coulomb_friction": dry * np.sign(traces.dq), "viscous_friction": oil * traces.dq}
 
 
-def _followed(machine: Machine, motions: list[Motion], more: bool) -> Traces:
-    """Return the motions followed exactly, under the catalogue's laws of friction."""
+def _followed(machine: Machine, motions: list[Motion], more: bool) -> tuple[Traces, Parts]:
+    """Return the motions followed exactly, and friction by the catalogue's laws, (T, R, n) N m."""
     arm, friction, rotor = machine.arm(Payload()), machine.friction, machine.drive.joint_inertia
     arm.model.dof_armature[:] = 0.0
     q, dq, ddq = (np.stack([getattr(one, name) for one in motions], axis=1) for name in ("q", "dq", "ddq"))
     flat = (x.reshape(-1, x.shape[2]) for x in (q, dq, ddq))
     load = np.array([arm.inverse_dynamics(*state) for state in zip(*flat, strict=True)])
-    load = load.reshape(q.shape) + rotor * ddq
+    torque = load.reshape(q.shape) + rotor * ddq
     sign = np.where(np.abs(dq) < 1e-6, 0.0, np.sign(dq))
-    dry = friction.coulomb * np.ones_like(q)
-    torque = load + dry * sign + friction.viscous * dq
+    laws = {"coulomb_friction": friction.coulomb * sign, "viscous_friction": friction.viscous * dq}
     if more:
-        torque = torque + STICKING * friction.coulomb * sign * np.exp(-np.abs(dq) / 0.05)
-        torque = torque + LOADED * np.abs(torque) * sign
-    return Traces(q, dq, ddq, torque, np.full_like(q, 35.0))
-
-
-def _power(machine: Machine, traces: Traces, copper: np.ndarray) -> np.ndarray:
-    """Return the power (T, R) W of these: iron with speed and its square, inverters with current, a chopper."""
-    drive, speed = machine.drive, np.abs(traces.dq) * machine.drive.gear_ratio / 314.16
-    iron = drive.iron_loss * (0.5 * speed + 0.5 * speed**2)
-    inverter = 2.0 * np.abs(traces.torque) / drive.joint_torque_constant
-    axes = (traces.torque * traces.dq + iron + inverter).sum(axis=2) + copper
-    return np.maximum(axes, 0.0) + machine.drawings.supply.standby
+        laws["stribeck_friction"] = STICKING * friction.coulomb * sign * np.exp(-np.abs(dq) / 0.05)
+    torque = torque + sum(laws.values())
+    if more:
+        laws["load_dependent_friction"] = LOADED * np.abs(torque) * sign
+        torque = torque + laws["load_dependent_friction"]
+    return Traces(q, dq, ddq, torque, np.full_like(q, 35.0)), laws
 
 
 def _released(told: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""`python -m energy_twin.savings [--seeds N] [--only WORD]`: savings that are said, and those when it is executed.
+"""`python -m energy_twin.savings [--seeds N...] [--only WORD]`: savings that are said, and those when it is executed.
 
 Runs that took no part in the fit are timed anew, in a quarter more time and with pauses that may shrink.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from energy_twin.cases import STEP, Case, cases
+from irtwin.demo.plant.motion import Motion as Programmed
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for
@@ -22,7 +23,6 @@ from irtwin.planning.programme import programme_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill, stretches
 from irtwin.twin.price import Figure, with_standing
-from plant.motion import Motion as Programmed
 
 LONGER, PAUSE = 1.25, 0.1
 
@@ -58,7 +58,7 @@ def _energy(case: Case, motion: Motion) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m energy_twin.savings", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--only", default="", help="cases whose name has this word")
     arguments = parser.parse_args()
     print("| case | run | takes, J | saves: said | executed |\n| --- | --- | --- | --- | --- |")

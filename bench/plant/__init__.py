@@ -1,4 +1,1 @@
-"""A plant: a simulated industrial robot that stands in for a real one.
-
-It shares no code with `irtwin`, so that what the twin recovers from its logs is a finding and not an echo.
-"""
+"""Campaigns and fleets of the plant that ships, `irtwin.demo.plant`, and robots that are drawn for this bench."""

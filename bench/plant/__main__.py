@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from irtwin.demo.plant.logger import write_run
 from plant.campaign import CAMPAIGNS, carry_out, read_campaign
-from plant.dataset import describe, write_run
-from plant.machine import read_drawings
+from plant.dataset import describe
+from plant.drawings import read_drawings
 
 
 def main() -> None:

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from plant.arm import Payload
-from plant.machine import Drawings, build, read_drawings
-from plant.motion import Limits, Motion, fourier, programme
-from plant.simulate import Recording, simulate
-from plant.thermal import Thermal
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Drawings, build
+from irtwin.demo.plant.motion import Motion, check, fourier, programme
+from irtwin.demo.plant.simulate import Recording, simulate
+from irtwin.demo.plant.thermal import Thermal
+from plant.drawings import read_drawings
 
 FOLDER = Path(__file__).parent
 CAMPAIGNS = FOLDER / "campaigns"
@@ -88,17 +89,3 @@ def motion_of(entry: dict[str, Any], drawings: Drawings) -> Motion:
         motion = programme(entry["moves"], drawings.limits, drawings.step, entry["cycles"])
     check(motion, drawings.limits)
     return motion
-
-
-def check(motion: Motion, limits: Limits) -> None:
-    """Raise ValueError where a motion asks more than the robot may do."""
-    slack = 1 + 1e-6
-    beyond = {
-        "position": (motion.q < limits.lower) | (motion.q > limits.upper),
-        "speed": np.abs(motion.dq) > slack * limits.speed,
-        "acceleration": np.abs(motion.ddq) > slack * limits.acceleration,
-    }
-    for what, where in beyond.items():
-        if where.any():
-            row, joint = np.argwhere(where)[0]
-            raise ValueError(f"joint {joint + 1} passes its {what} limit at step {row}")

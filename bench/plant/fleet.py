@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from plant.arm import Payload
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.friction import NearZero
+from irtwin.demo.plant.machine import Machine
+from irtwin.demo.plant.motion import Motion
 from plant.effects import LEVEL, PASSIVE, Effect, State
-from plant.friction import NearZero
-from plant.machine import Machine
-from plant.motion import Motion
 
 _ONLY_FRICTION = int(
     mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_EQUALITY

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from plant.drive import COPPER_COEFFICIENT
+from irtwin.demo.plant.drive import COPPER_COEFFICIENT
+from irtwin.demo.plant.machine import Machine
 from plant.effects import Effect
 from plant.fleet import Traces
-from plant.machine import Machine
 
 SENSOR_LAG = 2e-4  # s, of the current sensors: a drive samples at 4 to 16 kHz
 

@@ -29,6 +29,7 @@ from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
 from irtwin.simulator.sysid import script
 from irtwin.storage.files import check_place, write
+from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
 
@@ -141,8 +142,8 @@ class _Files:
         if self.json is not None:
             write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
         if self.twin is not None and found.twin is not None:
-            if found.twin.doubt_of_bodies:
-                announce(f"  {found.twin.doubt_of_bodies}")
+            for doubt in doubts(found.twin):
+                announce(f"  {doubt}")
             write(self.twin, to_json(found.twin).encode())
         if self.motion is not None and isinstance(found, Diagnosis):
             announce(f"  {save_motion(found, self.motion)}")

@@ -33,6 +33,7 @@ from irtwin.signals.sampling import as_sampled
 from irtwin.storage.files import check_place, write
 from irtwin.twin import predict as predicted
 from irtwin.twin.described import places, text_of
+from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load
 from irtwin.twin.identify import identify as fit
 from irtwin.twin.price import Price, price
@@ -200,9 +201,9 @@ def write_model(twin: Twin, form: str, out: Path) -> list[str]:
     write(out, text_of(twin, form).encode())
     held = [f"{effect} ({place})" for effect, place in places(twin, form) if place]
     lacking = [effect for effect, place in places(twin, form) if not place]
-    words = [twin.doubt_of_bodies, f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
+    words = [*doubts(twin), f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
     words += [f"{form.upper()} has no place for {', '.join(lacking)}"] if lacking else []
-    return [line for line in words if line]
+    return words
 
 
 def read_twin(source: Path) -> Twin:

@@ -57,6 +57,7 @@ from irtwin.storage.files import check_place
 from irtwin.storage.staging import staged
 from irtwin.storage.tariff import read_tariff
 from irtwin.storage.turns import rewriting_alone
+from irtwin.twin.doubts import doubts
 from irtwin.twin.files import to_json
 
 LONGEST_SQL = 600.0  # s for the SQL of a mapping, where some do not ship
@@ -271,8 +272,8 @@ def take_in(place: Workspace, data_set: DataSet, announce: Announce = lambda lin
                     "  no twin, for a meter alone was logged: which joint, effect or motion takes it stays unknown"
                 )
             known = known_twin(apart, robot_id)
-            if known and known[1].doubt_of_bodies:
-                announce(f"  {known[1].doubt_of_bodies}")
+            for doubt in doubts(known[1]) if known else ():
+                announce(f"  {doubt}")
             check_plans(apart, robot_id, data_set.plans)
         except InputError as error:
             error.args = (f"{data_set.folder}: {error}; nothing of this data set was stored",)

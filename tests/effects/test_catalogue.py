@@ -15,6 +15,8 @@ SOURCE = Path(irtwin.__file__).parent
 OTHER_MEANINGS = {
     "bring/data_set_text.py": {"rotor_inertia"},  # a key of the data sheet
     "bring/rtde_names.py": {"payload"},  # a column of a recording
+    "demo/plant/arm.py": {"payload"},  # a body of the plant
+    "demo/plant/machine.py": {"rotor_inertia"},  # a number of its drawings
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
     "identification/programmes.py": {"payload"},  # a kind of programme

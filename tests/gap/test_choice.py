@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
-from irtwin.effects.catalogue import BASELINE
-from irtwin.gap.choice import begin, identified
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.gap.choice import begin, elsewhere, identified
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 from irtwin.twin.validate import validate
@@ -61,6 +61,13 @@ def test_effects_that_are_named_are_taken_as_they_are():
     twin = identified(data, motions)
     assert twin.effect_ids == ("rigid_body", "coulomb_friction")
     assert twin.choices == ()
+
+
+def test_what_some_joints_show_is_in_the_twin_where_others_leave_it_open():
+    shown = [catalogue()["stribeck_friction"].on("joint_1"), catalogue()["torque_offset"]]
+    left_open = {"stribeck_friction": [("joint_1", 0.5), ("joint_2", 0.3)], "torque_offset": [("joint_2", 0.3)]}
+    more = list(elsewhere(shown, {**left_open, "backlash": [("joint_1", 0.9)], "bus_capacitor": [(None, 0.4)]}))
+    assert [(one.id, one.joints) for one in more] == [("stribeck_friction", ("joint_2",))]
 
 
 def test_the_heat_of_every_drive_needs_no_proof_where_power_was_logged():

@@ -1,4 +1,4 @@
-"""The plant lies in bench/, beside the package and not in it."""
+"""A robot that the plant builds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the plant needs irtwin[mujoco]")
 
-from plant.machine import Drawings, Machine, build, read_drawings
+from irtwin.demo.plant.machine import Drawings, Machine, build
+from plant.drawings import read_drawings
 
 
 @pytest.fixture(scope="session")

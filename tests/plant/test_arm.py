@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from plant.arm import Arm, LinkTolerance, Payload
-from plant.machine import Drawings, Machine
+from irtwin.demo.plant.arm import Arm, LinkTolerance, Payload
+from irtwin.demo.plant.machine import Drawings, Machine
 
 
 def _states(drawings: Drawings, count: int) -> list[np.ndarray]:

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.drive import Drive
-from plant.machine import Drawings
+from irtwin.demo.plant.drive import Drive
+from irtwin.demo.plant.machine import Drawings
 
 WARM, REFERENCE = np.full(6, 85.0), np.full(6, 25.0)
 

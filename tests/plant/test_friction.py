@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant.friction import Friction
-from plant.machine import Drawings
+from irtwin.demo.plant.friction import Friction
+from irtwin.demo.plant.machine import Drawings
 
 STEP = 5e-4
 NO_LOAD = np.zeros(6)

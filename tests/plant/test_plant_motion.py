@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.campaign import check
-from plant.machine import Drawings
-from plant.motion import Motion, fourier, programme
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.motion import Motion, check, fourier, programme
 
 STEP = 1e-3
 

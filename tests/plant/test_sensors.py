@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.machine import Drawings
-from plant.sensors import Encoders, PowerMeter, TorqueSensors
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.sensors import Encoders, PowerMeter, TorqueSensors
 
 
 def test_encoders_see_steps_of_the_motor_shaft(drawings: Drawings) -> None:

@@ -10,12 +10,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from irtwin.demo.plant.machine import Drawings, build
+from irtwin.demo.plant.simulate import simulate
+from irtwin.demo.plant.thermal import Thermal
 from irtwin.signals.log import DataSet, read_data_set
 from plant.campaign import motion_of, read_campaign
 from plant.dataset import describe
-from plant.machine import Drawings, build
-from plant.simulate import simulate
-from plant.thermal import Thermal
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "src" / "irtwin" / "demo" / "kuka_kr6_r700"

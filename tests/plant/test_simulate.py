@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.arm import Payload
-from plant.machine import Machine, build
-from plant.motion import Motion, programme
-from plant.simulate import Recording, simulate
-from plant.thermal import Thermal
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.machine import Machine, build
+from irtwin.demo.plant.motion import Motion, programme
+from irtwin.demo.plant.simulate import Recording, simulate
+from irtwin.demo.plant.thermal import Thermal
 
 pytestmark = pytest.mark.slow
 

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from plant.machine import Drawings
-from plant.supply import Supply
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.supply import Supply
 
 STEP = 5e-4
 

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.machine import Drawings
-from plant.thermal import Thermal
+from irtwin.demo.plant.machine import Drawings
+from irtwin.demo.plant.thermal import Thermal
 
 
 def test_settles_where_losses_flow_through_the_resistances(drawings: Drawings) -> None:

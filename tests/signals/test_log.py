@@ -147,6 +147,7 @@ def changed(name: str, row: int, value: float) -> dict[str, np.ndarray]:
     [
         ({k: v for k, v in columns().items() if k != "q_b"}, "column q_b is missing"),
         ({k: v for k, v in columns().items() if k != "time"}, "column time is missing"),
+        ({"time": columns()["time"], "power": columns()["time"]}, r"q_a is missing; .* say joints = \[\] and no urdf"),
         ({k: v for k, v in columns().items() if k != "tau_b"}, "column tau_b is missing; log tau_ for every"),
         (columns() | {"q_elbow": np.zeros(50)}, 'column q_elbow: the robot has no moving joint "elbow"'),
         (changed("tau_a", 7, math.nan), "line 9, column tau_a: is not a finite number"),

@@ -45,10 +45,14 @@ def test_what_data_cannot_part_is_one_entry_that_they_tell():
     assert told & {(effect, joint) for effect in ("copper_loss", "inverter_loss") for joint in ROBOT.joint_names}
 
 
-def test_a_share_is_as_unsure_as_its_parameters():
-    """Parameters drawn from their covariance spread each share as its interval says."""
-    twin, motion = fitted((*BASELINE, "copper_loss"), noise=3.0)
-    twin = replace(twin, remainder=None)
+@pytest.mark.parametrize(("more", "set_to"), [("copper_loss", {}), ("no_regeneration", {"burnt": 1, "Fc": 0, "Fv": 0})])
+def test_a_share_is_as_unsure_as_its_parameters(more, set_to):
+    """Parameters drawn from their covariance spread each share as its interval says; those that are set are sure."""
+    twin, motion = fitted((*BASELINE, more), noise=3.0)
+    known = np.array([one.name in set_to for one in twin.parameters])
+    numbers = tuple(replace(one, value=set_to.get(one.name, one.value)) for one in twin.parameters)
+    sure = np.where(known | known[:, None], 0.0, twin.covariance)
+    twin = replace(twin, parameters=numbers, covariance=sure, remainder=None)
     root = np.linalg.cholesky(twin.covariance + 1e-12 * np.eye(len(twin.covariance)))
     random = np.random.default_rng(0)
     drawn = []

@@ -83,13 +83,3 @@ def test_measured_torque_is_current_times_constant_where_no_torque_was_logged():
     np.testing.assert_allclose(TWIN.measured_torque(replace(motion, torque=None)), motion.current * 8.0)
     assert TWIN.measured_torque(swing(ROBOT, 1)) is None
     assert replace(TWIN, robot=arm(3)).measured_torque(replace(motion, torque=None)) is None
-
-
-def test_what_no_consistent_bodies_give_is_said():
-    right = ["rigid_body", "rotor_inertia", "coulomb_friction", "viscous_friction", "torque_offset"]
-    motions = [measure(ROBOT, swing(ROBOT, seed)) for seed in (1, 2)]
-    assert identify(ROBOT, motions, right).doubt_of_bodies is None
-    twin = identify(ROBOT, motions, ["rigid_body"])
-    assert twin.doubt_of_bodies is not None
-    assert f"up to {100 * twin.body_change:.2g} % of a joint's (RMS)" in twin.doubt_of_bodies
-    assert replace(twin, body_change=None).doubt_of_bodies is None

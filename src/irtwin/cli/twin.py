@@ -96,20 +96,37 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @click.option(
     "--case-study", is_flag=True, help="Plan, price, measure and show a motion instead, as the seed paper does."
 )
-def demo(location: Location, no_open: bool, case_study: bool, **asked: Any) -> None:
+@click.option("--from", "start", metavar="POSE", help="Where its process starts, as of `irtwin plan`.")
+@click.option("--to", "goal", metavar="POSE", help="Where it ends.")
+@click.option("--seconds", type=Number(min=0.0, min_open=True), help="How long it takes, s. Default: 1.2.")
+def demo(
+    location: Location,
+    no_open: bool,
+    case_study: bool,
+    start: str | None,
+    goal: str | None,
+    seconds: float | None,
+    **asked: Any,
+) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser.
 
     With --case-study, its twin plans a motion from an initial to a final configuration and says what it will take; that
-    is kept and mapped, and read back from the graph. A simulated robot carries it out, and one page shows all of it
-    beside the paper's figures. It needs a new workspace, and the extra `plan`.
+    is kept and mapped, and read back from the graph. Then a simulated robot carries it out as you watch, and a random
+    motion besides, and one page shows all of it beside the paper's figures. It needs a new workspace, and the extras
+    `plan` and `mujoco`.
 
     \b
     Example: irtwin demo --workspace my_demo
+    Example: irtwin demo --case-study --from 0,-1.57,1.57,0,0,0 --to 1,-1,1.2,0,0.5,0 --seconds 1.5 --workspace study
     """
     if case_study:
         from irtwin.case_study import case_study as carry_out
+        from irtwin.case_study import task_of
 
-        page, question = carry_out(location, announce=announce, **asked), "planned_against_measured"
+        task = task_of(start, goal, seconds)
+        page, question = carry_out(location, task=task, announce=announce, **asked), "planned_against_measured"
+    elif (start, goal, seconds) != (None, None, None):
+        raise click.UsageError("--from, --to and --seconds say what the case study does; give --case-study, too")
     else:
         from irtwin.workflow import run as run_all
         from irtwin.workflow import unpack_demo

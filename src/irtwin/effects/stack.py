@@ -109,6 +109,12 @@ class Stack:
         """(L,) whether the coefficient of power is known, not estimated."""
         return np.array([term.fixed for _, term in self.power_terms], dtype=bool)
 
+    @cached_property
+    def on_the_bus(self) -> np.ndarray:
+        """(L,) whether power flows between the bus and the joints, or into its capacitor; not what feeds the rest."""
+        pairs = self.power_terms
+        return np.array([e.channel == "power" and (t.joint is not None or e.stage == 1) for e, t in pairs], dtype=bool)
+
     @property
     def coupled(self) -> bool:
         """Whether columns of torque depend on its coefficients: on what other effects predict."""
@@ -347,14 +353,8 @@ class Stack:
                     continue
                 part = self.columns(effect, whole, below[stage]) @ values[own]
                 power += part
-                if _on_the_bus(effect, effect.terms(self.robot)[0]):
-                    axes += part
+                axes += part if self.on_the_bus[own].any() else 0.0
         return below
-
-
-def _on_the_bus(effect: Effect, term: Term) -> bool:
-    """Return whether power flows between the bus and the joints, or into its capacitor; not what feeds the rest."""
-    return effect.channel == "power" and (term.joint is not None or effect.stage == 1)
 
 
 def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, slice]]:

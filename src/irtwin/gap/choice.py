@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
 from irtwin.effects.catalogue import BASELINE, catalogue
-from irtwin.effects.effect import Effect, force_unit
+from irtwin.effects.effect import Effect, JointEffect, force_unit
 from irtwin.errors import InputError
 from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case, case_of
@@ -25,6 +25,8 @@ from irtwin.signals.motion import Motion
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Choice, Twin
 
+Places = list[tuple[str | None, float]]
+
 
 def begin(runs: Sequence[Run]) -> tuple[str, ...]:
     """Return the effects that need no proof: the baseline's, and the heat of every drive, where power was logged."""
@@ -37,9 +39,10 @@ def identified(data_set: DataSet, motions: Sequence[Motion]) -> Twin:
 
     Its effects are those that the data set names; else those that its runs show, each in its shape: all that a twin
     has acts wherever and whenever it moves, so effects about a place, of a while or of the surroundings are left to a
-    diagnosis. The scales of power and of torque are told only against each other; the twin's energy is that of the
-    meter, so no gain of it is chosen. Where the runs cannot be diagnosed, the effects are those of `begin`. Raises
-    InputError where there is nothing to fit.
+    diagnosis. What some joints show and others leave open is in the twin at both: it is as likely there, and intervals
+    hold it. The scales of power and of torque are told only against each other; the twin's energy is that of the meter,
+    so no gain of it is chosen. Where the runs cannot be diagnosed, the effects are those of `begin`. Raises InputError
+    where there is nothing to fit.
     """
     if data_set.effects is not None:
         return identify(data_set.robot, motions, data_set.effects)
@@ -56,8 +59,19 @@ def identified(data_set: DataSet, motions: Sequence[Motion]) -> Twin:
 def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ...]]:
     case = case_of(data_set, (), DEFAULT, None)
     found = list(_findings(case))
-    causes = [cause for finding in found for cause in finding.causes]
-    return (*case.effects, *added(case, causes)), tuple(one for finding in found for one in _choices(case, finding))
+    shown = added(case, [cause for finding in found for cause in finding.causes])
+    left_open = {effect: places for finding in found for effect, places in _open(case, finding).items()}
+    choices = tuple(one for finding in found for one in _choices(case, finding))
+    return (*case.effects, *shown, *elsewhere(shown, left_open)), choices
+
+
+def elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Iterator[Effect]:
+    """Yield effects that some joints show, for the joints that leave them open."""
+    for effect in {one.id: one for one in shown if isinstance(one, JointEffect)}.values():
+        has = {joint for one in shown if one.id == effect.id for joint in one.joints or ()}
+        lacking = [joint for joint, _ in left_open.get(effect.id, ()) if joint is not None and joint not in has]
+        if has and lacking:
+            yield effect.on(*lacking)
 
 
 def _findings(case: Case) -> Iterator[Finding]:
@@ -84,14 +98,19 @@ def _standing(case: Case, signal: str) -> list[Effect]:
 def _choices(case: Case, finding: Finding) -> Iterator[Choice]:
     """Yield what a channel shows, then what it leaves open."""
     yield from (_worth(case, finding, cause) for cause in finding.causes)
-    open_ones: dict[str, list[tuple[str | None, float]]] = {}
+    for effect, places in _open(case, finding).items():
+        joints = tuple(joint for joint, _ in places if joint is not None)
+        yield Choice(effect, joints, False, max(chance for _, chance in places))
+
+
+def _open(case: Case, finding: Finding) -> dict[str, Places]:
+    """Return the joints, None for the whole robot, where a channel leaves effects open, and how likely each is."""
+    found: dict[str, Places] = {}
     for one, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
         chance = float(scipy.special.expit(odds))
         if one.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
-            open_ones.setdefault(one.effect, []).append((one.joint, chance))
-    for effect, places in open_ones.items():
-        joints = tuple(joint for joint, _ in places if joint is not None)
-        yield Choice(effect, joints, False, max(chance for _, chance in places))
+            found.setdefault(one.effect, []).append((one.joint, chance))
+    return found
 
 
 def _worth(case: Case, finding: Finding, cause: Cause) -> Choice:

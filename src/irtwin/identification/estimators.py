@@ -1,4 +1,4 @@
-"""Weighted least squares on accumulated factors, under a weak prior and physical bounds (Yan 2018, eq. 6)."""
+"""Weighted least squares on accumulated factors, under a weak prior and physical bounds (Yan 2018, eqs. 5, 6)."""
 
 from __future__ import annotations
 

@@ -70,7 +70,9 @@ def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot
             )
     for needed in (name for field in REQUIRED for name in CHANNELS[field].columns(robot.joint_names)):
         if needed not in names:
-            raise InputError(f"{path}: column {needed} is missing")
+            metered = not any(name.endswith(tuple(robot.joint_names)) for name in names)
+            cure = "; a log of power alone is a meter's: say joints = [] and no urdf in dataset.toml" if metered else ""
+            raise InputError(f"{path}: column {needed} is missing{cure}")
     return [column for column, name in zip(columns, names, strict=True) if name in channels]
 
 

@@ -73,7 +73,7 @@ class Individuals(Base):
 
 
 class Robot(Base):
-    """An industrial robot; `robot_id` is the end of its IRI."""
+    """An industrial robot (Yan 2018, eqs. 10, 12); `robot_id` is the end of its IRI."""
 
     robot_id: Mapped[str] = mapped_column(primary_key=True)
     name: Mapped[str]
@@ -132,7 +132,7 @@ class Joint(Base):
 
 
 class Run(Base):
-    """One motion, recorded or planned; `run_id` is `robot_id.name`."""
+    """One motion, recorded or planned (Yan 2018, eq. 11); `run_id` is `robot_id.name`."""
 
     run_id: Mapped[str] = mapped_column(primary_key=True)
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"))

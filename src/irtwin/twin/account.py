@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
-from irtwin.effects.effect import NORMAL, JointEffect
-from irtwin.identification.power_line import power_rise
+from irtwin.effects.effect import NORMAL, JointEffect, Predicted
+from irtwin.identification.power_line import power_rise, power_slope
 from irtwin.signals.motion import Motion
 from irtwin.twin.price import cost, trapezoid
 from irtwin.twin.twin import LedgerEntry, Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
+_STEP = 1e-3  # W
 _LEARNT = 0.5  # of an energy: half an interval that is wider tells nothing of it
 
 Key = tuple[str, str | None]  # effect and joint
@@ -116,29 +118,19 @@ def _one_way(twin: Twin) -> set[Key]:
 def _slopes(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.ndarray:
     """Return the slope of each entry's energy over each of the twin's p parameters, (E, p).
 
-    To first order; effects that build on predicted power are taken as they are, and so is what a meter adds.
+    To first order; what a store holds is taken as it is, and so is what a meter adds.
     """
-    stack, names = twin.stack, twin.robot.joint_names
+    stack = twin.stack
     rows = {(entry.effect, entry.joint): row for row, entry in enumerate(ledger)}
-    values = [np.array([twin.value(e.id, t) for e, t in terms]) for terms in (stack.torque_terms, stack.power_terms)]
-    over_torque, over_power = (np.zeros((len(ledger), len(own))) for own in values)
+    over_torque, over_power = (np.zeros((len(ledger), len(own))) for own in (stack.torque_terms, stack.power_terms))
     weights = trapezoid(motion.time)
     for piece in motion.pieces(_PIECE):
         own = weights[piece.start - motion.start : piece.start - motion.start + len(piece.time)]
-        columns = stack.torque_columns(piece, values[0])
-        if any(effect.carries_torque for effect in stack.effects):
-            work = np.einsum("t,tj,tjk->jk", own, piece.dq, columns)
-            for joint, k in zip(*np.nonzero(stack.pattern & stack.real), strict=True):
-                over_torque[rows[stack.torque_terms[k][0].id, names[joint]], k] += work[joint, k]
-        power = own @ stack.predicted_power_columns(piece, *values)
-        rise = power_rise(stack, piece, stack.real_torque(piece, values[0]), np.ones(len(names))) * values[1]
-        for k, (effect, term) in enumerate(stack.power_terms):
-            row = rows.get((effect.id, term.joint))
-            if row is None or effect.carries_torque:
-                continue
-            over_power[row, k] += power[k]
-            if isinstance(effect, JointEffect) and term.joint and effect.needs == "torque":
-                over_torque[row] += own * rise[:, k] @ columns[:, twin.robot.index(term.joint)] * stack.real
+        about = _About.of(twin, piece, own)
+        over_torque += _of_work(about, rows, over_torque.shape)
+        for row, torque, power in chain(_of_losses(about, rows), _of_burnt(about, rows)):
+            over_torque[row] += torque
+            over_power[row] += power
     places = {(each.effect, each.joint, each.link, each.name): place for place, each in enumerate(twin.parameters)}
     slopes = np.zeros((len(ledger), len(places)))
     for terms, over in ((stack.torque_terms, over_torque), (stack.power_terms, over_power)):
@@ -146,3 +138,77 @@ def _slopes(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.nda
             if not term.fixed:
                 slopes[:, places[effect.id, term.joint, term.link, term.name]] += over[:, k]
     return slopes
+
+
+@dataclass(frozen=True)
+class _About:
+    """What a twin predicts of a piece of a motion, whose samples have `weights` (N,) s.
+
+    values: (L,), coefficients of power; columns: (N, n, K) of torque; torque: (N, n) N m, the real one; flows: (N, L),
+    the columns of power.
+    """
+
+    twin: Twin
+    piece: Motion
+    weights: np.ndarray
+    values: np.ndarray
+    columns: np.ndarray
+    torque: np.ndarray
+    flows: np.ndarray
+
+    @classmethod
+    def of(cls, twin: Twin, piece: Motion, weights: np.ndarray) -> _About:
+        stack = twin.stack
+        of_torque, of_power = (
+            np.array([twin.value(e.id, t) for e, t in terms]) for terms in (stack.torque_terms, stack.power_terms)
+        )
+        columns, torque = stack.torque_columns(piece, of_torque), stack.real_torque(piece, of_torque)
+        flows = stack.predicted_power_columns(piece, of_torque, of_power, torque)
+        return cls(twin, piece, weights, of_power, columns, torque, flows)
+
+
+_Slope = tuple[int, np.ndarray, np.ndarray]  # an entry's row, and its slope over (K,) and (L,) coefficients
+
+
+def _of_work(about: _About, rows: dict[Key, int], shape: tuple[int, ...]) -> np.ndarray:
+    """Return the slopes of what joints' torque works, `shape`: (E, K)."""
+    stack, names, slopes = about.twin.stack, about.twin.robot.joint_names, np.zeros(shape)
+    if any(effect.carries_torque for effect in stack.effects):
+        work = np.einsum("t,tj,tjk->jk", about.weights, about.piece.dq, about.columns)
+        for joint, k in zip(*np.nonzero(stack.pattern & stack.real), strict=True):
+            slopes[rows[stack.torque_terms[k][0].id, names[joint]], k] += work[joint, k]
+    return slopes
+
+
+def _of_losses(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
+    """Yield the slopes of what is drawn beside, by its own coefficients and by the torque of its joint."""
+    stack, robot = about.twin.stack, about.twin.robot
+    power = about.weights @ about.flows
+    rise = power_rise(stack, about.piece, about.torque, np.ones(len(robot.joints))) * about.values
+    for k, (effect, term) in enumerate(stack.power_terms):
+        row = rows.get((effect.id, term.joint))
+        if row is None or effect.carries_torque:
+            continue
+        own, torque = np.zeros(len(power)), np.zeros(len(stack.torque_terms))
+        own[k] = power[k]
+        if isinstance(effect, JointEffect) and term.joint and effect.needs == "torque":
+            torque = about.weights * rise[:, k] @ about.columns[:, robot.index(term.joint)] * stack.real
+        yield row, torque, own
+
+
+def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
+    """Yield the slopes of what is made of the power that axes give back, by what that power depends on."""
+    stack, robot, piece = about.twin.stack, about.twin.robot, about.piece
+    on_bus = np.where(stack.on_the_bus, about.values, 0.0)
+    axes = about.flows @ on_bus
+    for effect in stack.effects:
+        if effect.needs != "power" or effect.memory:
+            continue
+        more, less = (
+            effect.columns(robot, piece, Predicted(about.torque, axes + step, axes + step)) for step in (_STEP, -_STEP)
+        )
+        own = np.array([about.twin.value(effect.id, term) for term in effect.terms(robot)])
+        rise = about.weights * ((more - less) @ own) / (2 * _STEP)
+        over_torque = rise[:, None] * power_slope(stack, piece, about.torque, on_bus)
+        torque = np.einsum("tj,tjk->k", over_torque, about.columns) * stack.real
+        yield rows[effect.id, None], torque, rise @ about.flows * stack.on_the_bus

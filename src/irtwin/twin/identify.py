@@ -28,6 +28,7 @@ from irtwin.identification.fits import (
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.remainder import Remainder, of_pauses, remainder
+from irtwin.identification.run_scatter import with_run_scatter
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.identification.uncertainty import half_widths, normal_covariance
@@ -82,6 +83,7 @@ def identify(
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known)
         free, torque = torque, with_consistent_bodies(stack, stack.torque_terms, torque)
+        torque = with_run_scatter(stack, blocks, torque)
         found: list[Found] = [(stack.torque_terms, torque)]
         if powered:
             left, power = fit_power(stack, with_power, torque.values)

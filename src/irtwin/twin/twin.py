@@ -16,7 +16,6 @@ from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 from irtwin.twin.torque_scale import TorqueScale
 
-_CONTRADICTED = 0.01  # of a joint's torque, RMS: by less, consistent bodies are as good as any
 _PIECE = 8192  # samples whose regressor is held at once
 
 
@@ -88,16 +87,6 @@ class Twin:
     def knows_power(self) -> bool:
         """Whether some loss or draw of power was identified; mechanical power alone is none of the supply's."""
         return any(effect.channel == "power" and not term.fixed for effect, term in self.stack.power_terms)
-
-    @property
-    def doubt_of_bodies(self) -> str | None:
-        """What to say where no physically consistent bodies give the measured torque; None where some do."""
-        if self.body_change is None or self.body_change < _CONTRADICTED:
-            return None
-        return (
-            "no physically consistent bodies give the measured torque: theirs differs from the best fit's by up to "
-            f"{100 * self.body_change:.2g} % of a joint's (RMS); an effect may be lacking, or a joint of the URDF wrong"
-        )
 
     @property
     def effect_ids(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
@@ -16,13 +16,19 @@ from irtwin.signals.channels import CHANNELS
 _TIME = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
 
 
-def figures(plan: Columns, run: Columns, joints: Sequence[Row]) -> dict[str, Figure]:
-    """Return the figures by name: the motion as planned and as measured, and power and energy over it."""
+_VALIDATED = slice(1, 4)  # joints 2 to 4
+
+
+def figures(series: Mapping[str, Columns], joints: Sequence[Row]) -> dict[str, Figure]:
+    """Return the figures by name, of the series "plan", "run" and "validation": motions, power and energy over them."""
+    plan, run, validation = (series[name] for name in ("plan", "run", "validation"))
     return {
+        "validation_motion": _motion(validation, joints[_VALIDATED]),
+        "validation_power": _compared(validation, "power", "power", "W"),
         "planned_motion": _motion(plan, joints),
         "measured_motion": _motion(run, joints),
-        "power": _compared(plan, run, "power", "power", "W"),
-        "energy": _compared(plan, run, "energy", "energy used so far", "J"),
+        "power": _compared(run, "power", "power", "W", plan),
+        "energy": _compared(run, "energy", "energy used so far", "J", plan),
     }
 
 
@@ -37,14 +43,15 @@ def _motion(series: Columns, joints: Sequence[Row]) -> Figure:
     return {"data": data, "layout": {"xaxis": _TIME, "yaxis": {"title": {"text": "joint position, °"}}}}
 
 
-def _compared(plan: Columns, run: Columns, name: str, title: str, unit: str) -> Figure:
-    """Draw what was measured, what the twin makes of the measured motion, and what it made of the plan."""
+def _compared(run: Columns, name: str, title: str, unit: str, plan: Columns | None = None) -> Figure:
+    """Draw what was measured, what the twin makes of the measured motion, and what it made of the plan, if any."""
     data = [
         _line("measured", run, run[name], unit, MEASURED),
         _line("modelled, along the measured motion", run, run[f"{name}_model"], unit, MODELLED),
         _line("measured less modelled", run, run[name] - run[f"{name}_model"], unit, RESIDUAL),
-        _line("planned, before it moved", plan, plan[f"{name}_model"], unit, HELD_OUT, dash="dot"),
     ]
+    if plan is not None:
+        data.append(_line("planned, before it moved", plan, plan[f"{name}_model"], unit, HELD_OUT, dash="dot"))
     return {"data": data, "layout": {"xaxis": _TIME, "yaxis": axis(title, unit)}}
 
 

@@ -1,4 +1,4 @@
-"""The page of the case study: what the seed paper shows in its figures 9 to 13, and the same here."""
+"""The page of the case study: what the seed paper shows in its figures 7 to 13, and the same here."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def render(
     case = ask(graph, {"case": questions["case"]}, {"robot": robot_iri})["case"].first
     if case is None:
         raise InputError(f"{robot_iri}: the graph has no plan that was carried out; run `irtwin demo --case-study`")
-    bindings = {"robot": robot_iri} | {name: case[name] for name in ("plan", "run", "twin")}
+    bindings = {"robot": robot_iri} | {name: case[name] for name in ("plan", "run", "twin", "validation")}
     answers = ask(graph, questions, bindings)
     read = cache(read_series)
     series = {
@@ -47,7 +47,7 @@ def render(
 
 
 def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment, base: str) -> str:
-    drawn = figures(series["plan"], series["run"], answers["configurations"].rows)
+    drawn = figures(series, answers["configurations"].rows)
     scripts = figure_scripts("case_study/configurations.js")
     return written(
         shipped(),
@@ -57,6 +57,8 @@ def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns]
         case=answers["case"].first,
         twin=answers["twin"].first,
         configurations=answers["configurations"].rows,
+        chain=answers["chain"].rows,
+        equations=answers["equations"].rows,
         individuals=individuals(answers["individual"].rows, base),
         seed_modelled=SEED_MODELLED,
         seed_measured=SEED_MEASURED,

@@ -35,6 +35,7 @@ class Encoders:
         self.resolution = 2 * np.pi / 2**data.encoder_bits / gear_ratio
 
     def read(self, q: np.ndarray) -> np.ndarray:
+        """Return positions (n,) rad as encoders show them."""
         return quantise(q, self.resolution)
 
 
@@ -45,6 +46,7 @@ class TorqueSensors:
         self.data, self.offset, self.rng = data, offset, rng
 
     def read(self, torque: np.ndarray) -> np.ndarray:
+        """Return torques (n,) N m as current sensors show them."""
         noise = self.data.torque_noise * self.rng.standard_normal(len(torque))
         return quantise(torque + self.offset + noise, self.data.torque_resolution)
 
@@ -57,8 +59,10 @@ class PowerMeter:
         self.filtered = power
 
     def advance(self, power: float, step: float) -> None:
+        """Let the meter follow a power, W, for `step` s."""
         self.filtered += (1 - np.exp(-step / self.data.meter_time_constant)) * (power - self.filtered)
 
     def read(self) -> float:
+        """Return the power that the meter shows, W."""
         value = self.gain * self.filtered + self.data.meter_noise * self.rng.standard_normal()
         return float(quantise(value, self.data.meter_resolution))

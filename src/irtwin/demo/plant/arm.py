@@ -62,6 +62,7 @@ class Arm:
 
     @property
     def joint_names(self) -> list[str]:
+        """Names of the joints, in order."""
         return [self.model.joint(index).name for index in range(self.model.njnt)]
 
     def place(self, q: np.ndarray) -> None:

@@ -45,6 +45,7 @@ class Losses:
 
     @property
     def total(self) -> float:
+        """All of them together, W."""
         return float(self.copper.sum() + self.iron.sum() + self.inverter.sum())
 
 

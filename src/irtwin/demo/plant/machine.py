@@ -11,18 +11,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from plant.arm import Arm, LinkTolerance, Payload
-from plant.controller import ControlData
-from plant.drive import DriveData
-from plant.friction import FrictionData
-from plant.motion import Limits
-from plant.sensors import SensorData
-from plant.supply import SupplyData
-from plant.thermal import ThermalData
+from irtwin.demo.plant.arm import Arm, LinkTolerance, Payload
+from irtwin.demo.plant.controller import ControlData
+from irtwin.demo.plant.drive import DriveData
+from irtwin.demo.plant.friction import FrictionData
+from irtwin.demo.plant.motion import Limits
+from irtwin.demo.plant.sensors import SensorData
+from irtwin.demo.plant.supply import SupplyData
+from irtwin.demo.plant.thermal import ThermalData
 
 Data = TypeVar("Data", DriveData, FrictionData)
-
-ROBOTS = Path(__file__).parent / "robots"
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Drawings:
-    """All that the maker knows of a robot, read from robots/NAME.toml."""
+    """All that the maker knows of a robot."""
 
     urdf: str
     manufacturer: str
@@ -122,9 +120,8 @@ def scatter(data: Data, deviations: dict[str, float], rng: np.random.Generator) 
     return replace(data, **changed)
 
 
-def read_drawings(name: str) -> Drawings:
-    """Read robots/NAME.toml and the URDF it names."""
-    file = ROBOTS / f"{name}.toml"
+def read_drawings(file: Path, urdf: Path) -> Drawings:
+    """Read a robot's drawings, a TOML file, and its URDF."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     parts = {
         "tolerance": Tolerance,
@@ -137,7 +134,7 @@ def read_drawings(name: str) -> Drawings:
     }
     for key, part in parts.items():
         table[key] = _typed(part, table[key])
-    table["urdf"] = _bodies((file.parent / table["urdf"]).resolve().read_text(encoding="utf-8"))
+    table["urdf"] = _bodies(urdf.read_text(encoding="utf-8"))
     table["acceleration"] = np.asarray(table["acceleration"], dtype=float)
     return Drawings(**table)
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from plant.arm import Payload
-from plant.controller import Controller
-from plant.drive import Drive, Losses
-from plant.friction import Friction
-from plant.machine import Machine, scatter
-from plant.motion import Motion
-from plant.sensors import Encoders, PowerMeter, TorqueSensors, quantise
-from plant.supply import Flow, Supply
-from plant.thermal import Thermal
+from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.controller import Controller
+from irtwin.demo.plant.drive import Drive, Losses
+from irtwin.demo.plant.friction import Friction
+from irtwin.demo.plant.machine import Machine, scatter
+from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.sensors import Encoders, PowerMeter, TorqueSensors, quantise
+from irtwin.demo.plant.supply import Flow, Supply
+from irtwin.demo.plant.thermal import Thermal
 
 SETTLE = 0.6  # s, at the first pose before the log starts
 
@@ -113,8 +114,21 @@ class _Cell:
         )
 
 
-def simulate(machine: Machine, motion: Motion, payload: Payload, thermal: Thermal, seed: int) -> Recording:
-    """Let a machine do a motion; `thermal` is warmed by it, `seed` makes the run's noise."""
+Watch = Callable[[float, float, float], None]
+
+
+def simulate(
+    machine: Machine,
+    motion: Motion,
+    payload: Payload,
+    thermal: Thermal,
+    seed: int,
+    watch: Watch = lambda time, power, energy: None,
+) -> Recording:
+    """Let a machine do a motion; `thermal` is warmed by it, `seed` makes the run's noise.
+
+    `watch` is told each sample that is logged: time, s, power by the meter, W, and energy so far, J.
+    """
     drawings = machine.drawings
     settle = round(SETTLE / drawings.step)
     stride = round(drawings.log_interval / drawings.step)
@@ -128,6 +142,7 @@ def simulate(machine: Machine, motion: Motion, payload: Payload, thermal: Therma
     for sample in range(len(motion.q)):
         if sample % stride == 0:
             rows.append(cell.read())
+            watch(sample * drawings.step, float(rows[-1][-1]), book.grid)
             truth.append(np.concatenate([cell.arm.data.qpos, cell.torque]))
         losses, friction_loss, flow = cell.advance(settle + sample)
         _enter(book, losses, friction_loss, flow, drawings.supply.standby, drawings.step)

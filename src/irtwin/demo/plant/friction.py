@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-LAWS = {  # how much of dry friction there is, by speed over a width: none of them is the form that a twin has
+LAWS: dict[
+    str, Callable[[np.ndarray], np.ndarray]
+] = {  # how much of dry friction there is, by speed over a width: none of them is the form that a twin has
     "sharp": np.ones_like,
     "tanh": np.tanh,
     "arctangent": lambda u: 2 / np.pi * np.arctan(u),

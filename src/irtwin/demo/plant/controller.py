@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.arm import Arm
-from plant.motion import Motion
+from irtwin.demo.plant.arm import Arm
+from irtwin.demo.plant.motion import Motion
 
 
 @dataclass(frozen=True)

@@ -110,3 +110,17 @@ def _trapezoid(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     travelled = np.where(up, 2.25 * s**2, np.where(down, 1 - 2.25 * (1 - s) ** 2, 1.5 * s - 0.25))
     rate = np.where(up, 4.5 * s, np.where(down, 4.5 * (1 - s), 1.5))
     return travelled, rate, 4.5 * (up.astype(float) - down.astype(float))
+
+
+def check(motion: Motion, limits: Limits) -> None:
+    """Raise ValueError where a motion asks more than the robot may do."""
+    slack = 1 + 1e-6
+    beyond = {
+        "position": (motion.q < limits.lower) | (motion.q > limits.upper),
+        "speed": np.abs(motion.dq) > slack * limits.speed,
+        "acceleration": np.abs(motion.ddq) > slack * limits.acceleration,
+    }
+    for what, where in beyond.items():
+        if where.any():
+            row, joint = np.argwhere(where)[0]
+            raise ValueError(f"joint {joint + 1} passes its {what} limit at step {row}")
