@@ -23,9 +23,9 @@ import pyarrow.parquet as pq
 from blind.cases import Case, Plan, write_runs
 from blind.catalogue import Draw, draw
 from blind.motions import exciting
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.machine import Drawings
-from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.motion import PlantMotion
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.log import read_data_set
 
@@ -76,7 +76,7 @@ COMPARISONS = (
 )
 
 
-def simulate(drawings: Drawings, motion: Motion, friction: bool) -> tuple[np.ndarray, np.ndarray]:
+def simulate(drawings: Drawings, motion: PlantMotion, friction: bool) -> tuple[np.ndarray, np.ndarray]:
     """Log positions and joint torque, (N, n), of MuJoCo's forward dynamics under computed torque, as drawn."""
     spec = mujoco.MjSpec.from_string(drawings.urdf)
     spec.compiler.fusestatic = False
@@ -130,7 +130,7 @@ def make(comparison: Comparison, folder: Path) -> Path:
     drawings = case.machine.drawings
     with (data / "dataset.toml").open("a", encoding="utf-8") as description:
         for run in range(RUNS):
-            bare = [m for m, payload in zip(case.motions, case.payloads, strict=True) if payload == Payload()]
+            bare = [m for m, payload in zip(case.motions, case.payloads, strict=True) if payload == PlantPayload()]
             motion = bare[2 * run % len(bare)] if comparison.same else exciting(drawings, SECONDS, 0.9, 0.7, rng)
             q, tau = simulate(drawings, motion, comparison.friction)
             columns = {"time": drawings.log_interval * np.arange(len(q))}

@@ -12,13 +12,13 @@ import sys
 import time
 from pathlib import Path
 
-from irtwin.knowledge.questions.queries import Question, ask, named_questions
+from irtwin.knowledge.questions.queries import NamedQuery, ask, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 ROBOT = "R001"
 
 
-def measure(graph: KnowledgeGraph, question: Question, times: int) -> tuple[list[float], list[float], int]:
+def measure(graph: KnowledgeGraph, question: NamedQuery, times: int) -> tuple[list[float], list[float], int]:
     """Return how long each answer took, ms, by the clock and by the processor's time, and how many rows it has."""
     clock, processor = [], []
     for _ in range(times):

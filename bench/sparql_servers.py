@@ -19,7 +19,7 @@ from irtwin.asking import open_graph
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.location import Location
 
 SUMMED, SIX_DIGITS = 1e-12, 1e-5  # relative
@@ -52,7 +52,7 @@ def main(workspace: Path, urls: list[str]) -> None:
             print(f"  {equal} of {len(known)} equal, in {seconds:.1f} s")
 
 
-def difference(server: KnowledgeGraph, name: str, answer: Table) -> str:
+def difference(server: KnowledgeGraph, name: str, answer: AnswerTable) -> str:
     """Say in words how a server's answer differs; nothing where it does not."""
     try:
         found = ask(server, name)

@@ -16,7 +16,7 @@ from irtwin import asking, plans, workflow
 from irtwin.document import form
 from irtwin.document.document import Document
 from irtwin.errors import InputError
-from irtwin.identification.programmes import Programme, programmes
+from irtwin.identification.programmes import ExperimentProgramme, programmes
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
@@ -99,7 +99,7 @@ def test_the_motion_is_that_of_the_programme_that_a_diagnosis_designed(
     far = replace(ladder.motions[0], q=9.0 * ladder.motions[0].q)
     with Workspace(tmp_path / "w") as place, KnowledgeGraph.of_workspace(place) as graph:
 
-        def said(programme: Programme | None, motion: Motion | None, *by_hand: str) -> str:
+        def said(programme: ExperimentProgramme | None, motion: Motion | None, *by_hand: str) -> str:
             proposed = form.to_json(experiment(programme, *by_hand))
             motion_text = None if motion is None else csv_text(Signals(motion.time, motion.q), ROBOT.joint_names)
             record(place, "arm_2", diagnosis(next_experiment=proposed), NOTHING, motion=motion_text)

@@ -16,7 +16,7 @@ from irtwin.document.curves import Curves
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.diagnosis import Diagnosis
-from irtwin.identification.programmes import Programme, programmes
+from irtwin.identification.programmes import ExperimentProgramme, programmes
 from irtwin.proposed_motion import motion_text, save_motion
 from irtwin.signals.samples import read_signals
 from tests.synthetic import arm, swing
@@ -28,12 +28,12 @@ NOTHING = Curves(follows=(), runs=(), experiment=None)
 
 
 @cache
-def designed() -> dict[str, Programme]:
+def designed() -> dict[str, ExperimentProgramme]:
     asked = [catalogue()[name] for name in ("payload", "temperature_dependent_friction")]
     return {one.kind: one for one in programmes(ROBOT, (), [swing(ROBOT, 1)], asked)}
 
 
-def experiment(programme: Programme | None, *by_hand: str) -> Experiment:
+def experiment(programme: ExperimentProgramme | None, *by_hand: str) -> Experiment:
     return Experiment(
         purpose="tell one from the other",
         effects=("coulomb_friction", "payload"),
@@ -49,7 +49,7 @@ def experiment(programme: Programme | None, *by_hand: str) -> Experiment:
     )
 
 
-def found(programme: Programme | None, *by_hand: str, **changes: Any) -> Diagnosis:
+def found(programme: ExperimentProgramme | None, *by_hand: str, **changes: Any) -> Diagnosis:
     given: dict[str, Any] = {
         "description": ROBOT, "left_open": None, "channels": (), "floor": None, "locations": (), "untestable": (),
         "runs": (), "curves": NOTHING, "experiment": experiment(programme, *by_hand),

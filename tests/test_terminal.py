@@ -14,7 +14,7 @@ import pytest
 from click.shell_completion import ShellComplete
 
 from irtwin.cli import cli
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.report.terminal import show
 from tests.data_sets import irtwin
 
@@ -86,7 +86,7 @@ def test_options_take_finite_numbers(arguments, value):
     assert "Invalid value for" in said.err
 
 
-ANSWER = Table(
+ANSWER = AnswerTable(
     ("robot", "joint", "a_rather_long_name_W", "energy_J", "share_of_energy"),
     tuple(
         {"robot": "KUKA_KR6_R700", "joint": f"joint_{n}", "a_rather_long_name_W": -1.23456789e-5 * n}

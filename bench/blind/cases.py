@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from blind.catalogue import LOCAL, POWER, REGIMES, SLIGHT, TORQUE, UNKNOWN_EFFECTS, WHOLE_ROBOT, Draw, draw
 from blind.motions import exciting, work
 from blind.projection import STRIDE, Basis, low_pass
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.friction import LAWS, NearZero
 from irtwin.demo.plant.machine import Machine, build
 from plant.drawings import read_drawings
@@ -180,7 +180,7 @@ class Case:
             else:
                 motion = work(drawings, SECONDS, n, 0.7, rng)
             motions.append(motion)
-            payloads.append(Payload(told, (0.0, 0.0, 0.04)) if "p" in kind else Payload())
+            payloads.append(PlantPayload(told, (0.0, 0.0, 0.04)) if "p" in kind else PlantPayload())
             repeats.append(None)
         self.roles = ["observed"] * len(layout)
         if plan.scope == "changed":
@@ -232,11 +232,11 @@ class Case:
         self.healthy = seen, drawn
         sensors = self.machine.drawings.sensors
         payload = self.payloads[[p.mass > 0 for p in self.payloads].index(True)]
-        tool = self.machine.drawings.arm(Payload()).model.body("flange").pos
+        tool = self.machine.drawings.arm(PlantPayload()).model.body("flange").pos
         com = payload.mass * (np.array(payload.com) + tool)
         told = np.concatenate([[payload.mass], com, np.zeros(6)])
         known = np.array([p.mass > 0 for p in self.payloads])
-        arm = self.machine.drawings.arm(Payload())
+        arm = self.machine.drawings.arm(PlantPayload())
         self.basis = Basis(
             arm, *(x[:: self.stride] for x in (traces.q, traces.dq, traces.ddq)), payload=told, known=known,
             weights=1 / sensors.torque_noise, interval=self.interval, near_zero=self.near_zero,

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from irtwin.demo.plant.machine import Drawings
-from irtwin.demo.plant.motion import Motion, programme
+from irtwin.demo.plant.motion import PlantMotion, programme
 
 HARMONICS = 5
 JERK_TIME = 0.08  # s
 
 
-def exciting(drawings: Drawings, seconds: float, reach: float, speed: float, rng: np.random.Generator) -> Motion:
+def exciting(drawings: Drawings, seconds: float, reach: float, speed: float, rng: np.random.Generator) -> PlantMotion:
     """Return a random Fourier motion of all joints; `reach` and `speed` are shares of the limits."""
     limits = drawings.limits
     n = len(limits.lower)
@@ -34,10 +34,10 @@ def exciting(drawings: Drawings, seconds: float, reach: float, speed: float, rng
         np.minimum(speed * limits.speed / np.abs(dq).max(0), speed * limits.acceleration / np.abs(ddq).max(0)),
     )
     centre = middle - scale * (q.max(0) + q.min(0)) / 2
-    return Motion(centre + scale * q, scale * dq, scale * ddq)
+    return PlantMotion(centre + scale * q, scale * dq, scale * ddq)
 
 
-def work(drawings: Drawings, seconds: float, joints: int, speed: float, rng: np.random.Generator) -> Motion:
+def work(drawings: Drawings, seconds: float, joints: int, speed: float, rng: np.random.Generator) -> PlantMotion:
     """Return point-to-point moves between four poses with pauses; only the first `joints` joints move."""
     limits = drawings.limits
     middle, half = (limits.upper + limits.lower) / 2, np.minimum((limits.upper - limits.lower) / 2, 1.3)
@@ -50,7 +50,7 @@ def work(drawings: Drawings, seconds: float, joints: int, speed: float, rng: np.
     motion = programme(moves, limits, drawings.step, cycles=12)
     rows = round(seconds / drawings.step)
     smooth = [_without_jerks(getattr(motion, name), round(JERK_TIME / drawings.step)) for name in ("q", "dq", "ddq")]
-    return Motion(*(signal[:rows] for signal in smooth))
+    return PlantMotion(*(signal[:rows] for signal in smooth))
 
 
 def _without_jerks(signal: np.ndarray, steps: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from blind.projection import Basis
 from closed_loop.machine import Machine
 from closed_loop.simulation import Trace
-from irtwin.demo.plant.arm import Arm, Payload
+from irtwin.demo.plant.arm import Arm, PlantPayload
 from irtwin.demo.plant.friction import NearZero
 
 COARSE = 0.008  # s, between the samples that are fitted
@@ -21,7 +21,7 @@ class Refit:
         self.stride = max(round(COARSE / interval), 1)
         q, dq, ddq = (joined(traces, name)[:: self.stride] for name in ("q", "dq", "ddq"))
         self.basis = Basis(
-            Arm(machine.urdf, machine.real.dof_armature.copy(), Payload(), machine.step),
+            Arm(machine.urdf, machine.real.dof_armature.copy(), PlantPayload(), machine.step),
             q,
             dq,
             ddq,

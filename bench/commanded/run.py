@@ -26,7 +26,7 @@ from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
 from irtwin.simulator.callback import apply
 from irtwin.simulator.model import read_model
-from irtwin.simulator.play import Stretch, play, whole
+from irtwin.simulator.play import PlayedStretch, play, whole
 from irtwin.simulator.servos import Servos, servos
 
 EFFECTS = {  # what each kind is called by a diagnosis
@@ -73,7 +73,7 @@ def judge(folder: Path) -> dict[str, Any]:
     return {"document": found.document.to_json(), "left": left, "seconds": time.process_time() - begin}
 
 
-def called_back(own: Servos, said: Path, stretch: Stretch) -> np.ndarray:
+def called_back(own: Servos, said: Path, stretch: PlayedStretch) -> np.ndarray:
     """Return the positions (N, n) of a written model that MuJoCo moves with what a diagnosis says that it lacks."""
     compiled = mujoco.MjModel.from_xml_path(str(own.model.file.path))
     apply(compiled, said)

@@ -15,9 +15,9 @@ import numpy as np
 
 from blind.motions import exciting, work
 from energy_twin.truth import Parts, Truth, drives, mechanical, numbers, power_of
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.machine import Machine, build
-from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.motion import PlantMotion
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
@@ -48,7 +48,7 @@ class Case:
     data_set: DataSet
     effects: tuple[str, ...]
     truth: Truth
-    plant: Callable[[Motion], np.ndarray]
+    plant: Callable[[PlantMotion], np.ndarray]
 
 
 def cases(seeds: Sequence[int], only: str = "") -> Iterator[Case]:
@@ -70,7 +70,7 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     ]
     effects = _effects(machine, len(motions), more)
 
-    def executed(motions: list[Motion]) -> tuple[Traces, np.ndarray, Parts]:
+    def executed(motions: list[PlantMotion]) -> tuple[Traces, np.ndarray, Parts]:
         """Return what motions do, their power, (T, R) W, and its parts, (T, R) W or a joint's, (T, R, n)."""
         told = np.stack([motion.dq for motion in motions], axis=1)
         released = _released(told) if more else np.ones(told.shape[:2])
@@ -142,23 +142,27 @@ def _effects(machine: Machine, runs: int, more: bool) -> tuple[Effect, ...]:
 
 
 def _simulated(
-    machine: Machine, motions: list[Motion], effects: tuple[Effect, ...], rng: np.random.Generator, braked: np.ndarray
+    machine: Machine,
+    motions: list[PlantMotion],
+    effects: tuple[Effect, ...],
+    rng: np.random.Generator,
+    braked: np.ndarray,
 ) -> tuple[Traces, Parts]:
     """Return what a controller in MuJoCo makes of motions, and its friction, (T, R, n) N m, where laws are simple."""
     runs, n = len(motions), len(machine.drawings.joints)
     jitter = 1 + machine.drawings.tolerance.friction_per_run * rng.standard_normal((runs, 2, n)).clip(-2, 2)
-    traces = Fleet(machine, motions, [Payload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked).run(
-        effects
-    )
+    traces = Fleet(
+        machine, motions, [PlantPayload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked
+    ).run(effects)
     if any(effect.id == "stribeck_friction" for effect in effects):
         return traces, {}
     dry, oil = machine.friction.coulomb * jitter[:, 0], machine.friction.viscous * jitter[:, 1]
     return traces, {"coulomb_friction": dry * np.sign(traces.dq), "viscous_friction": oil * traces.dq}
 
 
-def _followed(machine: Machine, motions: list[Motion], more: bool) -> tuple[Traces, Parts]:
+def _followed(machine: Machine, motions: list[PlantMotion], more: bool) -> tuple[Traces, Parts]:
     """Return the motions followed exactly, and friction by the catalogue's laws, (T, R, n) N m."""
-    arm, friction, rotor = machine.arm(Payload()), machine.friction, machine.drive.joint_inertia
+    arm, friction, rotor = machine.arm(PlantPayload()), machine.friction, machine.drive.joint_inertia
     arm.model.dof_armature[:] = 0.0
     q, dq, ddq = (np.stack([getattr(one, name) for one in motions], axis=1) for name in ("q", "dq", "ddq"))
     flat = (x.reshape(-1, x.shape[2]) for x in (q, dq, ddq))

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from energy_twin.cases import STEP, Case, cases
-from irtwin.demo.plant.motion import Motion as Programmed
+from irtwin.demo.plant.motion import PlantMotion as Programmed
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.machine import Machine
 from irtwin.effects.stack import Stack
 from irtwin.identification.base_parameters import base_parameters
@@ -47,7 +47,7 @@ class Truth:
         rng, n = np.random.default_rng(1), len(self.joints)
         q, ddq = (rng.uniform(-most, most, (_STATES, n)) for most in (3, 5))
         dq = rng.uniform(1, 2, (_STATES, n)) * rng.choice([-1, 1], (_STATES, n))  # dry friction as it slides
-        arm, friction = self.machine.arm(Payload()), self.machine.friction
+        arm, friction = self.machine.arm(PlantPayload()), self.machine.friction
         torque = np.array([arm.inverse_dynamics(*state) for state in zip(q, dq, ddq, strict=True)])
         torque = torque + friction.coulomb * np.sign(dq) + friction.viscous * dq + self.machine.torque_offset
         columns = stack.torque_columns(Motion(np.arange(float(_STATES)), q, dq, ddq, run="random"))

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.machine import Drawings, build
-from irtwin.demo.plant.motion import Motion, check, fourier, programme
-from irtwin.demo.plant.simulate import Recording, simulate
+from irtwin.demo.plant.motion import PlantMotion, check, fourier, programme
+from irtwin.demo.plant.simulate import PlantRecording, simulate
 from irtwin.demo.plant.thermal import Thermal
 from plant.drawings import read_drawings
 
@@ -35,8 +35,8 @@ class Run:
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
-    def payload(self) -> Payload:
-        return Payload(self.payload_mass, self.payload_com)
+    def payload(self) -> PlantPayload:
+        return PlantPayload(self.payload_mass, self.payload_com)
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ def read_campaign(name: str) -> Campaign:
     return Campaign(table["name"], table["robot"], table["seed"], table["motion"], runs)
 
 
-def carry_out(campaign: Campaign) -> Iterator[tuple[Run, Motion, Recording]]:
+def carry_out(campaign: Campaign) -> Iterator[tuple[Run, PlantMotion, PlantRecording]]:
     """Simulate the runs one after another."""
     machine = build(read_drawings(campaign.robot), campaign.seed)
     thermal = Thermal(machine.drawings.thermal)
-    before: tuple[Run, Recording] | None = None
+    before: tuple[Run, PlantRecording] | None = None
     for number, run in enumerate(campaign.runs):
         if before is not None:
             _pass_time(thermal, *before, run)
@@ -71,7 +71,7 @@ def carry_out(campaign: Campaign) -> Iterator[tuple[Run, Motion, Recording]]:
         yield run, motion, recording
 
 
-def _pass_time(thermal: Thermal, run: Run, recording: Recording, following: Run) -> None:
+def _pass_time(thermal: Thermal, run: Run, recording: PlantRecording, following: Run) -> None:
     gap = (following.started - run.started).total_seconds() - float(recording.time[-1])
     worked = 60 * following.worked
     if gap < worked:
@@ -81,7 +81,7 @@ def _pass_time(thermal: Thermal, run: Run, recording: Recording, following: Run)
     thermal.wait(recording.mean_winding_loss, recording.mean_body_loss, worked)
 
 
-def motion_of(entry: dict[str, Any], drawings: Drawings) -> Motion:
+def motion_of(entry: dict[str, Any], drawings: Drawings) -> PlantMotion:
     """Return the motion of a campaign's [motion.NAME] table, checked against the robot's limits."""
     if "file" in entry:
         motion = fourier(FOLDER / entry["file"], drawings.step, entry.get("speed", 1.0))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.friction import NearZero
 from irtwin.demo.plant.machine import Machine
-from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.motion import PlantMotion
 from plant.effects import LEVEL, PASSIVE, Effect, State
 
 _ONLY_FRICTION = int(
@@ -39,8 +39,8 @@ class Fleet:
     def __init__(
         self,
         machine: Machine,
-        motions: list[Motion],
-        payloads: list[Payload],
+        motions: list[PlantMotion],
+        payloads: list[PlantPayload],
         warmth: np.ndarray,
         jitter: np.ndarray,
         step: float,
@@ -190,7 +190,7 @@ class Fleet:
                 extra = hidden.strength
                 mass = payload.mass + extra
                 com = (payload.mass * np.array(payload.com) + extra * np.array(hidden.shape["com"])) / mass
-                payload = Payload(mass, tuple(com))
+                payload = PlantPayload(mass, tuple(com))
             arm = self.machine.arm(payload)
             arm.model.opt.timestep = self.step
             arm.model.opt.enableflags = 0

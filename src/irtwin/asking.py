@@ -12,7 +12,7 @@ from irtwin.errors import GraphBehind, InputError
 from irtwin.knowledge.questions import queries
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.location import WORKSPACE, Location
 from irtwin.resources import Resources, resources_of
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 BEHIND, UPDATING = "behind", "updating"  # the standing of a graph that is not whole
 
 
-def ask(question: str, workspace: Location | Path | str = WORKSPACE, *, robot: str | None = None) -> Table:
+def ask(question: str, workspace: Location | Path | str = WORKSPACE, *, robot: str | None = None) -> AnswerTable:
     """Answer a named question, of all robots or of one by its name, or one in SPARQL, from a workspace's graph.
 
     Raises InputError where there is no graph or no answer.
@@ -47,13 +47,13 @@ def export(owl: Path | str, workspace: Location | Path | str = WORKSPACE) -> Non
         export_owl(graph, Path(owl))
 
 
-def questions(workspace: Path = WORKSPACE) -> Table:
+def questions(workspace: Path = WORKSPACE) -> AnswerTable:
     """Return the questions that have a name, theme by theme; `of` says which can be asked of one robot."""
     known = queries.named_questions(checked(workspace)).values()
     rows = (
         {"theme": q.theme, "name": q.name, "of": "robot" if q.of_robot else None, "question": q.question} for q in known
     )
-    return Table(("theme", "name", "of", "question"), tuple(rows))
+    return AnswerTable(("theme", "name", "of", "question"), tuple(rows))
 
 
 @contextmanager

@@ -15,8 +15,8 @@ from irtwin.location import Location
 from irtwin.modelling import Announce, Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.plan import Plan, Task
-from irtwin.planning.programme import Programme, programme_of
-from irtwin.planning.waiting import Proposal, proposals
+from irtwin.planning.programme import SectionedMotion, programme_of
+from irtwin.planning.waiting import PauseProposal, proposals
 from irtwin.providers.energy import stored_price
 from irtwin.providers.records import (
     check_run_name,
@@ -134,10 +134,10 @@ class Timings:
     """
 
     robot: Robot
-    programme: Programme
+    programme: SectionedMotion
     best: Cycle
     curve: Sequence[Cycle]
-    proposals: Sequence[Proposal]
+    proposals: Sequence[PauseProposal]
     shows_off: bool
     hours: float | None
 

@@ -17,7 +17,7 @@ from tests.data_sets import irtwin
 from tests.live.controller import Controller
 
 from irtwin.bring.bring import Options, bring, found_in, init
-from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.robot_library import robot_of, robots, with_fixed
 from irtwin.check.check import check
 from irtwin.errors import InputError
@@ -329,7 +329,7 @@ def test_an_answer_is_taken_as_if_it_had_been_typed(tmp_path: Path) -> None:
     log = plain(tmp_path, power=good()["power"], **{f"load{k}": good()[f"tau_joint_a{k}"] for k in range(1, 7)})
     asked: list[str] = []
 
-    def ask(doubt: DoubtError) -> Answer:
+    def ask(doubt: DoubtError) -> WayOut:
         asked.append(doubt.question)
         return doubt.answers[-1]
 

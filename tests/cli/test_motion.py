@@ -10,14 +10,14 @@ from tests.planning.test_programme import bell, motion, rest
 from irtwin.cli.motion import _curve_lines, _tour_text
 from irtwin.planning.plan import Tour
 from irtwin.planning.programme import programme_of
-from irtwin.planning.waiting import Proposal
+from irtwin.planning.waiting import PauseProposal
 from irtwin.twin.price import Figure
 
 
 def found(hours: float | None, shows_off: bool) -> SimpleNamespace:
     proposals = [
-        Proposal(1.0, 3.0, "wait where it stands at 0.20 s", Figure(36.0, 2.0), 0.0),
-        Proposal(1.0, 3.0, "close the brakes at once", Figure(18.0, None), None),
+        PauseProposal(1.0, 3.0, "wait where it stands at 0.20 s", Figure(36.0, 2.0), 0.0),
+        PauseProposal(1.0, 3.0, "close the brakes at once", Figure(18.0, None), None),
     ]
     return SimpleNamespace(
         curve=[],

@@ -13,7 +13,7 @@ from tests import gap_cases
 
 from irtwin.document import form
 from irtwin.document.curves import Curves
-from irtwin.document.document import Cause, Document, Gap, Location, Shrink, cause_ids, schema
+from irtwin.document.document import Cause, Document, Gap, GapLocation, Shrink, cause_ids, schema
 from irtwin.document.experiment import Experiment
 from irtwin.errors import InputError
 
@@ -85,7 +85,7 @@ def _typed(kind: str, node: dict[str, Any]) -> st.SearchStrategy[Any]:
     return st.fixed_dictionaries(required, optional=parts)
 
 
-@pytest.mark.parametrize("kind", [Gap, Location, Cause, Shrink, Experiment, Curves])
+@pytest.mark.parametrize("kind", [Gap, GapLocation, Cause, Shrink, Experiment, Curves])
 def test_whatever_the_schema_allows_is_read_and_written_alike(kind: type) -> None:
     @settings(max_examples=40)
     @given(json_of(form.schema(kind)))

@@ -14,7 +14,7 @@ from irtwin.effects.load import ExternalContact, Payload
 from irtwin.gap.regression.candidate_columns import Candidates
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
 from irtwin.gap.screening.contact import contact
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.signals.filter import low_pass
 
 ROBOT = arm(6)
@@ -29,7 +29,7 @@ def remainder(seed, added=None, observed=True):
     residual = NOISE * low_pass(white, motion.rate, 8.0) * np.sqrt(motion.rate / 2 / 8.0)
     if added is not None:
         residual = residual + added(motion)
-    return Remainder(motion, residual, observed)
+    return RunResidual(motion, residual, observed)
 
 
 def push(motion):

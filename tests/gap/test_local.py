@@ -9,7 +9,7 @@ from tests.synthetic import arm, swing
 from irtwin.effects.load import CableDrag
 from irtwin.effects.local import JointLimitSpring, LocalEffect, LocalWear
 from irtwin.gap.screening.local import local_effects
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.gap.screening.screen import Screened
 
 ROBOT = arm(3)
@@ -24,7 +24,7 @@ def remainders(added=lambda motion: 0.0, observed=True):
         residual = generator.standard_normal((len(motion.time), 3))
         residual[:, 1] += added(motion)
         residual[:20] = np.nan
-        left.append(Remainder(motion, residual, observed))
+        left.append(RunResidual(motion, residual, observed))
     return left
 
 

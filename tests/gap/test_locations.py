@@ -10,7 +10,7 @@ import pytest
 from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.effects.transmission import JointCoupling
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.localisation.channel_residuals import ChannelResidual
 from irtwin.gap.localisation.excess_map import JOINT_REGIMES, heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
@@ -202,7 +202,7 @@ def test_power_follows_the_torque_squared():
 def test_a_coupling_acts_on_both_joints_of_its_pair():
     effect = JointCoupling()
     variant = Variant(effect, (0,), effect.terms(ROBOT)[:1])
-    found = Cause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, log_odds=9.0, probability=1.0)
+    found = FoundCause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, log_odds=9.0, probability=1.0)
     assert found.touched(ROBOT) == JOINTS[1:]
     empty = dict.fromkeys(("refitted", "after", "seen", "acts", "reference", "level", "least"))
     finding = SimpleNamespace(places=JOINTS)

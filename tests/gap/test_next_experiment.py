@@ -14,7 +14,7 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap import next_experiment as module
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.finding import finding_of
 from irtwin.gap.isolation.structure_search import Attribution, judged
 from irtwin.gap.next_experiment import next_experiment
@@ -57,7 +57,7 @@ def channel_of(motions, tried, cause=None, rivals=(), part=1.0):
         (own,) = (one for one in found if (one.effect, one.joint) == (cause, "joint_2"))
         shown = evidence(system, system.moments(np.full(2, NOISE)), (), own.variants).explained
         shape = own.variants[int(np.argmax(shown))]
-        causes = (Cause(cause, MISSING, ("joint_2",), (shape,), 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
+        causes = (FoundCause(cause, MISSING, ("joint_2",), (shape,), 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
     attribution = Attribution(causes, np.full(2, NOISE), found, np.zeros((len(found), 2)), np.zeros(0))
     finding = finding_of("torque", ROBOT.joint_names, frozenset(m.run for m in motions), system, attribution, None, 0)
     vars(finding)["closed_squares"] = np.array([part * finding.counted.before for _ in causes])

@@ -14,7 +14,7 @@ from irtwin.gap.data.noise_floor import noise_floor
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.repeats.disturbances import disturbances
 from irtwin.gap.repeats.lines import lines
-from irtwin.gap.repeats.series import Series, correlation_samples
+from irtwin.gap.repeats.series import EvenSeries, correlation_samples
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)
@@ -164,7 +164,7 @@ def test_an_offset_matters_from_half_of_the_noise_on(times, count):
 def test_a_strong_line_does_not_hide_itself_by_what_it_leaks():
     time, rng = np.arange(1000) / 125, np.random.default_rng(0)
     slow = np.column_stack([np.ones(1000), time, np.tanh(np.sin(2.4 * time) / 0.02), np.sin(2.4 * time)])
-    series = Series(time, 80 * np.sin(2 * np.pi * 0.8 * time) + rng.standard_normal(1000), slow)
+    series = EvenSeries(time, 80 * np.sin(2 * np.pi * 0.8 * time) + rng.standard_normal(1000), slow)
     found, _ = lines([series], 6)
     assert [round(one.frequency, 2) for one in found] == [0.8]
     assert found[0].p < 1e-12
@@ -194,7 +194,7 @@ def test_noise_that_remembers_has_no_lines(memory):
     rng, false = np.random.default_rng(memory), 0
     time = np.arange(1000) / 125
     for _ in range(30):
-        series = Series(time, wandering(1000, memory, rng), np.column_stack([np.ones(1000), time]))
+        series = EvenSeries(time, wandering(1000, memory, rng), np.column_stack([np.ones(1000), time]))
         false += bool(lines([series], 6)[0])
     assert false <= 1
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.gap.screening.ripples import fast_ripples, known_ripples
 
 ROBOT = arm(3)
@@ -21,7 +21,7 @@ def remainders(order, size, joint=1, observed=True):
         residual = generator.standard_normal(motion.q.shape)
         residual[:, joint] += size * np.sin(order * motion.q[:, joint] + 0.4)
         residual[:100] = np.nan
-        left.append(Remainder(motion, residual, observed))
+        left.append(RunResidual(motion, residual, observed))
     return left
 
 
@@ -54,7 +54,7 @@ def test_a_known_order_is_tried_at_the_joints_that_move_through_a_period_of_it()
         one.motion.q[:, 0] = np.linspace(-np.pi, np.pi, len(one.motion.q))
         one.motion.q[:, 1] = 0.3
         one.motion.q[:, 2] = np.linspace(0, 2 * np.pi / 2.5, len(one.motion.q))
-    left.append(Remainder(swing(ROBOT, 9), np.zeros((1, 3)), observed=False))
+    left.append(RunResidual(swing(ROBOT, 9), np.zeros((1, 3)), observed=False))
     joints = {one.N: one.joints for one in known_ripples(ROBOT, left)}
     assert joints[1.0] == joints[2.0] == ("joint_1",)
     assert joints[3.0] == joints[24.0] == ("joint_1", "joint_3")

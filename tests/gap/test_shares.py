@@ -10,10 +10,10 @@ import pytest
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.held_out import held_out
-from irtwin.gap.regression.hypotheses import MISSING, Column, Variant
+from irtwin.gap.regression.hypotheses import MISSING, CandidateColumn, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.accumulate import Block, triangle
 
@@ -33,12 +33,12 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
         factor = triangle(np.column_stack([constant, columns, measured]))
         blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
     names = [f"k{k}" for k in range(len(mix))]
-    columns = tuple(Column(EFFECT, k, Term(name, "1")) for k, name in enumerate(names))
+    columns = tuple(CandidateColumn(EFFECT, k, Term(name, "1")) for k, name in enumerate(names))
     terms = ((EFFECT, Term("constant", "1")),)
     pattern = np.ones((1, 1 + len(mix)), dtype=bool)
     system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
     causes = tuple(
-        Cause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
+        FoundCause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
         for k, column in enumerate(columns)
     )
     return system, Attribution(causes, np.array([noise]), (), np.zeros((0, 2)), np.zeros(0))

@@ -14,7 +14,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.gap.isolation.structure_search import _Search, attribute
 from irtwin.gap.regression.evidence import evidence
-from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Column, Hypothesis, Variant
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.accumulate import Block, triangle
@@ -38,7 +38,7 @@ def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
         measured = size * independent @ coefficients + generator.standard_normal(ROWS)
         factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
         blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
-    columns = tuple(Column(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix)))
+    columns = tuple(CandidateColumn(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix)))
     pattern = np.ones((1, 1 + len(mix)), dtype=bool)
     terms = ((EFFECT, Term("constant", "1")),)
     system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
@@ -68,7 +68,7 @@ def changing(before, now, twin=()):
         own = [column] if twin else [np.ones((ROWS, 1))]
         factor = triangle(np.column_stack([*own, column, measured]))
         blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
-    column = Column(EFFECT, 0, Term("k", "1"))
+    column = CandidateColumn(EFFECT, 0, Term("k", "1"))
     observed = np.arange(RUNS) >= RUNS // 2
     known = (catalogue()["torque_offset"], Term("constant", "1"))
     terms = (twin or known,)
@@ -97,7 +97,7 @@ def frictions(joint):
         factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
         blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
     names = ("coulomb", "viscous", "nonlinear", "stribeck")
-    columns = tuple(Column(EFFECT, k, Term(name, "N m", spread=5.0)) for k, name in enumerate(names))
+    columns = tuple(CandidateColumn(EFFECT, k, Term(name, "N m", spread=5.0)) for k, name in enumerate(names))
     known = ((catalogue()["torque_offset"], Term("constant", "1")),)
     system = System(
         known, columns, np.ones((1, 5), dtype=bool), tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool)
@@ -133,7 +133,7 @@ def test_groups_that_disagree_speak_against_an_effect():
             measured = size * column[:, 0] + generator.standard_normal(ROWS)
             factor = triangle(np.column_stack([np.ones((ROWS, 1)), column, measured]))
             blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
-        column = Column(EFFECT, 0, Term("k", "1"))
+        column = CandidateColumn(EFFECT, 0, Term("k", "1"))
         known = ((catalogue()["torque_offset"], Term("constant", "1")),)
         every = np.arange(len(sizes)), np.ones(len(sizes), dtype=bool)
         system = System(known, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), *every)

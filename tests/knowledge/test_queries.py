@@ -8,7 +8,7 @@ import pytest
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, to_csv, to_json
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 
 
 def test_sparql_is_asked_as_it_is(graph: KnowledgeGraph) -> None:
@@ -28,7 +28,7 @@ def test_a_term_that_the_ontology_lacks_is_told_where_nothing_is_found(graph: Kn
     assert not ask(graph, "SELECT ?run { ?run irt:Run_Name 'none' }").faults
 
 
-TABLE = Table(
+TABLE = AnswerTable(
     ("name", "value", "time", "nothing"),
     (
         {"name": 'a "b",c', "value": 1.5, "time": datetime(2026, 3, 2, tzinfo=UTC), "nothing": None},

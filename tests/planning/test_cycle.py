@@ -12,7 +12,7 @@ from tests.synthetic import arm, with_constants
 
 from irtwin.errors import InputError
 from irtwin.planning.cycle import CycleTimes
-from irtwin.planning.programme import Programme, programme_of
+from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.twin.twin import Parameter, Twin
 
 EFFECTS = ("rigid_body", "viscous_friction", "mechanical_power", "copper_loss", "standby_power")
@@ -33,7 +33,7 @@ def twin(standby: float = 20.0, limits: float = np.inf, joints: int = 1) -> Twin
     )  # fmt: skip
 
 
-def programme() -> Programme:
+def programme() -> SectionedMotion:
     return programme_of(motion(rest(0.4), bell(0.6), rest(0.8), -bell(1.2), rest(0.4)), "w")
 
 

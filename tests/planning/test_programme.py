@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irtwin.errors import InputError
-from irtwin.planning.programme import Programme, programme_of
+from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.signals.motion import Motion
 
 STEP = 0.004
@@ -77,7 +77,7 @@ def test_a_pause_may_be_left_out() -> None:
 
 def test_a_section_alone(factor: float = 2.0) -> None:
     found = programme_of(replace(motion(rest(0.4), bell(1.0), rest(0.6)), payload_mass=3.0), "w")
-    assert isinstance(found, Programme)
+    assert isinstance(found, SectionedMotion)
     alone = found.alone(1, factor)
     assert alone.time[-1] == pytest.approx(factor * found.seconds[1])
     assert alone.payload_mass == 3.0

@@ -10,7 +10,7 @@ from tests.planning.test_cycle import EFFECTS, twin
 from tests.planning.test_programme import STEP, bell, motion, rest
 
 from irtwin.effects.supply import HoldingBrakes
-from irtwin.planning.programme import Programme, programme_of
+from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.planning.waiting import proposals
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Parameter, Twin
@@ -18,7 +18,7 @@ from irtwin.twin.twin import Parameter, Twin
 BRAKES, DELAY = 15.0, 0.5  # W, s
 
 
-def programme(seconds: float = 3.0) -> Programme:
+def programme(seconds: float = 3.0) -> SectionedMotion:
     """A pause with the arm up, a long one with it level, and one with it up again."""
     one = motion(rest(0.4), bell(3.0), rest(seconds), -bell(3.0), rest(0.4))
     q, dq, ddq = (np.hstack([0 * values, values]) for values in (one.q, one.dq, one.ddq))

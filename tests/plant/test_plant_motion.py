@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from irtwin.demo.plant.machine import Drawings
-from irtwin.demo.plant.motion import Motion, check, fourier, programme
+from irtwin.demo.plant.motion import PlantMotion, check, fourier, programme
 
 STEP = 1e-3
 
 
-def _assert_consistent(motion: Motion, rtol: float) -> None:
+def _assert_consistent(motion: PlantMotion, rtol: float) -> None:
     scale = np.abs(motion.dq).max()
     np.testing.assert_allclose(np.gradient(motion.q, STEP, axis=0)[2:-2], motion.dq[2:-2], atol=rtol * scale)
 
@@ -61,4 +61,4 @@ def test_check_names_the_limit(drawings: Drawings) -> None:
     rows = np.zeros((10, 6))
     rows[5, 2] = 100.0
     with pytest.raises(ValueError, match="joint 3 passes its speed limit at step 5"):
-        check(Motion(0 * rows, rows, 0 * rows), drawings.limits)
+        check(PlantMotion(0 * rows, rows, 0 * rows), drawings.limits)

@@ -18,7 +18,7 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.records import identifier, ingest, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.resources import folder
-from irtwin.robot.denavit_hartenberg import Row, Table
+from irtwin.robot.denavit_hartenberg import ChainTable, Row
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements
 from irtwin.robot.structure import Origin
@@ -89,7 +89,7 @@ def placed(rows: tuple[dict[str, Any], ...], positions: dict[str, float]) -> dic
     return places
 
 
-def dh_tables(graph: KnowledgeGraph, robot: Robot) -> list[Table]:
+def dh_tables(graph: KnowledgeGraph, robot: Robot) -> list[ChainTable]:
     """The tables of Denavit and Hartenberg, from the graph alone."""
     found = graph.query(
         """SELECT * { ?t irt:Convention ?convention ; ?end ?frame . VALUES ?end { irt:base_Frame irt:tool_Frame }
@@ -105,7 +105,7 @@ def dh_tables(graph: KnowledgeGraph, robot: Robot) -> list[Table]:
     kinds = {joint.name: joint.kind for joint in robot.joints}
     answer = ask(graph, "dh_table").rows
     return [
-        Table(
+        ChainTable(
             tuple(
                 Row(row["a_m"], row["alpha_rad"], row["d_m"], row["theta_rad"], kinds[row["joint"]], name=row["joint"])
                 for row in answer

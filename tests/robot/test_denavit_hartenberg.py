@@ -14,7 +14,7 @@ from tests.robot.chains import chains
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.robot.chain_table import deviation, table_of
-from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, Table, from_table
+from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, from_table
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.robot.urdf import parse_urdf, read_urdf
@@ -71,7 +71,7 @@ def poses(robot: Robot) -> np.ndarray:
     return np.random.default_rng(1).uniform(-2.0, 2.0, (5, len(robot.joints)))
 
 
-def check_same(robot: Robot, convention: str, tip: str | None = None) -> Table:
+def check_same(robot: Robot, convention: str, tip: str | None = None) -> ChainTable:
     """The robot, its table, and the robot of its table have the flange in one place."""
     table = table_of(robot, convention, tip)
     q = poses(robot)
@@ -86,7 +86,7 @@ def check_same(robot: Robot, convention: str, tip: str | None = None) -> Table:
 @pytest.mark.parametrize(("convention", "matrix"), [("standard", standard), ("modified", modified)])
 @given(q=st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, matrix, q):
-    table = Table(UR10, convention)
+    table = ChainTable(UR10, convention)
     product = np.eye(4)
     for row, angle in zip(UR10, q, strict=True):
         product = product @ matrix(row, angle)
@@ -108,7 +108,7 @@ def test_a_chain_its_table_and_the_robot_of_its_table_agree(convention, urdf):
         assert pin.rnea(again.model, other, q, 0.5 * q, -q) == pytest.approx(torque, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("said", [Table(UR10), Table(PANDA, "modified")])
+@pytest.mark.parametrize("said", [ChainTable(UR10), ChainTable(PANDA, "modified")])
 def test_a_makers_table_is_found_again(said):
     found = table_of(from_table("found", said), said.convention)
     for row, expected in zip(found.rows, said.rows, strict=True):
@@ -143,7 +143,7 @@ def test_a_table_ends_at_any_link_of_a_branched_robot():
 
 def test_angles_that_a_file_rounds_count_as_parallel_and_the_cost_is_known():
     rows = (Row(0.4, 1e-6, 0.1), Row(0.3, 0.0, 0.0))
-    robot = from_table("rounded", Table(rows))
+    robot = from_table("rounded", ChainTable(rows))
     table = table_of(robot)
     assert table.rows[0].alpha == 0.0
     assert abs(table.rows[0].d) < 1.0
@@ -155,8 +155,8 @@ def test_angles_that_a_file_rounds_count_as_parallel_and_the_cost_is_known():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: from_table("none", Table(())), "has no row"),
-        (lambda: table_of(from_table("UR10", Table(UR10)), "khalil"), 'no Denavit-Hartenberg convention "khalil"'),
+        (lambda: from_table("none", ChainTable(())), "has no row"),
+        (lambda: table_of(from_table("UR10", ChainTable(UR10)), "khalil"), 'no Denavit-Hartenberg convention "khalil"'),
     ],
 )
 def test_faults_are_named(make, message):

@@ -11,7 +11,7 @@ from tests.robot.chains import chains
 from tests.synthetic import arm
 
 from irtwin.errors import InputError
-from irtwin.robot.denavit_hartenberg import Row, Table, from_table
+from irtwin.robot.denavit_hartenberg import ChainTable, Row, from_table
 from irtwin.robot.equations import equations
 from irtwin.robot.urdf import parse_urdf
 
@@ -32,7 +32,7 @@ def sympy():
 def test_a_pendulum_is_a_pendulum(sympy):
     row = Row(0.5, 0.0, 0.0, mass=2.0, inertia=(0.0,) * 6)
     lying = ((0, 0, 1, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # z, the axis, along the base's x
-    found = equations(from_table("pendulum", Table((row,), base=np.array(lying, dtype=float))))
+    found = equations(from_table("pendulum", ChainTable((row,), base=np.array(lying, dtype=float))))
     q, ddq = sympy.symbols("q1 ddq1")
     assert sympy.N(found.torque(0) - (2.0 * 0.25 * ddq + 2.0 * 9.81 * 0.5 * sympy.cos(q)), 10, chop=True) == 0
     assert found.text(0) == "tau1 =\n  + 0.5*ddq1\n  + 9.81*cos(q1)"

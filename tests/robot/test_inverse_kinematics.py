@@ -12,7 +12,7 @@ from tests.robot.test_denavit_hartenberg import PANDA, UR10
 from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.robot.chain_table import deviation, table_of
-from irtwin.robot.denavit_hartenberg import Row, Table, from_table
+from irtwin.robot.denavit_hartenberg import ChainTable, Row, from_table
 from irtwin.robot.description import Robot
 from irtwin.robot.inverse_kinematics import solve
 from irtwin.robot.kinematics import placements
@@ -21,7 +21,7 @@ from irtwin.robot.urdf import read_urdf
 KR6 = read_urdf(resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf")
 SCARA = from_table(
     "scara",
-    Table(
+    ChainTable(
         (
             Row(0.325, 0.0, 0.0, lower=-2.0, upper=2.0),
             Row(0.275, np.pi, 0.0, lower=-2.5, upper=2.5),
@@ -56,7 +56,7 @@ def test_a_pose_that_was_reached_is_found_again(shares):
 
 
 def test_all_solutions_of_an_arm_with_eight_are_found():
-    robot = from_table("UR10", Table(UR10))
+    robot = from_table("UR10", ChainTable(UR10))
     q = np.array([0.3, -1.2, 1.4, 0.4, 1.1, -0.5])
     found = solve(robot, pose(robot, q))
     assert len(found.solutions) == 8
@@ -87,7 +87,7 @@ def test_a_scara_has_a_left_and_a_right_arm():
 
 
 def test_an_arm_of_seven_joints_has_solutions_without_end():
-    robot = from_table("Panda", Table(PANDA, "modified"))
+    robot = from_table("Panda", ChainTable(PANDA, "modified"))
     q = [0.1, -0.5, 0.2, -1.8, 0.3, 1.6, 0.4]
     found = solve(robot, pose(robot, q), start=np.array(q))
     assert found.redundant
@@ -96,7 +96,9 @@ def test_an_arm_of_seven_joints_has_solutions_without_end():
 
 
 def test_limits_may_lie_beyond_a_half_turn():
-    far = Table((Row(0.3, 0.0, 0.0, lower=4.0, upper=5.0), Row(0.2, 0.0, 0.0, kind="prismatic", lower=7.0, upper=7.5)))
+    far = ChainTable(
+        (Row(0.3, 0.0, 0.0, lower=4.0, upper=5.0), Row(0.2, 0.0, 0.0, kind="prismatic", lower=7.0, upper=7.5))
+    )
     robot = from_table("far", far)
     found = solve(robot, pose(robot, [4.5, 7.2]))
     assert found.solutions == pytest.approx(np.array([[4.5, 7.2]]), abs=1e-6)

@@ -11,7 +11,7 @@ from tests import data_sets, synthetic
 
 from irtwin.errors import InputError
 from irtwin.robot.chain_table import table_of
-from irtwin.robot.denavit_hartenberg import Row, Table, from_table
+from irtwin.robot.denavit_hartenberg import ChainTable, Row, from_table
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import read_data_set, read_robot
 
@@ -73,7 +73,7 @@ def test_a_robot_is_read_from_its_table(tmp_path):
 
 
 def test_a_data_set_needs_no_urdf(tmp_path):
-    robot = from_table("Two", Table((Row(0.4, 0.3, 0.0), Row(0.3, 0.0, 0.1))))
+    robot = from_table("Two", ChainTable((Row(0.4, 0.3, 0.0), Row(0.3, 0.0, 0.1))))
     run = synthetic.as_run(synthetic.measure(robot, synthetic.swing(robot, 1, seconds=2.0)))
     folder = data_sets.write(tmp_path / "set", robot, [replace(run, signals=replace(run.signals, current=None))])
     text = (folder / "dataset.toml").read_text()

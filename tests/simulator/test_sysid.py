@@ -12,7 +12,7 @@ from tests import servo_arm
 from tests.data_sets import irtwin
 
 from irtwin.simulator import sysid_script
-from irtwin.simulator.choice import Choice
+from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.model import read_model
 from irtwin.simulator.servos import NAMES, servos
 from irtwin.simulator.sysid import free, written
@@ -23,7 +23,7 @@ ROBOT = {"stiffness": (12.0, 15.0), "delay": (0.0, 0.03), "offset": (0.02, 0.0),
 def chosen(own, **numbers):
     robots = servo_arm.changed(own, **numbers)
     played = SimpleNamespace(at=own.chart(robots))
-    return Choice(SimpleNamespace(servos=own), played, None, robots != own.numbers, None, None)
+    return DifferingNumbers(SimpleNamespace(servos=own), played, None, robots != own.numbers, None, None)
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irtwin.effects.effect import Quantity
-from irtwin.twin.torque_scale import TorqueScale, torque_degree
+from irtwin.twin.torque_scale import FittedTorqueScale, torque_degree
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ def test_what_goes_with_torque(unit, degree):
 
 @given(st.floats(-100, 100), st.floats(0.01, 10), st.floats(0.5, 1.0), st.floats(1.0, 2.0))
 def test_a_wider_interval_holds_the_narrow_one_and_the_scaled_value(value, half, low, high):
-    said = TorqueScale(0.1, "assumed", low, high, "")
+    said = FittedTorqueScale(0.1, "assumed", low, high, "")
     wide = said.widened(Quantity("m", None, value, "kg", value - half, value + half))
     assert wide.lower <= min(value - half, low * value, high * value) + 1e-9
     assert wide.upper >= max(value + half, low * value, high * value) - 1e-9
@@ -33,9 +33,9 @@ def test_a_wider_interval_holds_the_narrow_one_and_the_scaled_value(value, half,
 
 @pytest.mark.parametrize("unit, uncertainty, lower", [("rad", 0.1, 1.9), ("N m", 0.0, 1.9), ("N m", 0.1, None)])
 def test_what_has_no_second_interval(unit, uncertainty, lower):
-    assert TorqueScale(uncertainty, "assumed", 0.9, 1.1, "").interval(2.0, unit, lower, 2.1) is None
+    assert FittedTorqueScale(uncertainty, "assumed", 0.9, 1.1, "").interval(2.0, unit, lower, 2.1) is None
 
 
 def test_noise_and_scale_are_added_in_quadrature():
-    lower, upper = TorqueScale(0.1, "assumed", 0.9, 1.1, "").interval(10.0, "N m", 9.0, 11.0)
+    lower, upper = FittedTorqueScale(0.1, "assumed", 0.9, 1.1, "").interval(10.0, "N m", 9.0, 11.0)
     assert (10 - lower, upper - 10) == (pytest.approx(2**0.5), pytest.approx(2**0.5))

@@ -12,7 +12,7 @@ from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
-from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.torque_scale import FittedTorqueScale
 from irtwin.twin.twin import Choice
 
 ROBOT = arm(3)
@@ -46,7 +46,7 @@ def test_a_saved_twin_is_the_same_twin(tmp_path):
 
 
 def test_a_saved_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path):
-    scale = TorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants")
+    scale = FittedTorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants")
     (tmp_path / "twin.json").write_text(to_json(replace(TWIN, torque_scale=scale)))
     again = load(tmp_path / "twin.json")
     assert again.torque_scale == scale and TWIN.torque_scale is None

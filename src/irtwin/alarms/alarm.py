@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.resources import Resources
 
 Event = Literal["raised", "cleared"]
@@ -66,11 +66,11 @@ def _contradictions(graph: KnowledgeGraph, robot: str | None) -> Iterator[Alarm]
             yield Alarm(row["robot"], None, CONTRADICTION, None, None, None, None, ACTIVE, row["reason"])
 
 
-def active(alarms: list[Alarm]) -> Table:
+def active(alarms: list[Alarm]) -> AnswerTable:
     """Return the alarms that are active, for people."""
     columns = ("since", "robot", "run", "reason", "rule")
     rows = ({name: one.as_dict()[name] for name in columns} for one in alarms if one.state == ACTIVE)
-    return Table(columns, tuple(rows))
+    return AnswerTable(columns, tuple(rows))
 
 
 def message(event: Event, alarm: Alarm, at: datetime, sparql: str | None) -> bytes:

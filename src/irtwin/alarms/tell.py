@@ -16,7 +16,7 @@ from irtwin.alarms.follow import follow, told_in
 from irtwin.alarms.settings import NAME, asks, read_edge_nodes, read_receivers
 from irtwin.asking import checked, open_graph
 from irtwin.knowledge.questions.queries import ask
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.location import Location
 from irtwin.storage.files import inside
 from irtwin.trust import how, trusted
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from irtwin.alarms.sparkplug import EdgeNode
 
 
-def listed(location: Location, robot: str | None = None) -> Table:
+def listed(location: Location, robot: str | None = None) -> AnswerTable:
     """Return the alarms that are active. Raises InputError where there is no graph, or no robot of the name."""
     return active(_alarms(location, robot))
 

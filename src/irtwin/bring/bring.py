@@ -15,13 +15,13 @@ from irtwin.bring import rtde_names
 from irtwin.bring.aligned import aligned
 from irtwin.bring.choice import meanings
 from irtwin.bring.data_set_text import RunText, data_set_text
-from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.meaning import Meaning
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
 from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
-from irtwin.bring.told import Told, told
+from irtwin.bring.told import UserSaid, told
 from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
 from irtwin.errors import InputError
@@ -30,7 +30,7 @@ from irtwin.signals.log import read_data_set
 from irtwin.signals.sampling import interval
 from irtwin.storage.files import working_folder
 
-Ask = Callable[[DoubtError], Answer]
+Ask = Callable[[DoubtError], WayOut]
 _PREFIX = ".irtwin-import-"
 _TOPIC = re.compile(r'say which in dataset\.toml: \[topics\] (\S+) = "(.*)"$')
 
@@ -53,7 +53,7 @@ class Options:
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
     repair: bool = False
 
-    def with_answer(self, answer: Answer) -> Options:
+    def with_answer(self, answer: WayOut) -> Options:
         """Return them with an answer, as if it had been typed."""
         result = self
         for option, value in answer.options:
@@ -67,7 +67,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Form:
+class LogsAlike:
     """Logs of the same columns: their files, and what each column was taken for."""
 
     files: tuple[Path, ...]
@@ -79,7 +79,7 @@ class Form:
 class Brought:
     """What was brought: forms of logs, and a line for each thing that was done in reading."""
 
-    forms: tuple[Form, ...]
+    forms: tuple[LogsAlike, ...]
     said: tuple[str, ...]
 
 
@@ -128,7 +128,9 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         for run_text, run in listed:
             pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
         (folder / "dataset.toml").write_text(text, encoding="utf-8")
-    shown = tuple(Form(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms)
+    shown = tuple(
+        LogsAlike(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms
+    )
     return Brought(shown, tuple(line for form in forms for line in form.said))
 
 
@@ -152,7 +154,7 @@ def _metered(files: Sequence[Path]) -> Robot:
 class _Form:
     """Logs of the same columns, taken together: what one of them tells of a unit holds for all."""
 
-    def __init__(self, logs: Sequence[Recording], robot: Robot, said: Told, repair: bool) -> None:
+    def __init__(self, logs: Sequence[Recording], robot: Robot, said: UserSaid, repair: bool) -> None:
         self.logs = logs
         means: list[Meaning] = meanings(logs[0], robot, said)
         usable = [aligned(log, means, repair=repair) for log in logs]

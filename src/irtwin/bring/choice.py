@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from irtwin.bring.column_name import said_by, words_of
-from irtwin.bring.doubt import Answer, DoubtError
+from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.meaning import Meaning, field_of, first_meaning
 from irtwin.bring.recording import Recording
-from irtwin.bring.told import LEFT_OUT, Told, fits
+from irtwin.bring.told import LEFT_OUT, UserSaid, fits
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
@@ -24,7 +24,7 @@ _OF_POWER = ("power", "meter_voltage", "meter_current")
 _ARRAY = (frozenset(("joint", "states")), frozenset(("jointstates",)), frozenset(("field",)))  # of ROS' joint states
 
 
-def meanings(recording: Recording, robot: Robot, told: Told) -> list[Meaning]:
+def meanings(recording: Recording, robot: Robot, told: UserSaid) -> list[Meaning]:
     """Return what each column of a log was taken for.
 
     Raises DoubtError where that cannot be told, InputError where time or a position is missing.
@@ -142,7 +142,7 @@ def _in_any_order(recording: Recording, group: Sequence[Meaning], names: Sequenc
         f"{recording.path}: columns {_shown(columns)} are numbered as in a message of ROS, whose joints come in any "
         f"order, often that of their letters; say each, as --map {columns[0]}={prefix}_{names[0]}, or that they go "
         "from base to flange",
-        [Answer("they go from base to flange", (("--map", f"{pattern}={prefix}"),))],
+        [WayOut("they go from base to flange", (("--map", f"{pattern}={prefix}"),))],
     )
 
 
@@ -184,7 +184,7 @@ def _torque_or_temperature(recording: Recording, found: Sequence[Meaning]) -> Do
     pattern = _pattern(columns[0])
     ways = [pattern] if [name for name in recording.columns if fits(pattern, name)] == columns else columns
     answers = [
-        Answer(f"{words} of the joints", tuple(("--map", f"{way}={CHANNELS[field].prefix}") for way in ways))
+        WayOut(f"{words} of the joints", tuple(("--map", f"{way}={CHANNELS[field].prefix}") for way in ways))
         for field, words in (("torque", "torques"), ("temperature", "temperatures"))
     ]
     return DoubtError(f"{recording.path}: columns {_shown(columns)} could be torques or temperatures", answers)
@@ -198,7 +198,7 @@ def _several(recording: Recording, field: str, sets: Sequence[Sequence[str]]) ->
         if not any(fits(pattern, column) for pattern in patterns for column in chosen):
             others = sorted(patterns)
         options = tuple(("--map", f"{column}={LEFT_OUT}") for column in others)
-        answers.append(Answer(f"take {_shown(chosen)}, leave out {_shown(others)}", options))
+        answers.append(WayOut(f"take {_shown(chosen)}, leave out {_shown(others)}", options))
     both = " and ".join(_shown(columns) for columns in sets)
     return DoubtError(f"{recording.path}: columns {both} could each be {CHANNELS[field].label}", answers)
 

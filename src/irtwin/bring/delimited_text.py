@@ -27,7 +27,7 @@ _BLANKS = re.compile(r"[ \t]+")
 
 
 @dataclass(frozen=True)
-class Form:
+class TextForm:
     """How a text is written: what stands between values, the decimal sign, and where its rows stand."""
 
     delimiter: str
@@ -78,14 +78,14 @@ def _check_lines(path: Path, lines: Sequence[str]) -> None:
             )
 
 
-def _form(path: Path, lines: Sequence[str]) -> Form:
+def _form(path: Path, lines: Sequence[str]) -> TextForm:
     """Return how the beginning of a text is written. Raises InputError where that cannot be told."""
     found = []
     for delimiter in _DELIMITERS:
         rows = [_split(line, delimiter) for line in lines]
         head = head_of(rows)
         if head is not None:
-            found.append(Form(delimiter, _decimal(rows[head.first :], delimiter), head, rows))
+            found.append(TextForm(delimiter, _decimal(rows[head.first :], delimiter), head, rows))
     if not found:
         raise InputError(
             f"{path}: no delimiter (comma, semicolon, tab, blank) makes even columns of numbers of it; export it as "
@@ -94,7 +94,7 @@ def _form(path: Path, lines: Sequence[str]) -> Form:
     return max(found, key=_fit)
 
 
-def _check_names(path: Path, form: Form) -> None:
+def _check_names(path: Path, form: TextForm) -> None:
     """Raise InputError where the line above the samples has many names, but not one for each value."""
     above = form.rows[form.head.first - 1] if form.head.first and form.head.names is None else []
     values = len(form.rows[form.head.first])
@@ -105,7 +105,7 @@ def _check_names(path: Path, form: Form) -> None:
         )
 
 
-def _fit(form: Form) -> tuple[bool, float, int]:
+def _fit(form: TextForm) -> tuple[bool, float, int]:
     """Return how well a form fits: a delimiter that is none cuts numbers in two, and names elsewhere than samples."""
     sample = form.rows[form.head.first]
     return form.head.names is not None, numbers_in(sample) / len(sample), len(sample)
@@ -139,7 +139,7 @@ def _decoded(path: Path, content: bytes) -> str:
     return text
 
 
-def _table(path: Path, body: str, form: Form, names: list[str], before: int) -> tuple[pa.Table, str | None]:
+def _table(path: Path, body: str, form: TextForm, names: list[str], before: int) -> tuple[pa.Table, str | None]:
     """Return the samples, and what is to be said of a last line that was cut off."""
     if form.delimiter == " ":
         body = "\n".join(_BLANKS.sub(" ", line.strip()) for line in body.split("\n"))

@@ -9,7 +9,7 @@ from irtwin.errors import InputError
 
 
 @dataclass(frozen=True)
-class Answer:
+class WayOut:
     """A way out: `label` says it in words, `options` on the command line, each (option, value)."""
 
     label: str
@@ -24,7 +24,7 @@ class Answer:
 class DoubtError(InputError):
     """A question to the user. Where nobody can be asked it ends the command, and its message says what to give."""
 
-    def __init__(self, question: str, answers: Sequence[Answer], hint: str = "") -> None:
+    def __init__(self, question: str, answers: Sequence[WayOut], hint: str = "") -> None:
         self.question, self.answers = question, tuple(answers)
         ways = " or ".join(answer.text for answer in answers) or hint
         super().__init__(f"{question}; give {ways}")

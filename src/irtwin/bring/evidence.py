@@ -32,7 +32,7 @@ _EVALUATED = 300  # samples of inverse dynamics
 
 
 @dataclass(frozen=True)
-class Evidence:
+class UnitEvidence:
     """The unit that the numbers choose, None where they cannot; those that they allow; and how, in words."""
 
     choice: Unit | None
@@ -41,7 +41,7 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Motion:
+class MeasuredRun:
     """A run in SI units: time (N,), q (N, n), and torque (N, n) where it is known."""
 
     time: np.ndarray
@@ -63,7 +63,7 @@ def smooth(values: np.ndarray) -> np.ndarray:
     return np.asarray((sums[high] - sums[low]) / (high - low)[:, None])
 
 
-def position(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> Evidence:
+def position(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> UnitEvidence:
     """Positions (N, n) of joints of one kind: within their limits, or not. Small ones could be in degrees, too."""
     allowed = [unit for unit in units(joints[0].unit) if _within(joints, [unit.to_si(q) for q in runs])]
     span = max(float(np.ptp(q, axis=0).max()) for q in runs)
@@ -73,8 +73,8 @@ def position(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> Evidence:
             why = f"by its numbers: as {si} they lie within the joints' limits (span {span:.3g} {si})"
             if unit.name != si:
                 why = f"by its numbers: they span {span:.3g}, beyond the joints' limits in {si}, within in {unit.name}"
-            return Evidence(unit, tuple(allowed), why)
-    return Evidence(None, tuple(allowed), f"spans {span:.3g}, which is within the joints' limits in no unit")
+            return UnitEvidence(unit, tuple(allowed), why)
+    return UnitEvidence(None, tuple(allowed), f"spans {span:.3g}, which is within the joints' limits in no unit")
 
 
 def _within(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> bool:
@@ -89,7 +89,7 @@ def _within(joints: Sequence[Joint], runs: Sequence[np.ndarray]) -> bool:
     return True
 
 
-def time(robot: Robot, runs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Evidence:
+def time(robot: Robot, runs: Sequence[tuple[np.ndarray, np.ndarray]]) -> UnitEvidence:
     """Times (N,) as they rise, beside positions (N, n) in rad (m)."""
     step = float(np.median([interval(times) for times, _ in runs]))
     last = max(float(np.abs(times).max()) for times, _ in runs)
@@ -114,10 +114,10 @@ def time(robot: Robot, runs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Evidenc
                 f"by its numbers: a sample every {unit.factor * step:.3g} s, joints at up to "
                 f"{fastest / unit.factor:.2g} of their speed limits"
             )
-            return Evidence(unit, tuple(possible), why)
+            return UnitEvidence(unit, tuple(possible), why)
     usual = [unit for unit in possible if _USUAL[0] <= unit.factor * step <= _USUAL[1]]
     choice = usual[0] if len(usual) == 1 else None
-    return Evidence(choice, tuple(possible), f"by its numbers: a sample every {step:.3g}")
+    return UnitEvidence(choice, tuple(possible), f"by its numbers: a sample every {step:.3g}")
 
 
 def _fastest(times: np.ndarray, q: np.ndarray, limits: np.ndarray) -> float:
@@ -126,8 +126,8 @@ def _fastest(times: np.ndarray, q: np.ndarray, limits: np.ndarray) -> float:
 
 
 def rate(
-    motions: Sequence[Motion], logged: Sequence[np.ndarray], joints: Sequence[int], si: str, order: int = 1
-) -> Evidence:
+    motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray], joints: Sequence[int], si: str, order: int = 1
+) -> UnitEvidence:
     """Speeds (N, len(joints)) as logged, or accelerations, against the derivative of that order of the positions."""
     gains = []
     for column, joint in enumerate(joints):
@@ -143,64 +143,64 @@ def rate(
             gains.append(abs(float(derived @ seen / (derived @ derived))))
     known = units(si)
     if not gains:
-        return Evidence(None, tuple(known), "no joint moves, or none as its position's derivative says")
+        return UnitEvidence(None, tuple(known), "no joint moves, or none as its position's derivative says")
     gain = float(np.median(gains))
     fits = [unit for unit in known if 1 / _NEAR < gain * unit.factor < _NEAR]
     why = f"by a check: {gain:.4g} times the {['first', 'second'][order - 1]} derivative of the positions"
-    return Evidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
+    return UnitEvidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
 
 
 def torque(
-    robot: Robot, motions: Sequence[Motion], logged: Sequence[np.ndarray], joints: Sequence[int], si: str
-) -> Evidence:
+    robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray], joints: Sequence[int], si: str
+) -> UnitEvidence:
     """Torques (N, len(joints)) as logged, against those of the description's bodies."""
     model = np.vstack([_bodies(robot, each)[:, joints] for each in motions])
     size, own = float(np.sqrt(np.mean(np.vstack(logged) ** 2))), float(np.sqrt(np.mean(model**2)))
     known = units(si)
     if own < 1e-6 or size == 0:
-        return Evidence(None, tuple(known), "the description's bodies have no weight to hold it against")
+        return UnitEvidence(None, tuple(known), "the description's bodies have no weight to hold it against")
     ratio = size / own
     fits = [unit for unit in known if _TORQUE[0] <= ratio * unit.factor <= _TORQUE[1]]
     why = f"by a check: {ratio:.2g} times what the description's bodies need"
     clear = fits if fits and fits[0].factor <= 1.0 else []  # what looks like kN m may be of the motor's side
-    return Evidence(clear[0] if len(clear) == 1 else None, tuple(fits), why)
+    return UnitEvidence(clear[0] if len(clear) == 1 else None, tuple(fits), why)
 
 
-def power(robot: Robot, motions: Sequence[Motion], logged: Sequence[np.ndarray]) -> Evidence:
+def power(robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray]) -> UnitEvidence:
     """Electrical power (N,) as logged, against torque times speed; at rest, against what controllers take."""
     done = np.concatenate([_done(robot, each) for each in motions])
     return _by_power(float(np.quantile(done, 0.99)), float(np.quantile(np.concatenate(logged), 0.99)), "W")
 
 
 def supply_current(
-    robot: Robot, motions: Sequence[Motion], voltage: Sequence[np.ndarray], logged: Sequence[np.ndarray]
-) -> Evidence:
+    robot: Robot, motions: Sequence[MeasuredRun], voltage: Sequence[np.ndarray], logged: Sequence[np.ndarray]
+) -> UnitEvidence:
     """The supply's current (N,), by the power that it makes with the voltage, V."""
     done = np.concatenate([_done(robot, each) for each in motions])
     watts = np.concatenate([v * i for v, i in zip(voltage, logged, strict=True)])
     return _by_power(float(np.quantile(done, 0.99)), float(np.quantile(watts, 0.99)), "A")
 
 
-def _by_power(done: float, taken: float, si: str) -> Evidence:
+def _by_power(done: float, taken: float, si: str) -> UnitEvidence:
     if done >= _WORKING and taken > 0:
         fits = [unit for unit in units(si) if _POWER[0] <= taken * unit.factor / done <= _POWER[1]]
         why = f"by a check: it reaches {taken:.3g} where torque times speed reaches {done:.3g} W"
-        return Evidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
+        return UnitEvidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
     return _by_size(si, taken, {"W": (10.0, 50_000.0), "A": (10.0, 50_000.0)}[si])
 
 
-def by_size(si: str, logged: Sequence[np.ndarray], bounds: tuple[float, float]) -> Evidence:
+def by_size(si: str, logged: Sequence[np.ndarray], bounds: tuple[float, float]) -> UnitEvidence:
     """Values whose greatest (99 % of them are below) lies between bounds, in SI units, in one unit alone."""
     return _by_size(si, float(np.quantile(np.abs(np.concatenate([each.ravel() for each in logged])), 0.99)), bounds)
 
 
-def _by_size(si: str, greatest: float, bounds: tuple[float, float]) -> Evidence:
+def _by_size(si: str, greatest: float, bounds: tuple[float, float]) -> UnitEvidence:
     fits = [unit for unit in units(si) if bounds[0] <= float(unit.to_si(np.array(greatest))) <= bounds[1]]
     why = f"by its numbers: they reach {greatest:.3g}"
-    return Evidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
+    return UnitEvidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
 
 
-def _bodies(robot: Robot, motion: Motion) -> np.ndarray:
+def _bodies(robot: Robot, motion: MeasuredRun) -> np.ndarray:
     """Return the torques of the description's bodies at a few samples, (M, n)."""
     speed, acceleration = motion.derivative(1), motion.derivative(2)
     rows = np.linspace(0, len(motion.time) - 1, min(_EVALUATED, len(motion.time))).astype(int)
@@ -208,7 +208,7 @@ def _bodies(robot: Robot, motion: Motion) -> np.ndarray:
     return np.array([pin.rnea(robot.model, data, motion.q[row], speed[row], acceleration[row]) for row in rows])
 
 
-def _done(robot: Robot, motion: Motion) -> np.ndarray:
+def _done(robot: Robot, motion: MeasuredRun) -> np.ndarray:
     """Return the power that the joints put into the motion, W; by the description's bodies where no torque is known."""
     if motion.torque is not None:
         return np.asarray(np.maximum((motion.torque * motion.derivative(1)).sum(axis=1), 0.0))

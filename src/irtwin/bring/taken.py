@@ -10,11 +10,11 @@ import numpy as np
 
 from irtwin.bring import evidence
 from irtwin.bring.aligned import Aligned
-from irtwin.bring.doubt import Answer, DoubtError
-from irtwin.bring.evidence import Evidence, Motion
+from irtwin.bring.doubt import DoubtError, WayOut
+from irtwin.bring.evidence import MeasuredRun, UnitEvidence
 from irtwin.bring.meaning import Meaning
 from irtwin.bring.rtde_names import POWER_AT, is_rtde
-from irtwin.bring.told import LEFT_OUT, Told
+from irtwin.bring.told import LEFT_OUT, UserSaid
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel
@@ -60,17 +60,17 @@ class TakenLogs:
     power_at_why: str
 
 
-def take(logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: Told) -> TakenLogs:
+def take(logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: UserSaid) -> TakenLogs:
     """Return logs of the same columns as runs. Raises DoubtError where a unit, or a place, cannot be told."""
     return _Taking(logs, meanings, robot, told).result()
 
 
 class _Taking:
-    def __init__(self, logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: Told) -> None:
+    def __init__(self, logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: UserSaid) -> None:
         self.logs, self.meanings, self.robot, self.told = logs, meanings, robot, told
         self.where = ", ".join(str(log.recording.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
         self.units: Units = {}
-        self.motions: list[Motion] = []
+        self.motions: list[MeasuredRun] = []
 
     def result(self) -> TakenLogs:
         self._resolve(
@@ -82,7 +82,7 @@ class _Taking:
         )
         positions = self._si("q")
         seconds, started = self._seconds(positions)
-        self.motions = [Motion(*pair) for pair in zip(seconds, positions, strict=True)]
+        self.motions = [MeasuredRun(*pair) for pair in zip(seconds, positions, strict=True)]
         self._resolve("dq", lambda joints, si: evidence.rate(self.motions, self._raw("dq", joints), joints, si))
         self._resolve("ddq", lambda joints, si: evidence.rate(self.motions, self._raw("ddq", joints), joints, si, 2))
         self._resolve(
@@ -92,7 +92,7 @@ class _Taking:
         if self._of("torque"):
             torques = self._si("torque")
             self.motions = [
-                Motion(each.time, each.q, torque) for each, torque in zip(self.motions, torques, strict=True)
+                MeasuredRun(each.time, each.q, torque) for each, torque in zip(self.motions, torques, strict=True)
             ]
         self._resolve("current", lambda joints, si: evidence.by_size(si, self._raw("current", joints), _CURRENT))
         self._resolve(
@@ -131,8 +131,8 @@ class _Taking:
             raise DoubtError(
                 f"{self.where}: column {each.column} is of the motor's side by its name; its gear's ratio is not known",
                 [
-                    Answer("of the motor: the gear's ratio", (("--gear-ratio", f"{each.joint}=RATIO"),)),
-                    Answer("of the joint's side", (("--map", f"{each.column}={channel}:{unit.name}"),)),
+                    WayOut("of the motor: the gear's ratio", (("--gear-ratio", f"{each.joint}=RATIO"),)),
+                    WayOut("of the joint's side", (("--map", f"{each.column}={channel}:{unit.name}"),)),
                 ],
             )
         return ratio
@@ -160,14 +160,14 @@ class _Taking:
         kind = "" if each.joint is None else self.robot.joints[self.robot.index(each.joint)].kind
         return CHANNELS[str(each.field)].unit_of(kind)
 
-    def _resolve(self, field: str, look: Callable[[list[int], str], Evidence]) -> None:
+    def _resolve(self, field: str, look: Callable[[list[int], str], UnitEvidence]) -> None:
         """Find the unit of each column of a channel; those of one quantity share it where they say none."""
         columns = self._of(field)
         for si in dict.fromkeys(self._si_unit(each) for each in columns):
             places = [place for place, each in enumerate(columns) if self._si_unit(each) == si]
             self._share([columns[place] for place in places], si, lambda places=places, si=si: look(places, si))  # type: ignore[misc]
 
-    def _share(self, columns: Sequence[Meaning], si: str, look: Callable[[], Evidence]) -> None:
+    def _share(self, columns: Sequence[Meaning], si: str, look: Callable[[], UnitEvidence]) -> None:
         said = sorted((each for each in columns if each.unit is not None), key=lambda each: not each.given)
         seen = None if said and said[0].given else look()
         for each in columns:
@@ -188,12 +188,12 @@ class _Taking:
 
     def _doubt(self, each: Meaning, question: str, choices: Sequence[Unit]) -> DoubtError:
         channel = CHANNELS[str(each.field)].column(str(each.joint))
-        answers = [Answer(unit.name, (("--map", f"{each.column}={channel}:{unit.name}"),)) for unit in choices]
+        answers = [WayOut(unit.name, (("--map", f"{each.column}={channel}:{unit.name}"),)) for unit in choices]
         if each.field not in ("q", "time"):
-            answers.append(Answer("leave it out", (("--map", f"{each.column}={LEFT_OUT}"),)))
+            answers.append(WayOut("leave it out", (("--map", f"{each.column}={LEFT_OUT}"),)))
         return DoubtError(f"{self.where}: column {each.column} ({CHANNELS[str(each.field)].label}) {question}", answers)
 
-    def _supply_current(self, _: list[int], si: str) -> Evidence:
+    def _supply_current(self, _: list[int], si: str) -> UnitEvidence:
         amperes = self._raw("meter_current")
         if not self._of("meter_voltage"):
             return evidence.by_size(si, amperes, _SUPPLY)
@@ -243,7 +243,7 @@ class _Taking:
         raise DoubtError(
             f"{self.where}: column {columns[0].column}: nothing says whether power was measured at the mains or "
             "on the DC bus",
-            [Answer("at the mains", (("--power-at", "mains"),)), Answer("on the DC bus", (("--power-at", "dc_bus"),))],
+            [WayOut("at the mains", (("--power-at", "mains"),)), WayOut("on the DC bus", (("--power-at", "dc_bus"),))],
         )
 
     def _columns(self, log: Aligned, time: np.ndarray) -> dict[str, np.ndarray]:
@@ -287,10 +287,10 @@ def _or(choices: Sequence[Unit]) -> str:
     return " or ".join(unit.name for unit in choices)
 
 
-def _warm(found: Evidence) -> Evidence:
+def _warm(found: UnitEvidence) -> UnitEvidence:
     """Temperatures that could be degC are: degF is taken by name alone."""
     celsius = next((unit for unit in found.allowed if unit.name == "degC"), None)
-    return Evidence(celsius or found.choice, found.allowed, found.why)
+    return UnitEvidence(celsius or found.choice, found.allowed, found.why)
 
 
 def _check_size(log: Aligned, column: str, values: np.ndarray, channel: Channel) -> None:

@@ -26,7 +26,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Told:
+class UserSaid:
     """What the user says: columns (`*` stands for any letters) with what they are; gear ratios by joint; power_at."""
 
     columns: Mapping[str, Target] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Told:
                 raise InputError(f"--map {said}=...: no file has such a column; there are {', '.join(names[:12])}")
 
 
-def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot: Robot) -> Told:
+def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot: Robot) -> UserSaid:
     """Read what the options say. Raises InputError, naming the option and what may stand there."""
     if power_at is not None and power_at not in _POWER_AT:
         raise InputError(f"--power-at {power_at}: use {' or '.join(_POWER_AT)}")
@@ -58,7 +58,7 @@ def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot
     }
     for text in ratios:
         gears |= _ratios(text, robot)
-    return Told(dict(_target(text, robot) for text in maps), gears, power_at)
+    return UserSaid(dict(_target(text, robot) for text in maps), gears, power_at)
 
 
 def fits(pattern: str, name: str) -> bool:

@@ -15,7 +15,7 @@ from irtwin.location import Location
 
 if TYPE_CHECKING:
     from irtwin.bring.bring import Brought
-    from irtwin.bring.doubt import Answer, DoubtError
+    from irtwin.bring.doubt import DoubtError, WayOut
     from irtwin.bring.taken import Taken
 
 _WIDE = 160  # characters of a table that goes into a file
@@ -145,7 +145,7 @@ def _take_edited(owl: Path, location: Location, yes: bool, author: str | None) -
         say("Taken.")
 
 
-def _ask(doubt: DoubtError) -> Answer:
+def _ask(doubt: DoubtError) -> WayOut:
     """Ask a person which answer is right."""
     say(doubt.question)
     for number, answer in enumerate(doubt.answers, start=1):

@@ -18,7 +18,7 @@ from irtwin.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-    from irtwin.robot.denavit_hartenberg import Table
+    from irtwin.robot.denavit_hartenberg import ChainTable
     from irtwin.robot.description import Robot
 
 _LARGEST = 100_000_000  # bytes of a file of joint positions
@@ -75,7 +75,7 @@ def dh(source: Path, convention: str, link: str | None, as_json: bool) -> None:
         click.echo("\n".join(_table_lines(described, table, end, apart)))
 
 
-def _table_document(described: Robot, table: Table, end: str, apart: tuple[float, float]) -> dict[str, Any]:
+def _table_document(described: Robot, table: ChainTable, end: str, apart: tuple[float, float]) -> dict[str, Any]:
     rows = [
         {"joint": name, "type": row.kind, "a_m": row.a, "alpha_rad": row.alpha, "d_m": row.d, "theta_rad": row.theta}
         for name, row in zip(table.joint_names, table.rows, strict=True)
@@ -92,7 +92,7 @@ def _table_document(described: Robot, table: Table, end: str, apart: tuple[float
     }
 
 
-def _table_lines(described: Robot, table: Table, end: str, apart: tuple[float, float]) -> Iterator[str]:
+def _table_lines(described: Robot, table: ChainTable, end: str, apart: tuple[float, float]) -> Iterator[str]:
     order = {"standard": "theta, d, a, alpha", "modified": "a, alpha, theta, d"}[table.convention]
     yield f"{printable(described.name)}, base to {printable(end)}: {table.convention} convention ({order})"
     head = ["joint", "a, m", "alpha, rad", "alpha, deg", "d, m", "theta, rad", "theta, deg"]

@@ -94,7 +94,7 @@ class PlannedMotion:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Apart:
+class FarthestApart:
     """The moment of all runs at which a simulator's flange is farthest from the robot's: `time` s of a run.
 
     Joint positions (n,), rad or m, of the robot, of the simulator `before` and `after` it has the robot's numbers; what
@@ -164,7 +164,7 @@ class Curves:
     heat_map: ExcessMap | None = told(default=None)
     experiment: PlannedMotion | None
     friction: tuple[FrictionCurve, ...] | None = None
-    apart: Apart | None = None
+    apart: FarthestApart | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the curves as JSON."""

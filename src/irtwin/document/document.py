@@ -81,7 +81,7 @@ class Gap:
 
 
 @part("Gap_Location", of="location_of", ranked=True)
-class Location:
+class GapLocation:
     """A place of the gap; joint and regime None: the whole robot, any motion.
 
     `follows`: the variable that the residual goes with; `share` of the channel's excess; `excess` as of a Size;
@@ -109,7 +109,7 @@ class Location:
 
 
 @part("Gap_Cause_Parameter", of="parameter_of_Cause", ranked=True)
-class Parameter:
+class CauseParameter:
     """A parameter of a cause, in its `unit`; joint None: of the whole robot.
 
     Where a simulator's model has the number, `simulator` is its, `robot` the robot's, and `value` how far these are
@@ -126,7 +126,7 @@ class Parameter:
 
 
 @part("Gap_Disturbance_Quantity", of="quantity_of_Disturbance", ranked=True)
-class Quantity:
+class DisturbanceQuantity:
     """A number that describes what does not repeat, in its `unit`; `joint` as of a parameter."""
 
     name: str = told("Quantity_Name")
@@ -184,7 +184,7 @@ class Cause:
     joints: tuple[Joint, ...] = told("caused_in_Joint")
     scope: Scope = told("has_Scope")
     confidence: Share = told("Confidence")
-    parameters: tuple[Parameter, ...] = told()
+    parameters: tuple[CauseParameter, ...] = told()
     indistinguishable_from: tuple[Effect, ...] = told("indistinguishable_from", table="gap_cause_rival")
     evidence: Evidence = told()
     folded_away: bool | None = None
@@ -250,7 +250,7 @@ class NotRepeating:
     kind: Annotated[str, OneOf("line", "band", "switching", "drift", "offset")] = told("Disturbance_Kind")
     rms: float = told("Disturbance_RMS")
     share: Share = told("Disturbance_Share")
-    quantities: tuple[Quantity, ...] = told()
+    quantities: tuple[DisturbanceQuantity, ...] = told()
     explained_by: CauseId | None = told("explained_by_Cause")
 
 
@@ -417,7 +417,7 @@ class Document:
     verdict: Verdict = told("has_Verdict")
     robot: str
     gap: Gap = told()
-    locations: tuple[Location, ...] = told()
+    locations: tuple[GapLocation, ...] = told()
     findings: tuple[Finding, ...] = told()
     causes: tuple[Cause, ...] = told()
     not_testable: tuple[Untestable, ...] = told()

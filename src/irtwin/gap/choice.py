@@ -14,8 +14,8 @@ from irtwin.errors import InputError
 from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.energy_errors import energy_errors
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.held_out import left_out
 from irtwin.gap.search import Search, variants
 from irtwin.gap.thresholds import DEFAULT
@@ -74,7 +74,7 @@ def elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Itera
             yield effect.on(*lacking)
 
 
-def _findings(case: Case) -> Iterator[Finding]:
+def _findings(case: Case) -> Iterator[ChannelFinding]:
     """Yield what torque shows, then what power shows on the torque that is explained."""
     search, of_torque = Search(case), None
     floor = search.floor
@@ -95,7 +95,7 @@ def _standing(case: Case, signal: str) -> list[Effect]:
     ]
 
 
-def _choices(case: Case, finding: Finding) -> Iterator[Choice]:
+def _choices(case: Case, finding: ChannelFinding) -> Iterator[Choice]:
     """Yield what a channel shows, then what it leaves open."""
     yield from (_worth(case, finding, cause) for cause in finding.causes)
     for effect, places in _open(case, finding).items():
@@ -103,7 +103,7 @@ def _choices(case: Case, finding: Finding) -> Iterator[Choice]:
         yield Choice(effect, joints, False, max(chance for _, chance in places))
 
 
-def _open(case: Case, finding: Finding) -> dict[str, Places]:
+def _open(case: Case, finding: ChannelFinding) -> dict[str, Places]:
     """Return the joints, None for the whole robot, where a channel leaves effects open, and how likely each is."""
     found: dict[str, Places] = {}
     for one, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
@@ -113,7 +113,7 @@ def _open(case: Case, finding: Finding) -> dict[str, Places]:
     return found
 
 
-def _worth(case: Case, finding: Finding, cause: Cause) -> Choice:
+def _worth(case: Case, finding: ChannelFinding, cause: FoundCause) -> Choice:
     """Return what a cause closes beside the others, on groups left out."""
     rest = [k for k in finding.chosen if k not in cause.columns]
     system, noise = finding.system, finding.attribution.noise

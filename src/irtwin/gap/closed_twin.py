@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from irtwin.document.curves import FrictionCurve
 from irtwin.effects.effect import Effect
 from irtwin.gap.data.case import Case
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.regression.hypotheses import CHANGED, place_of
 from irtwin.twin.friction_curve import friction_curves
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 
 
-def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
+def closed_twin(case: Case, causes: Sequence[FoundCause]) -> Twin:
     """Return the twin with the causes added; where some effect changed, fitted to the observed runs alone."""
     changed = any(cause.scope == CHANGED for cause in causes)
     robot, motions = case.given
@@ -22,7 +22,7 @@ def closed_twin(case: Case, causes: Sequence[Cause]) -> Twin:
     return identify(robot, used, [*case.effects, *added(case, causes)], case.prior)
 
 
-def added(case: Case, causes: Sequence[Cause]) -> list[Effect]:
+def added(case: Case, causes: Sequence[FoundCause]) -> list[Effect]:
     """Return the effects that causes add to the twin.
 
     A changed effect that the twin has needs no second one; a load at the flange is one with the last body.
@@ -42,7 +42,7 @@ def added(case: Case, causes: Sequence[Cause]) -> list[Effect]:
     return found
 
 
-def friction(case: Case, causes: Sequence[Cause], closed: Twin) -> tuple[FrictionCurve, ...]:
+def friction(case: Case, causes: Sequence[FoundCause], closed: Twin) -> tuple[FrictionCurve, ...]:
     """Return the friction of each joint by the closed twin; before it, where it changed, as the other runs show it."""
     robot, motions = case.given
     found = friction_curves(closed, [motions[run] for run in closed.fitted], "observed")

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import Any
 
 from irtwin.document.curves import Curves
-from irtwin.document.document import Cutoff, Document, Location, Untestable, cause_ids
+from irtwin.document.document import Cutoff, Document, GapLocation, Untestable, cause_ids
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
@@ -20,15 +20,15 @@ from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
 from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
 from irtwin.gap.next_experiment import next_experiment
-from irtwin.gap.not_repeating import NotRepeating, with_removed
+from irtwin.gap.not_repeating import DifferingRepeats, with_removed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.rehearsal import channel_equations
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
@@ -42,7 +42,7 @@ from irtwin.identification.two_processes import begun, one_blas_thread
 from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
-from irtwin.twin.torque_scale import TorqueScale, torque_scale
+from irtwin.twin.torque_scale import FittedTorqueScale, torque_scale
 from irtwin.twin.twin import Twin
 
 
@@ -55,9 +55,9 @@ class Diagnosis:
 
     description: Robot
     left_open: str | None
-    channels: tuple[Finding, ...]
+    channels: tuple[ChannelFinding, ...]
     floor: Floor
-    locations: tuple[Location, ...]
+    locations: tuple[GapLocation, ...]
     untestable: tuple[Untestable, ...]
     runs: tuple[str, ...]
     curves: Curves
@@ -71,7 +71,7 @@ class Diagnosis:
     against: str | None = None  # the role of the runs that the observed ones are held against
     thresholds: Thresholds = DEFAULT
     refusals: Refusals = NOTHING_REFUSED
-    scale: TorqueScale | None = None  # of torque, where it was measured
+    scale: FittedTorqueScale | None = None  # of torque, where it was measured
     cutoff: Cutoff | None = None  # of the filter that all runs passed
     simulator: Simulator | None = None
 
@@ -81,7 +81,7 @@ class Diagnosis:
         return self.document.verdict
 
     @property
-    def causes(self) -> tuple[tuple[Finding, Cause], ...]:
+    def causes(self) -> tuple[tuple[ChannelFinding, FoundCause], ...]:
         """Every cause with its channel, that which closes most first."""
         pairs = [(finding, cause) for finding in self.channels for cause in finding.causes]
         return tuple(sorted(pairs, key=lambda pair: -pair[0].closing([pair[1]]).size))
@@ -99,7 +99,7 @@ class Diagnosis:
         )
         if self.left_open == MUCH_IS_LEFT:
             written = tuple(writing.beside_unknown(one, self.thresholds.criterion) for one in written)
-        apart = NotRepeating(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
+        apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
             written = tuple(writing.beside(self.simulator, one) for one in written)
         causes = apart.causes(written)
@@ -178,7 +178,7 @@ def diagnose(
     twin_torque = search.twin.torque
     explained: list[Explained] = []
     refusals = NOTHING_REFUSED
-    scale: TorqueScale | None = None
+    scale: FittedTorqueScale | None = None
     torque: ExplainedTorque | None = None
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")

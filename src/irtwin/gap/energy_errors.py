@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.document.document import Change
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.moments import Summed
 from irtwin.signals.motion import Motion
 
@@ -36,7 +36,9 @@ class EnergyErrors:
         return Change(before=before, after=after, noise_floor=None, interval95_after=(float(low), float(high)))
 
 
-def energy_errors(finding: Finding, motions: Sequence[Motion], rest: Sequence[int] | None = None) -> EnergyErrors:
+def energy_errors(
+    finding: ChannelFinding, motions: Sequence[Motion], rest: Sequence[int] | None = None
+) -> EnergyErrors:
     """Return the energy errors on groups left out: the sum of the residual is its product with a column of ones.
 
     `rest`: the columns that there are before; None: the twin as it is.

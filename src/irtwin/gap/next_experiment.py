@@ -11,13 +11,13 @@ import numpy as np
 from irtwin.document.curves import PlannedMotion
 from irtwin.document.experiment import Considered, Experiment, Question
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding, branches
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding, branches
 from irtwin.gap.isolation.posterior import overlap
 from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.gap.rehearsal import Equations, Rehearsal
 from irtwin.gap.thresholds import Criterion, Thresholds
-from irtwin.identification.programmes import LONGEST, Programme, programmes
+from irtwin.identification.programmes import LONGEST, ExperimentProgramme, programmes
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -27,15 +27,15 @@ _LEAST = 1.0  # standard deviations: what adds less is not worth making
 _FAR = -700.0  # log of a chance that is none
 
 
-Weighed = tuple[Programme, list[Question]]
+Weighed = tuple[ExperimentProgramme, list[Question]]
 
 
 @dataclass(frozen=True)
-class Proposal:
+class ProposedExperiment:
     """The experiment that is proposed, its programme (None where none helps), and the curve that a page draws."""
 
     experiment: Experiment
-    programme: Programme | None
+    programme: ExperimentProgramme | None
     curve: PlannedMotion | None
 
 
@@ -57,7 +57,7 @@ class _Asked:
         """The rivals' names."""
         return [rival for rival in self.now if rival is not None]
 
-    def answered(self, programme: Programme) -> list[Question]:
+    def answered(self, programme: ExperimentProgramme) -> list[Question]:
         """Return what a programme would tell: of each rival by itself."""
         found = _of(self.rehearsal.causes(programme), self.effect, self.scope)
         return [
@@ -70,11 +70,11 @@ class _Asked:
         ]
 
 
-def _of(causes: Sequence[Cause], effect: str, scope: str) -> Cause:
+def _of(causes: Sequence[FoundCause], effect: str, scope: str) -> FoundCause:
     return next(one for one in causes if (one.effect, one.scope) == (effect, scope))
 
 
-def separation(cause: Cause, rival: str | None) -> float:
+def separation(cause: FoundCause, rival: str | None) -> float:
     """Return by how many standard deviations a rival is behind: a normal's that is as unlikely beside its middle.
 
     None: nothing is in the cause's place.
@@ -88,11 +88,11 @@ def separation(cause: Cause, rival: str | None) -> float:
 
 def next_experiment(
     robot: Robot,
-    channels: Sequence[tuple[Finding, Equations]],
+    channels: Sequence[tuple[ChannelFinding, Equations]],
     lacking: Sequence[str],
     seen: Sequence[Motion],
     limits: Thresholds,
-) -> Proposal | None:
+) -> ProposedExperiment | None:
     """Design what tells the rivals of causes that matter apart; where there are none, what shows the effects `lacking`.
 
     `channels`: each finding with its channel's equations; `seen`: the motions that were judged. Of the programmes after
@@ -137,10 +137,10 @@ def next_experiment(
         ),
         note=note,
     )
-    return Proposal(said, chosen, None if chosen is None else curve(robot, chosen))
+    return ProposedExperiment(said, chosen, None if chosen is None else curve(robot, chosen))
 
 
-def _rivals(robot: Robot, finding: Finding, equations: Equations, limits: Thresholds) -> Iterator[_Asked]:
+def _rivals(robot: Robot, finding: ChannelFinding, equations: Equations, limits: Thresholds) -> Iterator[_Asked]:
     """Yield a question for each cause that a person is told of and that has rivals."""
     told = [cause for one in branches(finding) if one.closing.matters(limits.matters) for cause in one.causes]
     true, sizes = _known(finding)
@@ -161,7 +161,7 @@ def _rivals(robot: Robot, finding: Finding, equations: Equations, limits: Thresh
 
 
 def _unseen(
-    robot: Robot, finding: Finding, equations: Equations, lacking: Sequence[str], limits: Criterion
+    robot: Robot, finding: ChannelFinding, equations: Equations, lacking: Sequence[str], limits: Criterion
 ) -> Iterator[_Asked]:
     """Yield the question whether an effect is there, of those that a channel's data cannot show.
 
@@ -181,7 +181,7 @@ def _unseen(
             yield _Asked(effect, own.scope, robot.joint_names, {None: now}, rehearsal)
 
 
-def _known(finding: Finding) -> tuple[tuple[Hypothesis, ...], dict[int, float]]:
+def _known(finding: ChannelFinding) -> tuple[tuple[Hypothesis, ...], dict[int, float]]:
     """Return a finding's causes joint by joint, each in the shape that was found, and their coefficients by column."""
     true = [
         Hypothesis(cause.effect, joint, cause.scope, (variant,))
@@ -192,7 +192,7 @@ def _known(finding: Finding) -> tuple[tuple[Hypothesis, ...], dict[int, float]]:
     return tuple(true), {k: value for k, value in fitted if k >= finding.system.base}
 
 
-def _weighed(programme: Programme, asked: Sequence[_Asked]) -> list[Question]:
+def _weighed(programme: ExperimentProgramme, asked: Sequence[_Asked]) -> list[Question]:
     tell_step(f"  weighing {programme.kind.replace('_', ' ')}")
     return [question for one in asked for question in one.answered(programme)]
 
@@ -205,7 +205,7 @@ def _answerable(weighed: list[Weighed], enough: float) -> list[Weighed]:
     return [(one, [told[k] for k in kept]) for one, told in weighed] if kept else weighed
 
 
-def _best(weighed: Sequence[Weighed], enough: float) -> tuple[Programme | None, list[Question]]:
+def _best(weighed: Sequence[Weighed], enough: float) -> tuple[ExperimentProgramme | None, list[Question]]:
     """Return the programme that answers most, of those that answer all the shortest; None of it where none helps.
 
     Of those as short, to the minute, it is the one that tells most.
@@ -234,7 +234,7 @@ def _reached(chances: Sequence[Question], enough: float) -> bool:
     return any(one.expected_separation >= enough for one in chances)
 
 
-def curve(robot: Robot, programme: Programme) -> PlannedMotion:
+def curve(robot: Robot, programme: ExperimentProgramme) -> PlannedMotion:
     """Return what a page draws of a programme: time (s) and the position of each joint that moves, thinned."""
     time, q, start = [], [], 0.0
     moved = [robot.index(joint) for joint in programme.joints]

@@ -15,7 +15,7 @@ from irtwin.document.document import cause_ids
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.closing import Closing, closing
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.hypotheses import MISSING
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.repeats.removal import Removed
@@ -27,7 +27,7 @@ _MOST = 0.5  # of what is closed in a channel
 _One = TypeVar("_One")
 
 
-def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
+def with_removed(finding: ChannelFinding, taken: Sequence[Removed]) -> ChannelFinding:
     """Return a finding whose residual before anything is added holds what was taken out, on groups left out."""
     judged, own = finding.held_out, [one for one in taken if one.disturbance.channel == finding.name]
     if not own:
@@ -40,12 +40,12 @@ def with_removed(finding: Finding, taken: Sequence[Removed]) -> Finding:
     return replace(finding, held_out=held_out, counted=counted, part=part)
 
 
-def _level(finding: Finding) -> np.ndarray:
+def _level(finding: ChannelFinding) -> np.ndarray:
     """Return (g,) by which squares of equations are compared: the floor's."""
     return np.ones(len(finding.places)) if finding.floor is None else finding.floor**2
 
 
-def _squares(finding: Finding, one: Removed) -> np.ndarray:
+def _squares(finding: ChannelFinding, one: Removed) -> np.ndarray:
     """Return (G, g) the squares of what was taken out in each group left out and equation of its channel."""
     rows, place = finding.held_out.rows, finding.places.index(one.disturbance.joint)
     found = np.zeros(rows.shape)
@@ -54,7 +54,7 @@ def _squares(finding: Finding, one: Removed) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class NotRepeating:
+class DifferingRepeats:
     """What was `taken` out of all that was `found` to differ between repeats.
 
     `channels`: the findings with what was taken out in them; `joints`: all of the robot.
@@ -63,7 +63,7 @@ class NotRepeating:
     taken: tuple[Removed, ...]
     found: tuple[Disturbance, ...]
     floor: Floor
-    channels: tuple[Finding, ...]
+    channels: tuple[ChannelFinding, ...]
     joints: tuple[str, ...]
 
     @property
@@ -178,7 +178,7 @@ class NotRepeating:
     def _of(self, channel: str) -> list[Removed]:
         return [one for one in self.taken if one.disturbance.channel == channel]
 
-    def _finding(self, one: Removed) -> Finding:
+    def _finding(self, one: Removed) -> ChannelFinding:
         return next(each for each in self.channels if each.name == one.disturbance.channel)
 
     def _mean_squares(self, one: Removed) -> np.ndarray:
@@ -223,9 +223,11 @@ def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]
     return (*first, *others, *(one for one in own if one not in first))
 
 
-def _quantity(one: Quantity) -> document.Quantity:
+def _quantity(one: Quantity) -> document.DisturbanceQuantity:
     own = parameter(one)
-    return document.Quantity(name=own.name, joint=own.joint, value=own.value, unit=own.unit, interval95=own.interval95)
+    return document.DisturbanceQuantity(
+        name=own.name, joint=own.joint, value=own.value, unit=own.unit, interval95=own.interval95
+    )
 
 
 def _log_odds(p: float) -> float:

@@ -16,8 +16,8 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.data.case import Case
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.isolation.structure_search import judged
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque, power_system, torque_system
@@ -26,7 +26,7 @@ from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Criterion
-from irtwin.identification.programmes import Programme
+from irtwin.identification.programmes import ExperimentProgramme
 from irtwin.signals.motion import Motion
 
 Equations = Callable[[Sequence[Motion], Sequence[Effect]], System]
@@ -41,7 +41,7 @@ class Rehearsal:
     an effect which they would not show are played, too.
     """
 
-    finding: Finding
+    finding: ChannelFinding
     equations: Equations
     true: tuple[Hypothesis, ...]
     rivals: tuple[Hypothesis, ...]
@@ -49,7 +49,7 @@ class Rehearsal:
     unseen: bool
     limits: Criterion
 
-    def causes(self, programme: Programme | None) -> tuple[Cause, ...]:
+    def causes(self, programme: ExperimentProgramme | None) -> tuple[FoundCause, ...]:
         """Return the true structure's causes, as sure as the programme beside the data makes them; None: the data."""
         known, noise = self._known
         played = None if programme is None else self._played(programme)
@@ -91,7 +91,7 @@ class Rehearsal:
             for one in some
         ]
 
-    def _played(self, programme: Programme) -> System | None:
+    def _played(self, programme: ExperimentProgramme) -> System | None:
         """Return the equations of a programme; None where it is too short to say anything."""
         system = self._reduced[0]
         effects = list({id(one.effect): one.effect for one in system.columns}.values())

@@ -18,7 +18,7 @@ from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
-from irtwin.gap.isolation.finding import Finding, Without, find
+from irtwin.gap.isolation.finding import ChannelFinding, Without, find
 from irtwin.gap.isolation.refusal import Refusals, find_possible
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
@@ -103,11 +103,11 @@ class Search:
 
     def _beside_power(
         self, tried: tuple[Sequence[Effect], Sequence[Effect]], without: Set[Without]
-    ) -> tuple[Finding, Floor]:
+    ) -> tuple[ChannelFinding, Floor]:
         about = self.below, self.twin.torque, self.before
         return find_beside_power(self.case, self.stack, tried, *about, self.floor, self.seed, without=without)
 
-    def _of_torque(self, system: System, without: Set[Without]) -> tuple[Finding, Floor]:
+    def _of_torque(self, system: System, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         first = find("torque", self.case, system, self.floor.torque, self.seed, without)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
@@ -127,7 +127,7 @@ class Search:
         level = None if floor.power is None else np.array([floor.power])
         plain = self.before.system if explained else None
 
-        def search(without: Set[Without]) -> tuple[Finding, Floor]:
+        def search(without: Set[Without]) -> tuple[ChannelFinding, Floor]:
             found = find("power", case, system, level, self.seed, without, plain)
             of_power = explained_power(self.power_stack, found, torque, power_of)
             left = floor_left(case, floor, of_power) if found.causes else floor

@@ -14,14 +14,14 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding, branches, quantities
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding, branches, quantities
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
 from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Criterion, Matters
 from irtwin.robot.description import Robot
-from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.torque_scale import FittedTorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
 
@@ -37,7 +37,7 @@ class Simulator(Protocol):
         """Return a joint's numbers, by what MJCF calls them."""
 
 
-def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErrors | None) -> document.Gap:
+def gap(joints: Sequence[str], findings: Sequence[ChannelFinding], energies: EnergyErrors | None) -> document.Gap:
     """Return the gap before anything is added."""
     sizes = {finding.name: _sizes(finding) for finding in findings}
     return document.Gap(
@@ -47,7 +47,7 @@ def gap(joints: Sequence[str], findings: Sequence[Finding], energies: EnergyErro
     )
 
 
-def _sizes(finding: Finding) -> list[document.Size]:
+def _sizes(finding: ChannelFinding) -> list[document.Size]:
     judged = finding.held_out.rows.sum(axis=0)
     return [
         document.Size(
@@ -61,10 +61,10 @@ def _sizes(finding: Finding) -> list[document.Size]:
 
 def cause(
     robot: Robot,
-    finding: Finding,
-    one: Cause,
+    finding: ChannelFinding,
+    one: FoundCause,
     name: str,
-    scale: TorqueScale | None,
+    scale: FittedTorqueScale | None,
     limits: Criterion,
 ) -> document.Cause:
     """Return a cause, `name` its id, with its parameters and evidence."""
@@ -90,7 +90,7 @@ def beside_unknown(cause: document.Cause, limits: Criterion) -> document.Cause:
 
 def findings(
     robot: Robot,
-    channels: Sequence[Finding],
+    channels: Sequence[ChannelFinding],
     ids_of: Mapping[int, str],
     causes: Sequence[document.Cause],
     limits: Matters,
@@ -147,7 +147,7 @@ def _members(cause: document.Cause) -> list[document.Member]:
     ]
 
 
-def _evidence(finding: Finding, one: Cause) -> document.Evidence:
+def _evidence(finding: ChannelFinding, one: FoundCause) -> document.Evidence:
     runs, window = acting(one.variants) or (None, None)
     return document.Evidence(
         channel=finding.name,
@@ -161,7 +161,9 @@ def _evidence(finding: Finding, one: Cause) -> document.Evidence:
     )
 
 
-def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | None) -> tuple[document.Parameter, ...]:
+def parameters(
+    robot: Robot, finding: ChannelFinding, one: FoundCause, scale: FittedTorqueScale | None
+) -> tuple[document.CauseParameter, ...]:
     """Return a cause's parameters as the catalogue states them, with 95 % intervals that hold the torque's scale."""
     stated = [parameter(each if scale is None else scale.widened(each)) for each in quantities(robot, finding, one)]
     if one.of_bodies:  # most of a body's numbers do not show: those that do
@@ -172,7 +174,7 @@ def parameters(robot: Robot, finding: Finding, one: Cause, scale: TorqueScale | 
 def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
     """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both."""
 
-    def told(one: document.Parameter) -> document.Parameter:
+    def told(one: document.CauseParameter) -> document.CauseParameter:
         if one.joint is None or cause.scope != CHANGED:
             return one
         own = simulator.numbers(one.joint).get(catalogue()[cause.effect].in_mjcf.get(one.name, ""))
@@ -181,7 +183,7 @@ def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
     return replace(cause, parameters=tuple(map(told, cause.parameters)))
 
 
-def torque_scale(one: TorqueScale) -> document.TorqueScale:
+def torque_scale(one: FittedTorqueScale) -> document.TorqueScale:
     """Return how sure the scale of torque is, and why."""
     return document.TorqueScale(
         uncertainty95=one.uncertainty, source=one.source, low=one.low, high=one.high, why=one.why
@@ -191,7 +193,7 @@ def torque_scale(one: TorqueScale) -> document.TorqueScale:
 def shrink(
     robot: Robot,
     runs: Sequence[str],
-    findings: Sequence[Finding],
+    findings: Sequence[ChannelFinding],
     floor: Floor,
     energies: EnergyErrors | None,
     ids_of: Mapping[int, str],
@@ -217,7 +219,9 @@ def shrink(
     )
 
 
-def fraction_closed(findings: Sequence[Finding], changed: Container[str], seed: int) -> document.ClosedFraction | None:
+def fraction_closed(
+    findings: Sequence[ChannelFinding], changed: Container[str], seed: int
+) -> document.ClosedFraction | None:
     """Return what closes in the channels that are `changed`, whose floor is known; None as `shrink` leaves it out."""
     with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.name in changed]
     if not with_floor or any(one.floor is None for one in findings if one.causes):
@@ -226,7 +230,7 @@ def fraction_closed(findings: Sequence[Finding], changed: Container[str], seed: 
     return found and document.ClosedFraction(value=found[0], interval95=(found[1][0], found[1][1]))
 
 
-def _change(finding: Finding, seed: int) -> document.Change:
+def _change(finding: ChannelFinding, seed: int) -> document.Change:
     judged = finding.held_out
     rows = judged.rows.sum()
     low, high = pooled_interval(judged.after, judged.rows, seed)
@@ -238,7 +242,7 @@ def _change(finding: Finding, seed: int) -> document.Change:
     )
 
 
-def _by_cause(robot: Robot, finding: Finding, one: Cause, name: str) -> document.CauseChange:
+def _by_cause(robot: Robot, finding: ChannelFinding, one: FoundCause, name: str) -> document.CauseChange:
     """Return what a cause closes alone, and what is lost without it."""
     system, noise = finding.system, finding.system.noise_before
     alone = held_out(system, noise, noise, one.columns)
@@ -263,7 +267,7 @@ def numbers(values: np.ndarray) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def parameter(one: Quantity) -> document.Parameter:
+def parameter(one: Quantity) -> document.CauseParameter:
     """Return a quantity as the document has it."""
     ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
-    return document.Parameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)
+    return document.CauseParameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)

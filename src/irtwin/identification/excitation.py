@@ -14,7 +14,7 @@ import scipy
 from irtwin.errors import InputError
 from irtwin.identification.base_condition import BaseRegressor, Criterion
 from irtwin.identification.fourier_series import FourierSeries, RestSeries, between_samples
-from irtwin.identification.motion_limits import Box, JointLimits, Workspace
+from irtwin.identification.motion_limits import Box, JointLimits, Walls
 from irtwin.identification.own_body import OwnBody
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.robot.description import Robot
@@ -168,7 +168,7 @@ class _Search:
     ) -> None:
         self._robot = robot
         self._limits = JointLimits.of(robot)
-        self._workspace = Workspace(robot, self._limits, box)
+        self._workspace = Walls(robot, self._limits, box)
         self._body = OwnBody(robot)
         self._regressor = BaseRegressor(robot, criterion, tasks)
         self._random = random

@@ -98,7 +98,7 @@ class _Wall:
     bound: float
 
 
-class Workspace:
+class Walls:
     """Walls: the floor for the origin of every link that moves up or down, the box for the flange."""
 
     def __init__(self, robot: Robot, limits: JointLimits, box: Box | None) -> None:

@@ -13,7 +13,7 @@ from irtwin.document.experiment import Settings
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.identification.excitation import excite
-from irtwin.identification.motion_limits import JointLimits, Workspace
+from irtwin.identification.motion_limits import JointLimits, Walls
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -44,7 +44,7 @@ _RATE = 5.0  # samples a period of the cutoff: enough of what the filter lets th
 
 
 @dataclass(frozen=True)
-class Programme:
+class ExperimentProgramme:
     """One experiment: the motions that it takes (planned: q, dq, ddq over time), and how to run it.
 
     `without`: effects that are taken off the robot in every one of its motions (the tool, the hose package);
@@ -88,7 +88,7 @@ def programmes(
     joints: Sequence[str],
     seen: Sequence[Motion],
     effects: Sequence[Effect] = (),
-) -> Iterator[Programme]:
+) -> Iterator[ExperimentProgramme]:
     """Yield the programmes that are worth weighing for some joints (none: all), the plain ones first.
 
     `seen`: motions of the robot, whose poses, filter and rate the programmes take over; `effects` are in question: with
@@ -132,11 +132,11 @@ class _Yard:
         last = seen[-1]
         self.cutoff = last.cutoff
         self.rate = min(last.rate, _RATE * last.cutoff) if last.cutoff else min(last.rate, 100.0)
-        walls = Workspace(robot, self.limits, None)
+        walls = Walls(robot, self.limits, None)
         every = max(1, len(q) // _CHECKED)
         self._walls = walls if walls.clearance(q[::every]).min(initial=1.0) > 0 else None  # else the floor is elsewhere
 
-    def clear(self, build: Callable[[_Yard], Programme]) -> Programme | None:
+    def clear(self, build: Callable[[_Yard], ExperimentProgramme]) -> ExperimentProgramme | None:
         """Return the programme about the pose, smaller where it would touch the floor or last too long.
 
         None where no such one is clear.
@@ -158,7 +158,7 @@ class _Yard:
         """Return whether a programme may last so long: neither too many samples nor too few to differentiate."""
         return seconds <= LONGEST and _FEWEST_SAMPLES <= seconds * self.rate <= _MOST_SAMPLES
 
-    def _above_floor(self, made: Programme) -> bool:
+    def _above_floor(self, made: ExperimentProgramme) -> bool:
         q = np.concatenate([motion.q for motion in made.motions])
         every = max(1, len(q) // _CHECKED)
         return self._walls is None or float(self._walls.clearance(q[::every]).min(initial=1.0)) > 0
@@ -186,11 +186,13 @@ class _Yard:
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
         return Motion(np.arange(len(q)) / self.rate, q, dq, ddq, run="planned", cutoff=self.cutoff)
 
-    def programme(self, kind: str, text: str, motion: Motion, **settings: Any) -> Programme:
+    def programme(self, kind: str, text: str, motion: Motion, **settings: Any) -> ExperimentProgramme:
         """Return the programme of one motion about the pose."""
         pose = {name: round(float(value), 4) for name, value in zip(self.robot.joint_names, self.pose, strict=True)}
         named = "all joints" if self.moved.all() else ", ".join(self.joints)
-        return Programme(kind, f"{named}: {text}", self.joints, (motion,), settings=Settings(pose=pose, **settings))
+        return ExperimentProgramme(
+            kind, f"{named}: {text}", self.joints, (motion,), settings=Settings(pose=pose, **settings)
+        )
 
     def by_joint(self, values: np.ndarray) -> dict[str, tuple[float, ...]]:
         """Return (M, n) values of the joints that move, by name, to four digits."""
@@ -251,7 +253,7 @@ def _limits(robot: Robot, seen: Sequence[Motion]) -> JointLimits:
         )
 
 
-def _ladder(yard: _Yard) -> Programme:
+def _ladder(yard: _Yard) -> ExperimentProgramme:
     lowest = np.minimum(_SLOWEST / yard.speed, 0.5)
     speeds = np.array([yard.speed * lowest ** (1 - k / (_LEVELS - 1)) for k in range(_LEVELS)])
     seconds = [min(_LEG, float((2 * yard.reach / speed)[yard.moved].min())) for speed in speeds]
@@ -270,7 +272,7 @@ def _ladder(yard: _Yard) -> Programme:
     )
 
 
-def _sweep(yard: _Yard) -> Programme:
+def _sweep(yard: _Yard) -> ExperimentProgramme:
     speed = 2 * np.maximum(yard.reach, 1e-6) / _SWEEP
     low, high = yard.pose - yard.reach, yard.pose + yard.reach
     return yard.programme(
@@ -282,7 +284,7 @@ def _sweep(yard: _Yard) -> Programme:
     )
 
 
-def _reversals(yard: _Yard) -> Programme:
+def _reversals(yard: _Yard) -> ExperimentProgramme:
     stops, rates = [yard.pose], []
     for size in _SMALL:
         way = np.minimum(size, yard.reach) * yard.moved
@@ -296,7 +298,7 @@ def _reversals(yard: _Yard) -> Programme:
     )
 
 
-def _steps(yard: _Yard) -> Programme:
+def _steps(yard: _Yard) -> ExperimentProgramme:
     way = np.minimum(yard.reach, 0.25 * yard.speed) * yard.moved
     stops, sharp = [yard.pose], []
     for share in _STEPS:
@@ -312,7 +314,7 @@ def _steps(yard: _Yard) -> Programme:
     )
 
 
-def _poses(yard: _Yard) -> Programme:
+def _poses(yard: _Yard) -> ExperimentProgramme:
     spread = np.random.default_rng(0).uniform(-1, 1, (_POSES, len(yard.pose)))
     stops = [yard.pose, *(yard.pose + spread * yard.reach)]
     made = yard.programme(
@@ -323,7 +325,7 @@ def _poses(yard: _Yard) -> Programme:
     return replace(made, settings=Settings(poses=yard.by_joint(np.array(stops)), hold_seconds=_HOLD))
 
 
-def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
+def _exciting(robot: Robot, yard: _Yard) -> ExperimentProgramme | None:
     """Return an exciting motion of all joints, good enough to compare; None where the robot's limits allow none."""
 
     def step(iteration: int, condition: float, seconds: float) -> None:
@@ -333,7 +335,7 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
         time, q, dq, ddq = excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step).sample(yard.rate)
     except InputError:
         return None
-    return Programme(
+    return ExperimentProgramme(
         "exciting_motion",
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
@@ -342,7 +344,7 @@ def _exciting(robot: Robot, yard: _Yard) -> Programme | None:
     )
 
 
-def _loaded(exciting: Programme, mass: float) -> Programme:
+def _loaded(exciting: ExperimentProgramme, mass: float) -> ExperimentProgramme:
     (plain,) = exciting.motions
     return replace(
         exciting,
@@ -354,7 +356,7 @@ def _loaded(exciting: Programme, mass: float) -> Programme:
     )
 
 
-def _warmed(exciting: Programme) -> Programme:
+def _warmed(exciting: ExperimentProgramme) -> ExperimentProgramme:
     (plain,) = exciting.motions
     shape = plain.q.shape
     return replace(

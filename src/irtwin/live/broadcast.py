@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from irtwin.live.joint_stream import State
-from irtwin.twin.so_far import Stretch
+from irtwin.twin.so_far import WatchedStretch
 
 SOCKET = "samples.sock"
 _HELD = 1000  # lines that wait to be sent
@@ -70,7 +70,7 @@ class Broadcast:
             self._lines.append(state)
             self._news.set()
 
-    def stretches(self, robot_id: str, stretches: Sequence[Stretch]) -> None:
+    def stretches(self, robot_id: str, stretches: Sequence[WatchedStretch]) -> None:
         """Tell what the twin says of a while ago: times, s since 1970, and power, W."""
         if self._clients:
             for one in stretches:

@@ -20,7 +20,7 @@ from irtwin.live.stream_health import StreamHealth
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.journal import Header, Journal
 from irtwin.storage.schema import LIVE
-from irtwin.twin.so_far import Stretch
+from irtwin.twin.so_far import WatchedStretch
 
 LEAST = 0.2  # s of samples that are worked out at once
 
@@ -126,7 +126,7 @@ class WatchedRun:
                 self._mapped[table] = rows, quads
         return self._idle.union(self._kinds, *(quads for _, quads in self._mapped.values()))
 
-    def work_out(self, states: Sequence[State], known: KnownTwin | None) -> list[Stretch]:
+    def work_out(self, states: Sequence[State], known: KnownTwin | None) -> list[WatchedStretch]:
         """Work out energy and gap from the next states, as far as they go."""
         if self.energy is None:
             of = (self.header.run_id, self.header.robot_id, tuple(self.joints), known)

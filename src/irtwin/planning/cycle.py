@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from irtwin.errors import InputError
-from irtwin.planning.programme import Programme
+from irtwin.planning.programme import SectionedMotion
 from irtwin.signals.motion import Motion
 from irtwin.twin.price import Figure, cost, saving
 from irtwin.twin.twin import Twin
@@ -46,7 +46,7 @@ class CycleTimes:
     s, is what a pause needs; what is longer may be given to the moves. None: pauses stay as they are.
     """
 
-    def __init__(self, twin: Twin, programme: Programme, least_pause: float | None = None) -> None:
+    def __init__(self, twin: Twin, programme: SectionedMotion, least_pause: float | None = None) -> None:
         self._twin, self._programme = twin, programme
         self._pauses = programme.are("pause")
         self._least = np.where(programme.are("move"), 0.0, programme.seconds)

@@ -22,7 +22,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Programme:
+class SectionedMotion:
     """A motion and its sections in order; they share their ends."""
 
     motion: Motion
@@ -42,14 +42,14 @@ class Programme:
         """Return a section alone, `factor` times as long."""
         section = self.sections[number]
         motion = self.motion.part(section.first, section.last + 1)
-        return Programme(motion, (Section(0, len(motion.time) - 1, section.kind),)).retimed(np.array([factor]))
+        return SectionedMotion(motion, (Section(0, len(motion.time) - 1, section.kind),)).retimed(np.array([factor]))
 
-    def timed(self, factors: np.ndarray) -> Programme:
+    def timed(self, factors: np.ndarray) -> SectionedMotion:
         """Return the programme with each section (S,) times as long; what takes no time is left out."""
         motion = self.retimed(factors)
         bounds = np.round(np.append(0.0, np.cumsum(self.seconds * factors)) * motion.rate).astype(int).tolist()
         ends = zip(self.sections, pairwise(bounds), strict=True)
-        return Programme(motion, tuple(Section(*own, section.kind) for section, own in ends if own[1] > own[0]))
+        return SectionedMotion(motion, tuple(Section(*own, section.kind) for section, own in ends if own[1] > own[0]))
 
     def retimed(self, factors: np.ndarray) -> Motion:
         """Return the motion with each section (S,) times as long, at the log's rate; by a factor of zero left out."""
@@ -72,7 +72,7 @@ class Programme:
         )  # fmt: skip
 
 
-def programme_of(motion: Motion, place: str) -> Programme:
+def programme_of(motion: Motion, place: str) -> SectionedMotion:
     """Return a motion's moves and pauses. Raises InputError by `place` where it has no whole move."""
     still = standstill(motion)
     bounds = _bounds(still)
@@ -86,7 +86,7 @@ def programme_of(motion: Motion, place: str) -> Programme:
     if "move" not in kinds:
         raise InputError(f'{place}: run "{motion.run}" has no move from rest to rest; name a run that has one')
     sections = zip(pairwise(bounds.tolist()), kinds, strict=True)
-    return Programme(motion, tuple(Section(*ends, kind) for ends, kind in sections))
+    return SectionedMotion(motion, tuple(Section(*ends, kind) for ends, kind in sections))
 
 
 def _bounds(still: np.ndarray) -> np.ndarray:

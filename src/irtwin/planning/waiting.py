@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.planning.programme import Programme
+from irtwin.planning.programme import SectionedMotion
 from irtwin.signals.motion import Motion
 from irtwin.twin.price import Figure, balance, saving, trapezoid
 from irtwin.twin.twin import Twin
@@ -17,7 +17,7 @@ _KEPT = 0.05  # s of a pause that is moved
 
 
 @dataclass(frozen=True)
-class Proposal:
+class PauseProposal:
     """What to do in a pause of a cycle, from `begin` on, `seconds` long, and what that saves a cycle, J.
 
     `takes`: s of the cycle; None: no log shows how long it takes to come back.
@@ -30,7 +30,7 @@ class Proposal:
     takes: float | None
 
 
-def proposals(twin: Twin, programme: Programme, off: float | None) -> Iterator[Proposal]:
+def proposals(twin: Twin, programme: SectionedMotion, off: float | None) -> Iterator[PauseProposal]:
     """Yield what would take less than what the robot does in the pauses of a programme, by more than is unsure.
 
     Only states that logs have shown: brakes that the twin has, and off with the power that was logged there, `off` W;
@@ -54,10 +54,10 @@ def proposals(twin: Twin, programme: Programme, off: float | None) -> Iterator[P
             found.append(("switch off", Figure(taken.value - off * seconds, taken.half_width), None))
         for what, saved, takes in found:
             if saved.value > (saved.half_width or 0.0):
-                yield Proposal(begin, seconds, what, saved, takes)
+                yield PauseProposal(begin, seconds, what, saved, takes)
 
 
-def _elsewhere(twin: Twin, programme: Programme, number: int) -> tuple[str, Figure, float]:
+def _elsewhere(twin: Twin, programme: SectionedMotion, number: int) -> tuple[str, Figure, float]:
     """Return what it saves to wait at the pose of the pause of the programme where that costs least."""
     motion, pauses = programme.motion, np.flatnonzero(programme.are("pause"))
     spare = float(programme.seconds[number]) - _KEPT

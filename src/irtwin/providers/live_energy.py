@@ -26,7 +26,7 @@ from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import live_schema, schema
 from irtwin.storage.database import Workspace
 from irtwin.twin.gap_watch import ROBOT, GapWatch, PlaceState, Windows, band
-from irtwin.twin.so_far import EnergySoFar, Stretch
+from irtwin.twin.so_far import EnergySoFar, WatchedStretch
 from irtwin.twin.twin import Twin
 
 Values = dict[str, Any]
@@ -79,7 +79,7 @@ class LiveEnergy:
         self.so_far = EnergySoFar(joints, twin, name=run_id, payload=payload, payload_com=payload_com)
         self.watch = GapWatch(joints, {} if known is None else known.bands)
 
-    def feed(self, columns: dict[str, np.ndarray], *, last: bool = False, least: float = 0.0) -> list[Stretch]:
+    def feed(self, columns: dict[str, np.ndarray], *, last: bool = False, least: float = 0.0) -> list[WatchedStretch]:
         """Take samples, columns as of a log by name; return what could be worked out, as `EnergySoFar.feed`."""
         stretches = list(self.so_far.feed(columns, last=last, least=least))
         for stretch in stretches:
@@ -214,7 +214,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     assert run.start_time is not None  # of what was watched
     began = run.start_time.timestamp()
     columns["time"] = columns["time"] + began
-    stretches: list[Stretch] = []
+    stretches: list[WatchedStretch] = []
     for start in range(0, table.num_rows, _AT_ONCE):
         piece = {name: values[start : start + _AT_ONCE] for name, values in columns.items()}
         stretches += energy.feed(piece, last=start + _AT_ONCE >= table.num_rows)
@@ -224,7 +224,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     return Made(run.robot_id, sorted(read), rows, series)
 
 
-def _modelled_series(joints: tuple[str, ...], stretches: list[Stretch], began: float) -> pa.Table:
+def _modelled_series(joints: tuple[str, ...], stretches: list[WatchedStretch], began: float) -> pa.Table:
     """Return measured (filtered) and modelled signals side by side, columns as in `providers.energy`."""
     parts: defaultdict[str, list[np.ndarray]] = defaultdict(list)
     energies = {"energy": 0.0, "energy_model": 0.0}

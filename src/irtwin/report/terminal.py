@@ -17,7 +17,7 @@ _LEAST = 6  # characters that a column of text keeps
 _BETWEEN = 3  # characters between two columns
 
 
-def show(answer: answers.Table, in_sections: bool = False, counted: bool = True) -> None:
+def show(answer: answers.AnswerTable, in_sections: bool = False, counted: bool = True) -> None:
     """Print an answer as a table, numbers to the right and never broken; `in_sections`, each named by the first column.
 
     Text is folded where the terminal is narrow. Where that is not enough, each row is printed as a block of lines.

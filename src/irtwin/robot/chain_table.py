@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.errors import InputError
-from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, Table, row_transform, screw_x, screw_z
+from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_frame, ranges
 
@@ -30,7 +30,7 @@ class _Line:
     direction: np.ndarray
 
 
-def table_of(robot: Robot, convention: str = "standard", tip: str | None = None) -> Table:
+def table_of(robot: Robot, convention: str = "standard", tip: str | None = None) -> ChainTable:
     """Return the table of the chain from the robot's base to the link `tip`, the flange where None.
 
     It holds for revolute, continuous and prismatic joints with axes however they lie. Rows keep the joints' names and
@@ -44,11 +44,11 @@ def table_of(robot: Robot, convention: str = "standard", tip: str | None = None)
     kinds = [robot.joints[joint - 1].kind for joint in chain]
     base = _first_frame(axes[0])
     rows, frame = _rows(axes, kinds, base, end, convention)
-    table = Table(tuple(rows), convention, base, np.linalg.inv(frame) @ end)
+    table = ChainTable(tuple(rows), convention, base, np.linalg.inv(frame) @ end)
     return replace(table, base=_tidy(table.base), tool=_tidy(table.tool), rows=tuple(_bodies(robot, chain, table)))
 
 
-def deviation(robot: Robot, table: Table, tip: str | None = None) -> tuple[float, float]:
+def deviation(robot: Robot, table: ChainTable, tip: str | None = None) -> tuple[float, float]:
     """Return by how much table and robot differ at most over poses drawn within the limits: m, and rad."""
     name = tip or flange(robot)
     chain, _ = _chain(robot, name)
@@ -189,7 +189,7 @@ def _tidy(place: np.ndarray) -> np.ndarray:
     return np.where(np.abs(place) < 1e-15, 0.0, place)
 
 
-def _bodies(robot: Robot, chain: Sequence[int], table: Table) -> list[Row]:
+def _bodies(robot: Robot, chain: Sequence[int], table: ChainTable) -> list[Row]:
     """Return a table's rows with names, limits and bodies of the joints of a chain."""
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, np.zeros(model.nq))

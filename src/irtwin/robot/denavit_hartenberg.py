@@ -41,7 +41,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class ChainTable:
     """The rows of a chain, base to flange, and the (4, 4) transforms before the first and after the last of them.
 
     `standard` (Denavit and Hartenberg 1955) is T_i = Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha); `modified`
@@ -90,7 +90,7 @@ def _moved(row: Row, position: float) -> np.ndarray:
     return screw_z(row.d, row.theta + position)
 
 
-def from_table(name: str, table: Table) -> Robot:
+def from_table(name: str, table: ChainTable) -> Robot:
     """Make a robot of n joints from its table: links base_link, link_1 to link_n and flange.
 
     Raises InputError on an empty table, and where the robot cannot be modelled.
@@ -98,7 +98,7 @@ def from_table(name: str, table: Table) -> Robot:
     return parse_urdf(to_urdf(name, table), source=f'Denavit-Hartenberg table of "{name}"')
 
 
-def to_urdf(name: str, table: Table) -> str:
+def to_urdf(name: str, table: ChainTable) -> str:
     """Return a table as URDF text; the joints' zeros are those of the table. Raises InputError on an empty table."""
     if not table.rows:
         raise InputError(f'robot "{name}": its Denavit-Hartenberg table has no row; give one for each joint')

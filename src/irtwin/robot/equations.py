@@ -22,7 +22,7 @@ _STATES = 20  # at which the equations are held against Pinocchio
 
 
 @dataclass(frozen=True)
-class Equations:
+class EquationsOfMotion:
     """The rigid-body torque of each joint in symbols q1, dq1, ddq1, ... (rad or m, s), N m or N.
 
     `mass` (n, n), `speed` (n,) and `gravity` (n,) are the parts; `deviation` is by how much the whole differs at most
@@ -61,7 +61,7 @@ class Equations:
         return rf"\tau_{{{joint + 1}}} = {sympy.latex(torque, symbol_names=names)}"
 
 
-def equations(robot: Robot) -> Equations:
+def equations(robot: Robot) -> EquationsOfMotion:
     """Derive the equations of motion by Lagrange's method from the robot's nominal masses and dimensions.
 
     Rigid bodies alone: no friction, no rotors. Raises InputError where sympy is missing or more than MOST_JOINTS move.
@@ -76,8 +76,8 @@ def equations(robot: Robot) -> Equations:
     q, dq, _ = _symbols(len(robot.joints))
     gravity = sympy.Matrix([sympy.diff(height, position) for position in q])
     speed = sympy.Matrix([_speed_terms(mass, q, dq, joint) for joint in range(len(q))])
-    found = Equations(robot.joint_names, mass, speed, gravity, 0.0)
-    return Equations(robot.joint_names, mass, speed, gravity, _deviation(robot, found))
+    found = EquationsOfMotion(robot.joint_names, mass, speed, gravity, 0.0)
+    return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, found))
 
 
 def _library() -> Any:
@@ -244,7 +244,7 @@ def _shifted(
     return result
 
 
-def _deviation(robot: Robot, found: Equations) -> float:
+def _deviation(robot: Robot, found: EquationsOfMotion) -> float:
     sympy = _library()
     count = len(robot.joints)
     q, dq, ddq = _symbols(count)

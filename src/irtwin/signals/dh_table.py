@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, from_table
-from irtwin.robot.denavit_hartenberg import Table as DhTable
+from irtwin.robot.denavit_hartenberg import ChainTable as DhTable
 from irtwin.robot.description import Robot
 from irtwin.signals.toml_file import TomlTable, shown
 

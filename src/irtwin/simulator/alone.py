@@ -16,7 +16,7 @@ import scipy
 
 from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
-from irtwin.simulator.play import Stretch
+from irtwin.simulator.play import PlayedStretch
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Alone:
     """
 
     servos: Servos
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[PlayedStretch, ...]
     step: float
     load: np.ndarray
     inertia: np.ndarray
@@ -126,7 +126,7 @@ class Alone:
         return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
 
 
-def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
+def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Alone:
     """Return stretches of runs as each joint by itself is played over them."""
     steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
     shape = (1 + len(OF_ROBOT), steps, len(stretches), len(servos.model.joints))
@@ -149,7 +149,7 @@ def alone(servos: Servos, stretches: Sequence[Stretch], step: float) -> Alone:
     )
 
 
-def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
+def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) -> tuple[np.ndarray, np.ndarray]:
     """Return at a stretch's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
     import mujoco
 

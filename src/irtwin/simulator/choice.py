@@ -14,7 +14,7 @@ import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Equations, Fit, Played, Slopes, marginal
+from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Fit, Played, Slopes, StepEquations, marginal
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
 
 _HOLDING = NAMES.index("holding")
@@ -30,7 +30,7 @@ _SAME = 1e-9  # of the chart
 
 
 @dataclass(frozen=True)
-class Choice:
+class DifferingNumbers:
     """Numbers of the robot and which of them differ: `differs` (k, n); `odds` (k, n), natural logarithms, that they do.
 
     `interval` (2, k, n): ends of 95 % of each number, the number itself where it is the simulator's.
@@ -83,7 +83,7 @@ class Choice:
         return self.fit.servos.of_chart(at)
 
 
-def choose(fit: Fit) -> Choice:
+def choose(fit: Fit) -> DifferingNumbers:
     """Return the numbers with most evidence."""
     own = fit.rolled(fit.servos.chart(fit.servos.numbers))
     fit, best = _all_free(fit, own)
@@ -108,7 +108,7 @@ def choose(fit: Fit) -> Choice:
     slopes = fit.slopes(best)
     loss, worth = _weighed(fit, best, slopes, differs)
     odds = np.where(differs, np.where(_ROBOTS, odds, loss - worth), -np.inf)
-    return Choice(fit, best, slopes, differs, odds, _interval(fit, best, slopes, differs))
+    return DifferingNumbers(fit, best, slopes, differs, odds, _interval(fit, best, slopes, differs))
 
 
 def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> tuple[Played, bool]:
@@ -349,6 +349,6 @@ def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: i
 
 def _equations(
     fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int, chosen: np.ndarray | slice = slice(None)
-) -> Equations:
+) -> StepEquations:
     """Return a joint's own numbers that differ and are smooth, and the normal equations of a step from them."""
     return fit.equations(best.at, slopes, SMOOTH, [row for row in SMOOTH if differs[row, joint]], joint, chosen)

@@ -12,7 +12,7 @@ import numpy as np
 from irtwin.identification.progress import tell_step
 from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
-from irtwin.simulator.play import Stretch, play
+from irtwin.simulator.play import PlayedStretch, play
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, Servos
 
 _HOLDING = NAMES.index("holding")
@@ -78,7 +78,7 @@ class Slopes:
     right: np.ndarray
 
 
-class Equations(NamedTuple):
+class StepEquations(NamedTuple):
     """Normal equations for a step of some `rows` of the numbers at a joint: `normal` (j, j), `right` (j,)."""
 
     rows: Sequence[int]
@@ -86,7 +86,7 @@ class Equations(NamedTuple):
     right: np.ndarray
 
 
-def marginal(joints: Sequence[Equations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def marginal(joints: Sequence[StepEquations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal equations of rows that joints share, each joint's own numbers fitted beside."""
     normal, right = np.zeros((len(rows), len(rows))), np.zeros(len(rows))
     for one in joints:
@@ -129,7 +129,7 @@ class Fit:
         return self.alone.servos
 
     @property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def stretches(self) -> tuple[PlayedStretch, ...]:
         """What is played."""
         return self.alone.stretches
 
@@ -233,12 +233,12 @@ class Fit:
     def equations(
         self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], own: Sequence[int], joint: int,
         chosen: np.ndarray | slice = slice(None),
-    ) -> Equations:  # fmt: skip
+    ) -> StepEquations:  # fmt: skip
         """Return a joint's equations for a step of its `own` of the slopes' rows, from stretches that are chosen."""
         places, likely = [list(rows).index(row) for row in own], LIKELY[own, 0]
         normal = slopes.normal[chosen, joint].sum(axis=0)[np.ix_(places, places)] + np.diag(likely**-2.0)
         right = slopes.right[chosen, joint].sum(axis=0)[places] - self.away(at)[own, joint] / likely
-        return Equations(own, normal, right)
+        return StepEquations(own, normal, right)
 
     def _costs(self, tried: Sequence[Played], together: bool) -> np.ndarray:
         costs = np.array([self.cost(one) for one in tried])

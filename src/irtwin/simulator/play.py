@@ -21,7 +21,7 @@ _MOST = 20_000_000  # values of states that are held at a time: 160 MB
 
 
 @dataclass(frozen=True)
-class Stretch:
+class PlayedStretch:
     """A part of a run that is played by itself: `rows` of it, from `begin` s; it begins as the robot did there."""
 
     run: Run
@@ -81,12 +81,12 @@ class Stretch:
         return np.asarray(found + numbers[NAMES.index("offset")])
 
 
-def whole(run: Run) -> Stretch:
+def whole(run: Run) -> PlayedStretch:
     """Return a run as one stretch."""
-    return Stretch(run, slice(None), float(run.signals.time[0]))
+    return PlayedStretch(run, slice(None), float(run.signals.time[0]))
 
 
-def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
+def each(run: Run, seconds: float, most: int | None = None) -> list[PlayedStretch]:
     """Return stretches of a run that do not overlap, of `most` at most, evenly spread; at least one."""
     time = run.signals.time
     lasts = float(time[-1] - time[0])
@@ -94,11 +94,11 @@ def each(run: Run, seconds: float, most: int | None = None) -> list[Stretch]:
     count = min(fit, most or fit)
     begins = time[0] + np.maximum((np.arange(count) + 0.5) * lasts / count - seconds / 2, 0.0)
     ends = [np.searchsorted(time, [begin - 1e-9, begin + seconds - 1e-9]) for begin in begins]
-    return [Stretch(run, slice(*rows), float(begin)) for rows, begin in zip(ends, begins, strict=True)]
+    return [PlayedStretch(run, slice(*rows), float(begin)) for rows, begin in zip(ends, begins, strict=True)]
 
 
 def play(
-    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], step: float | None = None
+    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch], step: float | None = None
 ) -> list[list[np.ndarray]]:
     """Return, for each set of numbers (k, n) and each stretch, what the model does at its samples, as `measured`.
 
@@ -111,7 +111,7 @@ def play(
 
 
 def _played(
-    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch], steps: int, step: float
+    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch], steps: int, step: float
 ) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     import mujoco
@@ -161,7 +161,7 @@ def _efforts(compiled: mujoco.MjModel, servos: Servos) -> np.ndarray:
     return np.array([of[compiled.joint(joint).id] for joint in servos.model.joints])
 
 
-def _state(servos: Servos, stretch: Stretch, size: int) -> np.ndarray:
+def _state(servos: Servos, stretch: PlayedStretch, size: int) -> np.ndarray:
     """Return the model's state: time, positions, speeds, then what its actuators remember."""
     compiled = servos.model.compiled
     state = np.zeros(size)

@@ -15,10 +15,10 @@ from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
 from irtwin.simulator.alone import alone
-from irtwin.simulator.choice import Choice, choose
+from irtwin.simulator.choice import DifferingNumbers, choose
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
-from irtwin.simulator.play import Stretch, each, play
+from irtwin.simulator.play import PlayedStretch, each, play
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
@@ -36,7 +36,7 @@ class Playing:
 
     document: Document
     curves: Curves
-    chosen: Choice
+    chosen: DifferingNumbers
     against: str = "simulated"  # the role of what the observed runs are held against
     twin: None = None  # positions alone make none
 
@@ -95,14 +95,14 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     )
 
 
-def _stretches(runs: Sequence[Run], lasts: float) -> list[Stretch]:
+def _stretches(runs: Sequence[Run], lasts: float) -> list[PlayedStretch]:
     most = max(1, round(_STRETCHES / len(runs)))
     alone = runs[0].signals.time if len(runs) == 1 else None
     lasts = lasts if alone is None else min(lasts, float(alone[-1] - alone[0]) / _LEAST)
     return [one for run in runs for one in each(run, lasts, most)]
 
 
-def _falls(own: Servos, stretches: Sequence[Stretch]) -> bool:
+def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
     """Return whether the robot ends far from its model: too far for slopes to say which number does that."""
     moved = play(own, [own.numbers], stretches)[0]
     left = [one.q - played[:, 0] for one, played in zip(stretches, moved, strict=True)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from irtwin.document.document import Document
-from irtwin.simulator.choice import Choice
+from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.differences import not_held
 from irtwin.simulator.payload import together
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, tilted
@@ -35,7 +35,7 @@ _SIGNED = {  # what may be below zero, and how far beyond both sides it is sough
 Free = tuple[str, str, list[float], list[float], list[float], list[float]]  # as FREE of the script
 
 
-def script(chosen: Choice, document: Document, logs: Path, out: Path) -> bytes:
+def script(chosen: DifferingNumbers, document: Document, logs: Path, out: Path) -> bytes:
     """Return the script that fits what a diagnosis says differs to `logs`, a data set, to be written to `out`."""
     lacking = [f"{one.effect} of {', '.join(one.joints)}" for one in not_held(document)]
     return written(free(chosen), lacking, chosen.fit.servos.model.file.path, logs, out)
@@ -57,7 +57,7 @@ def written(some: Iterable[Free], lacking: Iterable[str], model: Path, logs: Pat
     return text.encode()
 
 
-def free(chosen: Choice) -> Iterator[Free]:
+def free(chosen: DifferingNumbers) -> Iterator[Free]:
     """Yield what differs: joint or body, number, the model's, the robot's, and bounds, as far beyond as they differ."""
     own, robots = chosen.fit.servos.numbers, chosen.numbers
     model = chosen.fit.servos.model

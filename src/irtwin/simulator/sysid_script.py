@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from irtwin import DataSet, read_data_set
+from irtwin.signals.log import DataSet, read_data_set
 
 # files, from where this one is
 MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"

@@ -13,8 +13,8 @@ from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
-from irtwin.simulator.choice import Choice
-from irtwin.simulator.play import Stretch, each, play, whole
+from irtwin.simulator.choice import DifferingNumbers
+from irtwin.simulator.play import PlayedStretch, each, play, whole
 from irtwin.simulator.servos import NAMES, Servos, part_of
 
 _FOLDS = 3
@@ -88,7 +88,7 @@ class Parts:
         return found
 
 
-def held_out(chosen: Choice, runs: Sequence[Run]) -> OfRun:
+def held_out(chosen: DifferingNumbers, runs: Sequence[Run]) -> OfRun:
     """Return for each run numbers that other runs alone say; of one run alone its own."""
     folds = min(_FOLDS, len(runs))
     found: dict[str, np.ndarray] = {}
@@ -134,7 +134,7 @@ def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[fl
     return found
 
 
-def parts(chosen: Choice, numbers: OfRun, families: Sequence[Sequence[str]]) -> Parts:
+def parts(chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[str]]) -> Parts:
     """Play the stretches with each name's numbers alone, with all but them, and with those of any families."""
     names = tuple(name for family in families for name in family)
     sets = {frozenset[str](), frozenset(names)}
@@ -160,7 +160,7 @@ def parts(chosen: Choice, numbers: OfRun, families: Sequence[Sequence[str]]) -> 
     return Parts(names, {one: means[:, place] for place, one in enumerate(wanted)})
 
 
-def _alike(stretches: Sequence[Stretch], numbers: OfRun) -> list[list[int]]:
+def _alike(stretches: Sequence[PlayedStretch], numbers: OfRun) -> list[list[int]]:
     """Return places of stretches, those of runs with the same numbers together."""
     found: dict[bytes, list[int]] = {}
     for place, one in enumerate(stretches):
@@ -172,7 +172,7 @@ def _rows(names: frozenset[str]) -> np.ndarray:
     return np.array([part_of(name) in names for name in NAMES])[:, None]
 
 
-def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Stretch]) -> np.ndarray:
+def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> np.ndarray:
     played = play(own, numbers, stretches)
     return np.array([
         [((one.measured - moved) ** 2).mean(axis=0) for one, moved in zip(stretches, way, strict=True)]

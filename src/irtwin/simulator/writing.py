@@ -10,14 +10,14 @@ import numpy as np
 import scipy
 
 from irtwin.document import document as said
-from irtwin.document.curves import Apart, Curves, RunError
+from irtwin.document.curves import Curves, FarthestApart, RunError
 from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.closing import share
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
 from irtwin.robot.description import Robot
-from irtwin.simulator.choice import Choice
+from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.servos import OF_JOINTS, PARTS, row_of
 from irtwin.simulator.tracking import Parts, Tracked
 
@@ -65,7 +65,7 @@ def document(
     robot: Robot,
     simulator: str,
     runs: Sequence[str],
-    chosen: Choice,
+    chosen: DifferingNumbers,
     parts: Parts,
     before: Sequence[Tracked],
     after: Sequence[Tracked],
@@ -122,11 +122,11 @@ def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: 
     return Curves(follows=(), runs=every, experiment=None, apart=_apart(runs, before, after))
 
 
-def _apart(runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> Apart:
+def _apart(runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> FarthestApart:
     run = int(np.argmax([one.off.max() for one in before]))
     one, other = before[run], after[run]
     at = int(one.off.argmax())
-    return Apart(
+    return FarthestApart(
         run=runs[run],
         time=float(one.time[at]),
         robot=tuple(one.robot[at].tolist()),
@@ -170,7 +170,7 @@ def together(before: np.ndarray, after: np.ndarray) -> said.Change:
     )
 
 
-def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
+def _causes(robot: Robot, chosen: DifferingNumbers, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
     rows = [row_of(name) for name in names]
     joints = [
         [robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] if name in OF_JOINTS else []
@@ -192,7 +192,7 @@ def _causes(robot: Robot, chosen: Choice, parts: Parts, names: Sequence[str]) ->
     )
 
 
-def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
+def _evidence(chosen: DifferingNumbers, parts: Parts, name: str) -> said.Evidence:
     at = chosen.differs[row_of(name)]
     everywhere, left = (float(parts.relative(some).sum()) for some in (parts.without(name), parts.after))
     without, after = (float(parts.relative(some * at).sum()) for some in (parts.without(name), parts.after))
@@ -206,7 +206,7 @@ def _evidence(chosen: Choice, parts: Parts, name: str) -> said.Evidence:
     )
 
 
-def _parameters(robot: Robot, chosen: Choice, name: str) -> Iterator[said.Parameter]:
+def _parameters(robot: Robot, chosen: DifferingNumbers, name: str) -> Iterator[said.CauseParameter]:
     if name in PARTS:
         for each in PARTS[name]:
             symbol, unit = _SYMBOLS[each]
@@ -218,12 +218,12 @@ def _parameters(robot: Robot, chosen: Choice, name: str) -> Iterator[said.Parame
         yield _parameter(chosen, name, int(place), robot.joint_names[place], unit)
 
 
-def _parameter(chosen: Choice, name: str, place: int, joint: str | None, unit: str) -> said.Parameter:
+def _parameter(chosen: DifferingNumbers, name: str, place: int, joint: str | None, unit: str) -> said.CauseParameter:
     row = row_of(name)
     simulator, robots = float(chosen.fit.servos.numbers[row, place]), float(chosen.numbers[row, place])
     held = name != _NOT_HELD
     lower, upper = chosen.interval[:, row, place] - simulator
-    return said.Parameter(
+    return said.CauseParameter(
         name=name,
         joint=joint,
         value=robots - simulator,

@@ -21,7 +21,7 @@ from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
-from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.torque_scale import FittedTorqueScale
 from irtwin.twin.twin import BaseParameter, Choice, Parameter, Twin
 
 _FORMAT, _VERSION = "irtwin twin", 1
@@ -72,7 +72,7 @@ class _Twin:
     parameters: tuple[Parameter, ...]
     base_parameters: tuple[BaseParameter, ...]
     covariance: tuple[str, ...] | None = None
-    torque_scale: TorqueScale | None = None
+    torque_scale: FittedTorqueScale | None = None
     body_change: float | None = None
     quantities: tuple[Parameter, ...] = ()
     remainder: Remainder | None = None

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from irtwin.twin.so_far import Stretch
+from irtwin.twin.so_far import WatchedStretch
 
 OUTSIDE, INSIDE = 1.5, 1.1  # times the band: beyond the first the gap leaves it, below the second it is back
 SEEN_AS = 1.0  # s that an excursion lasts at least; shorter ones are forgotten when they end
@@ -93,7 +93,7 @@ class GapWatch:
         self._bands = {place: band for place, band in bands.items() if band > 0}
         self._windows = Windows()
 
-    def take(self, stretch: Stretch) -> None:
+    def take(self, stretch: WatchedStretch) -> None:
         """Take the next stretch of the run."""
         for time, roots in self._windows.take(*residuals(stretch), begins=stretch.begins):
             for place, root in zip(self._names, roots.tolist(), strict=True):
@@ -129,7 +129,7 @@ class GapWatch:
             now.excursions.pop()
 
 
-def residuals(stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
+def residuals(stretch: WatchedStretch) -> tuple[np.ndarray, np.ndarray]:
     """Return times (N,) s and residuals (N, n + 1) of torque and power; without the sample of the stretch before."""
     new = slice(0 if stretch.begins else 1, None)
     missing = np.full_like(stretch.torque, np.nan)

@@ -29,7 +29,7 @@ _MEMORY = 30.0  # s that effects with memory are given of what went before
 
 
 @dataclass(frozen=True)
-class Stretch:
+class WatchedStretch:
     """Some samples of a run as conditioned, and what its twin says of them; the first is the last of the one before.
 
     torque: (N, n) N m, as a measurement would show it; power: (N,) W; residual: measured less modelled, (N, n) N m and
@@ -85,7 +85,9 @@ class EnergySoFar:
         """The greatest power, W: measured where it is, else modelled."""
         return self._measured_peak if self.measured is not None else self.peak
 
-    def feed(self, columns: dict[str, np.ndarray], *, last: bool = False, least: float = 0.0) -> Iterator[Stretch]:
+    def feed(
+        self, columns: dict[str, np.ndarray], *, last: bool = False, least: float = 0.0
+    ) -> Iterator[WatchedStretch]:
         """Take the next samples, columns as of a log, (N,) each and NaN where not said; yield what is worked out.
 
         `last`: nothing follows. Less than `least` seconds wait for more. Where a hole in time is, one stretch ends.
@@ -120,7 +122,7 @@ class EnergySoFar:
             both = {field: np.concatenate([getattr(held, field), values]) for field, values in new.logged().items()}
             self._signals = Signals(**both)
 
-    def _work(self, least: float, to_the_end: bool) -> Iterator[Stretch]:
+    def _work(self, least: float, to_the_end: bool) -> Iterator[WatchedStretch]:
         if self._twin is None:
             return self._measure(to_the_end)
         if not self._paced():
@@ -165,7 +167,7 @@ class EnergySoFar:
         ahead = max((effect.reach or 0.0 for effect in self._twin.stack.effects if effect.memory), default=0.0)
         return half + round(ahead / self._step), half + round(max(memories, default=0.0) / self._step)
 
-    def _modelled(self, held: Signals, low: int, high: int, first: int, until: int, begins: bool) -> Stretch:
+    def _modelled(self, held: Signals, low: int, high: int, first: int, until: int, begins: bool) -> WatchedStretch:
         assert self._twin is not None
         time = self._start + self._step * np.arange(low, high + 1)
         near = (held.time >= time[0] - 8 * self._step) & (held.time <= time[-1] + 8 * self._step)
@@ -173,7 +175,7 @@ class EnergySoFar:
         motion = whole.part(first - low, until - low + 1)
         torque, power = self._twin.torque(motion), self._twin.power(motion)
         shown = self._twin.measured_torque(motion)
-        return Stretch(
+        return WatchedStretch(
             motion=motion,
             torque=torque,
             power=power,
@@ -188,7 +190,7 @@ class EnergySoFar:
         whole = Signals(**{**signals.logged(), **said})  # type: ignore[arg-type]
         return run_of(self._name, whole, role="live", payload_mass=self._payload, payload_com=self._payload_com)
 
-    def _add(self, stretch: Stretch) -> None:
+    def _add(self, stretch: WatchedStretch) -> None:
         assert self._twin is not None
         motion, time = stretch.motion, stretch.motion.time
         self.seconds += float(time[-1] - time[0])

@@ -38,7 +38,7 @@ Torque = Callable[[Motion], np.ndarray]
 
 
 @dataclass(frozen=True)
-class TorqueScale:
+class FittedTorqueScale:
     """Half the 95 % interval of logged torque over that which is there, a share, and where that comes from.
 
     low, high: the ends of what true torque is over logged torque; `why` says all of it in words.
@@ -81,7 +81,7 @@ def _degree(part: str) -> int:
     return int(power[1]) if power else 1
 
 
-def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -> TorqueScale | None:
+def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -> FittedTorqueScale | None:
     """Return how sure the scale is by what the data set states, and by power where that tells more.
 
     motions: filtered alike; None where none has a torque. torque: the real joint torque, (N, n) N m, of each that
@@ -99,7 +99,7 @@ def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -
     return known if told is None else _narrowed(known, *told)
 
 
-def _stated(data_set: DataSet, by_power: bool) -> TorqueScale:
+def _stated(data_set: DataSet, by_power: bool) -> FittedTorqueScale:
     note = data_set.notes.get("torque")
     if data_set.torque_scale_uncertainty is not None:
         share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
@@ -112,10 +112,10 @@ def _stated(data_set: DataSet, by_power: bool) -> TorqueScale:
     else:
         share, source, why = _ASSUMED, ASSUMED, "torque of drives comes from nominal constants"
     words = f"The scale of torque is {f'uncertain by {100 * share:.3g} %' if share else 'exact'}: {why}"
-    return TorqueScale(share, source, 1 / (1 + share), 1 / (1 - share), words)
+    return FittedTorqueScale(share, source, 1 / (1 + share), 1 / (1 - share), words)
 
 
-def _narrowed(known: TorqueScale, slope: float, half: float) -> TorqueScale:
+def _narrowed(known: FittedTorqueScale, slope: float, half: float) -> FittedTorqueScale:
     """Join what is known of true torque over logged, 1 give or take the uncertainty, with the slope of power."""
     half = float(np.hypot(half, _OF_SENSOR * abs(slope)))
     if half >= known.uncertainty:

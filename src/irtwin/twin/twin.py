@@ -14,7 +14,7 @@ from irtwin.identification.remainder import Remainder
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
-from irtwin.twin.torque_scale import TorqueScale
+from irtwin.twin.torque_scale import FittedTorqueScale
 
 _PIECE = 8192  # samples whose regressor is held at once
 
@@ -78,7 +78,7 @@ class Twin:
     fitted: tuple[str, ...] = ()  # runs
     quantities: tuple[Parameter, ...] = ()
     covariance: np.ndarray | None = field(default=None, repr=False, compare=False)
-    torque_scale: TorqueScale | None = None
+    torque_scale: FittedTorqueScale | None = None
     choices: tuple[Choice, ...] = ()
     remainder: Remainder | None = None
     body_change: float | None = None

@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Payload:
+class PlantPayload:
     """What the flange carries: mass in kg, centre of mass in the flange frame in m."""
 
     mass: float = 0.0
@@ -28,7 +28,7 @@ class LinkTolerance:
 class Arm:
     """Rigid-body dynamics of a URDF robot with rotor inertia at the joints and a payload at the flange."""
 
-    def __init__(self, urdf: str, rotor_inertia: np.ndarray, payload: Payload, step: float) -> None:
+    def __init__(self, urdf: str, rotor_inertia: np.ndarray, payload: PlantPayload, step: float) -> None:
         """Build the arm; `rotor_inertia`: (n,) kg m^2 reflected to the joint, `step`: integration step in s."""
         spec = mujoco.MjSpec.from_string(urdf)
         spec.compiler.fusestatic = False

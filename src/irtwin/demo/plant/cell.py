@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import BPoly
 
-from irtwin.demo.plant.arm import Payload
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.logger import write_run
 from irtwin.demo.plant.machine import build, read_drawings
-from irtwin.demo.plant.motion import Motion, check, programme
+from irtwin.demo.plant.motion import PlantMotion, check, programme
 from irtwin.demo.plant.simulate import Watch, simulate
 from irtwin.demo.plant.thermal import Thermal
 
@@ -29,16 +29,16 @@ class Cell:
         self.machine = build(read_drawings(drawings, urdf), _SEED)
         self.rng = np.random.default_rng([_SEED, 1])
         self.thermal = Thermal(self.machine.drawings.thermal)
-        work = simulate(self.machine, self.random(range(1, 4)), Payload(), self.thermal, _SEED)
+        work = simulate(self.machine, self.random(range(1, 4)), PlantPayload(), self.thermal, _SEED)
         self.thermal.wait(work.mean_winding_loss, work.mean_body_loss, _WARM_UP)
 
-    def through(self, time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> Motion:
+    def through(self, time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> PlantMotion:
         """Return the motion at the controller's steps: the polynomial of fifth degree through samples, (N, n)."""
         curve, step = BPoly.from_derivatives(time, np.stack([q, dq, ddq], axis=1)), self.machine.drawings.step
         at = step * np.arange(round((time[-1] - time[0]) / step) + 1)
-        return Motion(curve(at), curve(at, 1), curve(at, 2))
+        return PlantMotion(curve(at), curve(at, 1), curve(at, 2))
 
-    def random(self, joints: Sequence[int]) -> Motion:
+    def random(self, joints: Sequence[int]) -> PlantMotion:
         """Return a random motion from pose to pose, of some joints alone."""
         moves = []
         for _ in range(_MOVES):
@@ -47,9 +47,9 @@ class Cell:
             moves.append({"to": pose, "speed": self.rng.uniform(*_SPEED)})
         return programme(moves, self.machine.drawings.limits, self.machine.drawings.step)
 
-    def carry_out(self, motion: Motion, log: Path, watch: Watch) -> None:
+    def carry_out(self, motion: PlantMotion, log: Path, watch: Watch) -> None:
         """Let the robot do a motion, and write what its logger shows. Raises ValueError or RuntimeError else."""
         drawings = self.machine.drawings
         check(motion, drawings.limits)
         seed = int(self.rng.integers(1 << 30))
-        write_run(log, simulate(self.machine, motion, Payload(), self.thermal, seed, watch), drawings.joints)
+        write_run(log, simulate(self.machine, motion, PlantPayload(), self.thermal, seed, watch), drawings.joints)

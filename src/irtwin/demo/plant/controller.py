@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.demo.plant.arm import Arm
-from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.motion import PlantMotion
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class ControlData:
     following_error: float  # rad, the controller stops the robot beyond it
 
 
-class Controller:
+class PlantController:
     """Cascaded position and velocity control of all joints along one motion."""
 
     def __init__(
-        self, data: ControlData, nominal: Arm, maximum_torque: np.ndarray, motion: Motion, step: float
+        self, data: ControlData, nominal: Arm, maximum_torque: np.ndarray, motion: PlantMotion, step: float
     ) -> None:
         """`nominal` is the arm as its maker thinks it is, `maximum_torque` (n,) N m what the drives may give."""
         self.data, self.maximum_torque, self.motion, self.step = data, maximum_torque, motion, step

@@ -8,10 +8,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from irtwin.demo.plant.simulate import Recording
+from irtwin.demo.plant.simulate import PlantRecording
 
 
-def write_run(file: Path, recording: Recording, joints: list[str]) -> None:
+def write_run(file: Path, recording: PlantRecording, joints: list[str]) -> None:
     """Write one run; single precision holds every sensor's resolution but the clock's."""
     columns = {"time": pa.array(np.round(recording.time, 6))}
     for prefix, values in (("q", recording.q), ("tau", recording.torque), ("temp", recording.temperature)):

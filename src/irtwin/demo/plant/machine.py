@@ -11,11 +11,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from irtwin.demo.plant.arm import Arm, LinkTolerance, Payload
+from irtwin.demo.plant.arm import Arm, LinkTolerance, PlantPayload
 from irtwin.demo.plant.controller import ControlData
 from irtwin.demo.plant.drive import DriveData
 from irtwin.demo.plant.friction import FrictionData
-from irtwin.demo.plant.motion import Limits
+from irtwin.demo.plant.motion import PlantLimits
 from irtwin.demo.plant.sensors import SensorData
 from irtwin.demo.plant.supply import SupplyData
 from irtwin.demo.plant.thermal import ThermalData
@@ -59,15 +59,15 @@ class Drawings:
     @cached_property
     def joints(self) -> list[str]:
         """Names of the joints, in the order of every (n,) array."""
-        return self.arm(Payload()).joint_names
+        return self.arm(PlantPayload()).joint_names
 
     @cached_property
-    def limits(self) -> Limits:
+    def limits(self) -> PlantLimits:
         """Position limits and speeds of the URDF (MuJoCo keeps no speeds), accelerations of the drawings."""
-        lower, upper = self.arm(Payload()).model.jnt_range.T
-        return Limits(lower.copy(), upper.copy(), _urdf_speeds(self.urdf, self.joints), self.acceleration)
+        lower, upper = self.arm(PlantPayload()).model.jnt_range.T
+        return PlantLimits(lower.copy(), upper.copy(), _urdf_speeds(self.urdf, self.joints), self.acceleration)
 
-    def arm(self, payload: Payload) -> Arm:
+    def arm(self, payload: PlantPayload) -> Arm:
         """Return the arm as drawn."""
         return Arm(self.urdf, self.drive.joint_inertia, payload, self.step)
 
@@ -83,7 +83,7 @@ class Machine:
     torque_offset: np.ndarray  # (n,) N m, of the current sensors
     meter_gain: float
 
-    def arm(self, payload: Payload) -> Arm:
+    def arm(self, payload: PlantPayload) -> Arm:
         """Return the arm as built."""
         arm = Arm(self.drawings.urdf, self.drive.joint_inertia, payload, self.drawings.step)
         tolerance = self.drawings.tolerance

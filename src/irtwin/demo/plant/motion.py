@@ -12,7 +12,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Limits:
+class PlantLimits:
     """What the joints may do, (n,): positions in rad, speed in rad/s, acceleration in rad/s^2."""
 
     lower: np.ndarray
@@ -22,24 +22,24 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Motion:
+class PlantMotion:
     """Programmed positions, speeds and accelerations: (N, n) rad, rad/s, rad/s^2, one row a control step."""
 
     q: np.ndarray
     dq: np.ndarray
     ddq: np.ndarray
 
-    def held(self, rows: int) -> Motion:
+    def held(self, rows: int) -> PlantMotion:
         """Return the motion with its first pose held for `rows` steps before it starts."""
         rest = np.zeros((rows, self.q.shape[1]))
-        return Motion(
+        return PlantMotion(
             np.vstack([np.repeat(self.q[:1], rows, axis=0), self.q]),
             np.vstack([rest, self.dq]),
             np.vstack([rest, self.ddq]),
         )
 
 
-def fourier(file: Path, step: float, speed: float = 1.0) -> Motion:
+def fourier(file: Path, step: float, speed: float = 1.0) -> PlantMotion:
     """Read a finite Fourier series from a TOML file and return one period of it, slowed down to `speed`.
 
     `period` (s), `centre` (n,), `sine` and `cosine` (K, n), rad:
@@ -51,14 +51,14 @@ def fourier(file: Path, step: float, speed: float = 1.0) -> Motion:
     time = step * np.arange(round(period / step) + 1)
     w = 2 * np.pi / period * np.arange(1, len(sine) + 1)
     sin, cos = np.sin(np.outer(time, w)), np.cos(np.outer(time, w))
-    return Motion(
+    return PlantMotion(
         np.array(table["centre"]) + sin @ sine + cos @ cosine,
         (cos * w) @ sine - (sin * w) @ cosine,
         -(sin * w**2) @ sine - (cos * w**2) @ cosine,
     )
 
 
-def programme(moves: Sequence[dict[str, Any]], limits: Limits, step: float, cycles: int = 1) -> Motion:
+def programme(moves: Sequence[dict[str, Any]], limits: PlantLimits, step: float, cycles: int = 1) -> PlantMotion:
     """Return the motion of a list of point-to-point moves, repeated `cycles` times.
 
     A move has `to` (deg), `speed` (share of the robot's own limits), `pause` (s, after it) and `profile`
@@ -71,20 +71,20 @@ def programme(moves: Sequence[dict[str, Any]], limits: Limits, step: float, cycl
         parts.append(_point_to_point(at, to, move.get("speed", 1.0), move.get("profile", "quintic"), limits, step))
         parts.append(_pause(to, move.get("pause", 0.0), step))
         at = to
-    return Motion(*(np.vstack([getattr(part, field) for part in parts]) for field in ("q", "dq", "ddq")))
+    return PlantMotion(*(np.vstack([getattr(part, field) for part in parts]) for field in ("q", "dq", "ddq")))
 
 
-def _pause(q: np.ndarray, seconds: float, step: float) -> Motion:
+def _pause(q: np.ndarray, seconds: float, step: float) -> PlantMotion:
     rows = np.repeat(q[None], round(seconds / step), axis=0)
-    return Motion(rows, 0 * rows, 0 * rows)
+    return PlantMotion(rows, 0 * rows, 0 * rows)
 
 
 _PEAKS = {"quintic": (1.875, 5.7735), "trapezoid": (1.5, 4.5)}  # peak speed and acceleration of a unit move
 
 
 def _point_to_point(
-    start: np.ndarray, end: np.ndarray, speed: float, profile: str, limits: Limits, step: float
-) -> Motion:
+    start: np.ndarray, end: np.ndarray, speed: float, profile: str, limits: PlantLimits, step: float
+) -> PlantMotion:
     distance = end - start
     peak_speed, peak_acceleration = _PEAKS[profile]
     by_speed = peak_speed * np.abs(distance) / (speed * limits.speed)
@@ -93,7 +93,7 @@ def _point_to_point(
     duration = rows * step
     s = np.arange(1, rows + 1)[:, None] / rows
     travelled, rate, acceleration = _quintic(s) if profile == "quintic" else _trapezoid(s)
-    return Motion(start + distance * travelled, distance * rate / duration, distance * acceleration / duration**2)
+    return PlantMotion(start + distance * travelled, distance * rate / duration, distance * acceleration / duration**2)
 
 
 def _quintic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -112,7 +112,7 @@ def _trapezoid(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return travelled, rate, 4.5 * (up.astype(float) - down.astype(float))
 
 
-def check(motion: Motion, limits: Limits) -> None:
+def check(motion: PlantMotion, limits: PlantLimits) -> None:
     """Raise ValueError where a motion asks more than the robot may do."""
     slack = 1 + 1e-6
     beyond = {

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from irtwin.demo.plant.arm import Payload
-from irtwin.demo.plant.controller import Controller
+from irtwin.demo.plant.arm import PlantPayload
+from irtwin.demo.plant.controller import PlantController
 from irtwin.demo.plant.drive import Drive, Losses
 from irtwin.demo.plant.friction import Friction
 from irtwin.demo.plant.machine import Machine, scatter
-from irtwin.demo.plant.motion import Motion
+from irtwin.demo.plant.motion import PlantMotion
 from irtwin.demo.plant.sensors import Encoders, PowerMeter, TorqueSensors, quantise
 from irtwin.demo.plant.supply import Flow, Supply
 from irtwin.demo.plant.thermal import Thermal
@@ -41,7 +41,7 @@ class EnergyBook:
 
 
 @dataclass(frozen=True)
-class Recording:
+class PlantRecording:
     """What the logger wrote, (N,) and (N, n), and what no logger could know."""
 
     time: np.ndarray  # s
@@ -59,7 +59,9 @@ class Recording:
 class _Cell:
     """A machine at work: all parts and their states."""
 
-    def __init__(self, machine: Machine, motion: Motion, payload: Payload, thermal: Thermal, seed: int) -> None:
+    def __init__(
+        self, machine: Machine, motion: PlantMotion, payload: PlantPayload, thermal: Thermal, seed: int
+    ) -> None:
         drawings = machine.drawings
         rng = np.random.default_rng([machine.seed, seed])
         jitter = drawings.tolerance.friction_per_run
@@ -68,7 +70,7 @@ class _Cell:
         self.thermal = thermal
         self.arm = machine.arm(payload)
         self.arm.place(motion.q[0])
-        self.controller = Controller(
+        self.controller = PlantController(
             drawings.control, drawings.arm(payload), drawings.drive.maximum_torque, motion, self.step
         )
         self.drive = Drive(machine.drive)
@@ -119,12 +121,12 @@ Watch = Callable[[float, float, float], None]
 
 def simulate(
     machine: Machine,
-    motion: Motion,
-    payload: Payload,
+    motion: PlantMotion,
+    payload: PlantPayload,
     thermal: Thermal,
     seed: int,
     watch: Watch = lambda time, power, energy: None,
-) -> Recording:
+) -> PlantRecording:
     """Let a machine do a motion; `thermal` is warmed by it, `seed` makes the run's noise.
 
     `watch` is told each sample that is logged: time, s, power by the meter, W, and energy so far, J.
@@ -151,7 +153,7 @@ def simulate(
     book.bus = cell.supply.stored - start[0]
     book.mechanical = cell.arm.energy() - start[1]
     log, true = np.array(rows), np.array(truth)
-    return Recording(
+    return PlantRecording(
         time=drawings.log_interval * np.arange(len(log)),
         q=log[:, :n],
         torque=log[:, n : 2 * n],

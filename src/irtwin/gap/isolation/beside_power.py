@@ -11,9 +11,9 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
-from irtwin.gap.isolation.finding import BesidePower, Finding, Without, attributed, finding_of
+from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, Without, attributed, finding_of
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
@@ -35,7 +35,7 @@ def find_beside_power(
     seed: int,
     *,
     without: Set[Without] = frozenset(),
-) -> tuple[Finding, Floor]:
+) -> tuple[ChannelFinding, Floor]:
     """Find the causes of torque, `without` some effects; return them with the floor that they leave.
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
@@ -45,7 +45,7 @@ def find_beside_power(
     square, make a difference.
     """
 
-    def about(torque: Torque, power: TwinPower, level: Floor) -> Finding:
+    def about(torque: Torque, power: TwinPower, level: Floor) -> ChannelFinding:
         both = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, case.shaken)
         return _find(case, both, level, seed, without)
 
@@ -71,7 +71,7 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> Finding:
+def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> ChannelFinding:
     """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
@@ -83,7 +83,7 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     return finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
 
 
-def _causes_of_torque(found: Attribution) -> list[Cause]:
+def _causes_of_torque(found: Attribution) -> list[FoundCause]:
     return [cause for cause in found.causes if cause.variants[0].effect.signal == "torque"]
 
 

@@ -9,7 +9,7 @@ from irtwin.robot.description import Robot
 
 
 @dataclass(frozen=True)
-class Cause:
+class FoundCause:
     """An effect in one or more joints (the variants chosen), with what it explains beside the other causes.
 
     gain: of weighted squares, a row of each equation; log_odds: that it is there beside the other causes, against that

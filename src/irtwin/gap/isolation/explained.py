@@ -11,8 +11,8 @@ from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import REPEATS, Floor, noise_floor
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import PowerOf
@@ -25,7 +25,7 @@ _LOWER = 0.95  # of the floor: by less it may be lower by chance
 class Explained:
     """What the causes found in a channel add to its signal, and what the twin is beside them."""
 
-    def __init__(self, stack: Stack, finding: Finding, below: Below):
+    def __init__(self, stack: Stack, finding: ChannelFinding, below: Below):
         """Take what a channel showed, and what candidates were built on: what the twin predicts `below` them."""
         self.stack, self.finding, self._below = stack, finding, below
         self._places = {k: place for place, k in enumerate(finding.used)}
@@ -35,7 +35,7 @@ class Explained:
         """(K,) the twin's coefficients."""
         return self.finding.estimate.values[: self.finding.system.base]
 
-    def added(self, cause: Cause, whole: Motion, *, real: bool = False) -> np.ndarray:
+    def added(self, cause: FoundCause, whole: Motion, *, real: bool = False) -> np.ndarray:
         """Return what a cause adds over a whole run, (N, n) N m or (N,) W; `real` torque and power alone, or all."""
         robot, below = self.stack.robot, self._below(whole)
         total = np.zeros(whole.dq.shape if self.finding.name == "torque" else len(whole.time))
@@ -72,7 +72,7 @@ class Explained:
 class ExplainedTorque(Explained):
     """The joint torque of the twin refitted with the causes, and what each cause adds to the torque."""
 
-    def __init__(self, stack: Stack, finding: Finding, below: Below):
+    def __init__(self, stack: Stack, finding: ChannelFinding, below: Below):
         """Take what torque showed, and what candidates were built on."""
         super().__init__(stack, finding, below)
         self._held: tuple[str, np.ndarray] | None = None
@@ -97,7 +97,7 @@ class ExplainedTorque(Explained):
         return replace(motion, torque=torque, power=motion.power - as_filtered(motion, taken))
 
 
-def explained_power(stack: Stack, finding: Finding, torque: Torque, power_of: PowerOf) -> Explained:
+def explained_power(stack: Stack, finding: ChannelFinding, torque: Torque, power_of: PowerOf) -> Explained:
     """Return what the causes found in power add to it, built on the joint torque and the power that it takes."""
 
     def below(whole: Motion) -> Predicted:

@@ -13,7 +13,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
-from irtwin.gap.isolation.cause import Cause
+from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.structure_search import Attribution, attribute
@@ -31,7 +31,7 @@ Without = str | tuple[str, str | None]
 
 
 @dataclass(frozen=True)
-class Finding:
+class ChannelFinding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
     `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
@@ -61,7 +61,7 @@ class Finding:
         return closed_squares(self.apart, self.seed)
 
     @property
-    def causes(self) -> tuple[Cause, ...]:
+    def causes(self) -> tuple[FoundCause, ...]:
         """The channel's causes, ranked."""
         return self.attribution.causes
 
@@ -72,11 +72,11 @@ class Finding:
         own = shares(self.closed_squares, self.counted.rows, level)
         return tuple(self.part * share for share in own)
 
-    def share(self, cause: Cause) -> float | None:
+    def share(self, cause: FoundCause) -> float | None:
         """Return a cause's part of what all close together, None where they close nothing."""
         return self.shares[self.causes.index(cause)] if self.shares else None
 
-    def closing(self, causes: Sequence[Cause]) -> Closing:
+    def closing(self, causes: Sequence[FoundCause]) -> Closing:
         """Return what some causes close of the channel's gap, beside the others."""
         closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
@@ -117,7 +117,7 @@ class Finding:
             observed_rms(self.system, self.chosen, self.attribution.noise),
         )
 
-    def closed(self, cause: Cause) -> float:
+    def closed(self, cause: FoundCause) -> float:
         """Return the part of the mean square above the floor, where a cause acts, that all causes together close."""
         mine = [place in cause.joints or not cause.joints for place in self.places]
         before, after = (level[mine] ** 2 for level in self.fitted)
@@ -143,7 +143,7 @@ def find(
     seed: int,
     without: Set[Without] = frozenset(),
     plain: System | None = None,
-) -> Finding:
+) -> ChannelFinding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
 
     `plain` as a finding's.
@@ -163,14 +163,14 @@ def finding_of(
     seed: int,
     plain: System | None = None,
     beside: BesidePower | None = None,
-) -> Finding:
+) -> ChannelFinding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in found.causes for k in cause.columns]
     alone, inside = system.with_columns(chosen)
     judged = held_out(alone, (plain or alone).noise_before, found.noise, inside, plain)
     apart = Apart.of(plain or system, system, [cause.columns for cause in found.causes])
     fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
-    return Finding(
+    return ChannelFinding(
         name,
         places,
         observed,
@@ -222,12 +222,12 @@ def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypot
     return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
 
 
-def quantities(robot: Robot, finding: Finding, one: Cause) -> list[Quantity]:
+def quantities(robot: Robot, finding: ChannelFinding, one: FoundCause) -> list[Quantity]:
     """Return a cause's parameters with 95 % intervals of the fit, those of one variant after the other."""
     return [each for number in range(len(one.variants)) for each in of_variant(robot, finding, one, number)]
 
 
-def of_variant(robot: Robot, finding: Finding, one: Cause, number: int) -> list[Quantity]:
+def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: int) -> list[Quantity]:
     """Return the parameters of one of a cause's variants, by its number."""
     found, used, variant = finding.estimate, finding.used, one.variants[number]
     known = {
@@ -256,11 +256,11 @@ class Branch:
 
     family: str
     scope: str
-    causes: tuple[Cause, ...]
+    causes: tuple[FoundCause, ...]
     closing: Closing
 
 
-def branches(finding: Finding) -> tuple[Branch, ...]:
+def branches(finding: ChannelFinding) -> tuple[Branch, ...]:
     """Return the branches of a channel, that which closes most first; its causes are in that order too."""
     found = [
         Branch(_family(causes[0]), causes[0].scope, _by_size(finding, causes), finding.closing(causes))
@@ -269,9 +269,9 @@ def branches(finding: Finding) -> tuple[Branch, ...]:
     return tuple(sorted(found, key=lambda one: -one.closing.size))
 
 
-def joined(causes: Sequence[Cause]) -> list[list[Cause]]:
+def joined(causes: Sequence[FoundCause]) -> list[list[FoundCause]]:
     """Return causes by family and scope, those with a joint in common together; of the whole robot, all."""
-    found: list[list[Cause]] = []
+    found: list[list[FoundCause]] = []
     for cause in causes:
         near = [one for one in found if any(_near(cause, other) for other in one)]
         found = [one for one in found if one not in near]
@@ -279,17 +279,17 @@ def joined(causes: Sequence[Cause]) -> list[list[Cause]]:
     return found
 
 
-def _near(one: Cause, other: Cause) -> bool:
+def _near(one: FoundCause, other: FoundCause) -> bool:
     if (_family(one), one.scope) != (_family(other), other.scope):
         return False
     return bool(set(one.joints) & set(other.joints)) or not (one.joints or other.joints)
 
 
-def _family(cause: Cause) -> str:
+def _family(cause: FoundCause) -> str:
     return cause.variants[0].effect.family
 
 
-def _by_size(finding: Finding, causes: Sequence[Cause]) -> tuple[Cause, ...]:
+def _by_size(finding: ChannelFinding, causes: Sequence[FoundCause]) -> tuple[FoundCause, ...]:
     return tuple(sorted(causes, key=lambda one: -finding.closing([one]).size))
 
 

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.gap.regression.evidence import Evidence, evidence
+from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
@@ -31,14 +31,14 @@ _SCREENED = 128  # places, or choices of runs, out of which a screening takes on
 
 
 @dataclass(frozen=True)
-class Prior:
+class HypothesisPrior:
     """The prior of hypotheses: `effects` in each scope and `joints` are as likely as others."""
 
     effects: int
     joints: int
 
     @classmethod
-    def of(cls, candidates: Sequence[Hypothesis]) -> Prior:
+    def of(cls, candidates: Sequence[Hypothesis]) -> HypothesisPrior:
         """Take it from all candidates of a search."""
         joints = {one.joint for one in candidates if one.joint}
         return cls(len({(one.effect, one.scope) for one in candidates}), max(len(joints), 1))
@@ -61,7 +61,7 @@ class Posterior:
     hypotheses: tuple[Hypothesis, ...]
     owner: np.ndarray
     prior: np.ndarray
-    evidence: Evidence
+    evidence: HypothesisEvidence
     misfit: np.ndarray
     limits: Criterion
 
@@ -72,7 +72,7 @@ class Posterior:
         moments: Sequence[Moments],
         found: Sequence[tuple[Hypothesis, Variant]],
         candidates: Sequence[Hypothesis],
-        prior: Prior,
+        prior: HypothesisPrior,
         limits: Criterion,
         misfit: np.ndarray,
     ) -> Posterior:
@@ -202,7 +202,7 @@ class Posterior:
         return [np.flatnonzero(self.owner == place) for place in range(len(self.hypotheses))]
 
 
-def _where_it_explains(system: System, misfit: np.ndarray, seen: Evidence) -> np.ndarray:
+def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvidence) -> np.ndarray:
     """Return (V,) the misfit, squared, of the rows in which a variant explains something; `misfit` (g,) of equations.
 
     What it explains in one half of the equations counts by the misfit there.

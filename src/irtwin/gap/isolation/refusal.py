@@ -11,8 +11,8 @@ from irtwin.document.document import Refused
 from irtwin.effects.effect import NORMAL, Possible, Quantity, Stated
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.finding import Finding, Without, of_variant
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding, Without, of_variant
 from irtwin.gap.regression.hypotheses import CHANGED, Variant, place_of
 from irtwin.robot.description import Robot
 
@@ -34,8 +34,8 @@ NOTHING_REFUSED = Refusals()
 
 
 def find_possible(
-    case: Case, search: Callable[[Set[Without]], tuple[Finding, Floor]], without: Set[Without] = frozenset()
-) -> tuple[Finding, Floor, Refusals]:
+    case: Case, search: Callable[[Set[Without]], tuple[ChannelFinding, Floor]], without: Set[Without] = frozenset()
+) -> tuple[ChannelFinding, Floor, Refusals]:
     """Return what a search `without` some effects finds, where each cause can be true, and what was refused."""
     refused: dict[tuple[str, str | None], Refused] = {}
     least = np.inf
@@ -56,7 +56,7 @@ def find_possible(
     return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.criterion.excess))
 
 
-def _of(robot: Robot, finding: Finding, cause: Cause, stated: Stated) -> list[Refused]:
+def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated) -> list[Refused]:
     refused = []
     for number, variant in enumerate(cause.variants):
         joint = place_of(variant.terms[0]) if cause.joints else None
@@ -80,7 +80,7 @@ def _beyond(one: Quantity, limits: Possible) -> str | None:
     return f"{_value(one)}; {allowed} is possible: {limits.why}"
 
 
-def _below_nothing(finding: Finding, variant: Variant, place: int) -> str | None:
+def _below_nothing(finding: ChannelFinding, variant: Variant, place: int) -> str | None:
     """Say where a change takes more off a coefficient than there was in the reference runs."""
     term, used, system = variant.terms[place], finding.used, finding.system
     key = (variant.effect.id, term.joint, term.link, term.name)

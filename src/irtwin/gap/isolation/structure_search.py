@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from irtwin.gap.isolation.cause import Cause
-from irtwin.gap.isolation.posterior import Posterior, Prior, overlap
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior, overlap
 from irtwin.gap.regression.evidence import visibility
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.moments import Moments
@@ -31,7 +31,7 @@ class Attribution:
     `log_odds` (H,) that it is there beside the causes.
     """
 
-    causes: tuple[Cause, ...]
+    causes: tuple[FoundCause, ...]
     noise: np.ndarray
     hypotheses: tuple[Hypothesis, ...]
     visible: np.ndarray
@@ -47,7 +47,7 @@ def attribute(
     is taken out and looked for anew, and so are two of one joint together. floor: (g,) RMS, 0 or None where unknown;
     """
     candidates = in_scope(candidates, both=system.both)
-    search = _Search(system, candidates, Prior.of(candidates), limits, floor)
+    search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
     tell_step("  what the twin leaves")
     noise = system.residual_rms((), np.ones(len(system.pattern)))
     tell_step("  what the twin leaves")
@@ -70,12 +70,12 @@ def judged(
     limits: Criterion,
     floor: np.ndarray | None,
     noise: np.ndarray,
-) -> tuple[Cause, ...]:
+) -> tuple[FoundCause, ...]:
     """Return the causes of a structure, hypotheses of one shape each, as sure as a system makes them among candidates.
 
     floor, noise: (g,) RMS, 0 or None where unknown, and what the structure leaves.
     """
-    search = _Search(system, candidates, Prior.of(candidates), limits, floor)
+    search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
     return search.causes([(one, one.variants[0]) for one in found], noise)
 
 
@@ -85,7 +85,7 @@ class _Search:
 
     system: System
     candidates: Sequence[Hypothesis]
-    prior: Prior
+    prior: HypothesisPrior
     limits: Criterion
     floor: np.ndarray | None
     tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
@@ -245,15 +245,15 @@ class _Search:
         """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations."""
         return self.system.residual_rms(_columns(found), noise)
 
-    def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[Cause, ...]:
+    def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[FoundCause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
-        parts: dict[tuple[str, str], list[Cause]] = {}
+        parts: dict[tuple[str, str], list[FoundCause]] = {}
         for one in found:
             parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.instead(one, found, noise)))
         return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
 
 
-def _cause(found: Found, posterior: Posterior) -> Cause:
+def _cause(found: Found, posterior: Posterior) -> FoundCause:
     """Return one hypothesis of a structure as a cause, with what could stand in its place.
 
     What the catalogue lacks could, too: its part is no effect's.
@@ -272,7 +272,7 @@ def _cause(found: Found, posterior: Posterior) -> Cause:
     for (effect, _), chance in sure.items():
         rivals[effect] = rivals.get(effect, 0.0) + chance
     rivals.pop(hypothesis.effect, None)
-    return Cause(
+    return FoundCause(
         effect=hypothesis.effect,
         scope=hypothesis.scope,
         joints=(hypothesis.joint,) if hypothesis.joint else (),
@@ -284,7 +284,7 @@ def _cause(found: Found, posterior: Posterior) -> Cause:
     )
 
 
-def _joined(parts: Sequence[Cause]) -> Cause:
+def _joined(parts: Sequence[FoundCause]) -> FoundCause:
     """Return causes of one effect at several joints as one: as sure as at the joint where it is most."""
     first = max(parts, key=lambda one: one.probability)
     return replace(

@@ -12,7 +12,7 @@ import numpy as np
 from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
 from irtwin.gap.isolation.apart import spread
-from irtwin.gap.isolation.finding import Finding, branches
+from irtwin.gap.isolation.finding import ChannelFinding, branches
 from irtwin.gap.repeats.disturbances import Disturbance
 from irtwin.gap.thresholds import Thresholds
 
@@ -23,7 +23,7 @@ MUCH_IS_LEFT, IMPOSSIBLE_NUMBER, DOES_NOT_REPEAT, UNSURE = (
 
 
 def left_open(
-    findings: Sequence[Finding],
+    findings: Sequence[ChannelFinding],
     limits: Thresholds,
     *,
     unmatched: bool = False,
@@ -52,7 +52,7 @@ def left_open(
     return DOES_NOT_REPEAT if nameless else None
 
 
-def most_left(findings: Sequence[Finding]) -> tuple[str, int]:
+def most_left(findings: Sequence[ChannelFinding]) -> tuple[str, int]:
     """Return the channel and the place in it with the largest excess that causes leave, over floor and references."""
     left = {
         (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor)) ** 2)[place])
@@ -92,14 +92,14 @@ def _classes(finding: document.Finding) -> list[list[float]]:
     return list(classes.values())
 
 
-def _spread(findings: Sequence[Finding], unknown: float) -> float:
+def _spread(findings: Sequence[ChannelFinding], unknown: float) -> float:
     """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
     known = [spread(one.apart.plain, one.floor) for one in findings if one.floor is not None]
     return max((unknown if one is None else one for one in known), default=unknown)
 
 
 def _largest(
-    finding: Finding, explained: Sequence[Disturbance], located: Sequence[Disturbance]
+    finding: ChannelFinding, explained: Sequence[Disturbance], located: Sequence[Disturbance]
 ) -> tuple[float, float, float]:
     """Return the largest excess of a channel without causes, of what these leave, and of that less `located`.
 
@@ -114,7 +114,7 @@ def _largest(
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
 
 
-def _excess(some: Sequence[Disturbance], finding: Finding, level: np.ndarray) -> np.ndarray:
+def _excess(some: Sequence[Disturbance], finding: ChannelFinding, level: np.ndarray) -> np.ndarray:
     """Return (g,) the excess that some of what does not repeat makes in the equations of a channel."""
     found = np.zeros(len(finding.places))
     for one in some:

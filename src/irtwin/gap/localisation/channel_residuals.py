@@ -9,10 +9,10 @@ from itertools import compress
 import numpy as np
 
 from irtwin.document.curves import Curves, Followed, FrictionCurve, PlannedMotion, RunError
-from irtwin.document.document import Location
+from irtwin.document.document import GapLocation
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.explained import Explained
-from irtwin.gap.isolation.finding import Finding
+from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.localisation.excess_map import Map, heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import curve, followed
@@ -37,7 +37,7 @@ class ChannelResidual:
     square beyond which a gap lies; `least`: the share of it beyond which a run, or a gap, is worth a word.
     """
 
-    finding: Finding
+    finding: ChannelFinding
     before: list[Trace]
     after: list[Trace]
     touched: list[tuple[str, ...]]
@@ -98,12 +98,12 @@ def _among(place: str | None, joints: tuple[str, ...]) -> bool:
     return place in (None, *joints) or not joints
 
 
-def against_reference(finding: Finding) -> bool:
+def against_reference(finding: ChannelFinding) -> bool:
     """Return whether to hold the observed runs against the others: there are some, and the gap is not in both."""
     return finding.system.both and (not finding.causes or any(cause.scope == CHANGED for cause in finding.causes))
 
 
-def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None) -> list[Location]:
+def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] | None = None) -> list[GapLocation]:
     """Return the ranked places of the gap: of the channel with the largest cause first, else the largest excess.
 
     `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
@@ -111,7 +111,7 @@ def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] 
     channel, place = leaving or (None, None)
     found = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
 
-    def order(pair: tuple[ChannelResidual, list[Location]]) -> tuple[float, float]:
+    def order(pair: tuple[ChannelResidual, list[GapLocation]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
         return -gain, -max((place.excess for place in pair[1]), default=0.0)
 
@@ -134,7 +134,7 @@ def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
     return lines
 
 
-def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[Location], most: int) -> list[Followed]:
+def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[GapLocation], most: int) -> list[Followed]:
     """Return the residual against what it follows, at the foremost places on which no cause acts."""
     lines: list[Followed] = []
     for one in left:
@@ -160,7 +160,7 @@ def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.nda
     return found
 
 
-def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[Location]:
+def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[GapLocation]:
     names = left.finding.places
     best = []
     for k, joint in enumerate(names):
@@ -189,7 +189,7 @@ def _standing_out(left: ChannelResidual, place: int) -> tuple[str, ...]:
     return tuple(sorted(above, key=lambda run: -means[run]))
 
 
-def fitted_values(finding: Finding, *, reference: bool) -> Values:
+def fitted_values(finding: ChannelFinding, *, reference: bool) -> Values:
     """Return the coefficients of the twin alone, without causes, for each run.
 
     They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group.
@@ -211,7 +211,7 @@ def fitted_values(finding: Finding, *, reference: bool) -> Values:
 
 def drawn(
     left: Sequence[ChannelResidual],
-    located: Sequence[Location],
+    located: Sequence[GapLocation],
     planned: PlannedMotion | None,
     friction: tuple[FrictionCurve, ...],
 ) -> Curves:
@@ -230,7 +230,7 @@ def drawn(
     )
 
 
-def _per_run(finding: Finding) -> Iterator[RunError]:
+def _per_run(finding: ChannelFinding) -> Iterator[RunError]:
     judged = finding.held_out
     for group, runs in enumerate(finding.groups):
         for k, joint in enumerate(finding.places):

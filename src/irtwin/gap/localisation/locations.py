@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, Location
+from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, GapLocation
 from irtwin.gap.localisation.excess_map import FEWEST, LOADED, Map
 
 _RESAMPLED = 1000
@@ -26,7 +26,7 @@ def locate(
     acts: Map | None = None,
     leaving: int | None = None,
     seed: int = 0,
-) -> list[Location]:
+) -> list[GapLocation]:
     """Return the places whose excess over the `level` (g, R) is beyond chance, the foremost first; `runs` are empty.
 
     joints, follows: of each of the g places its joint and the variable that its residual follows. The false discovery
@@ -59,7 +59,7 @@ def locate(
     whole = share[:, : seen.parts].sum(axis=1)
     found.sort(key=lambda at: (not acting[at[0]], -whole[at[0]], -rank[at]))
     return [
-        Location(
+        GapLocation(
             channel=channel,
             joint=joints[place],
             regime=seen.regimes[r],

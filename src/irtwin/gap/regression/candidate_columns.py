@@ -10,7 +10,7 @@ import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect, Predicted
 from irtwin.effects.stack import side_by_side
-from irtwin.gap.regression.hypotheses import Column
+from irtwin.gap.regression.hypotheses import CandidateColumn
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -128,7 +128,7 @@ def free_columns(effect: Effect, robot: Robot, motion: Motion, predicted: Predic
     return columns if not any(term.fixed for term in terms) else columns[..., [not term.fixed for term in terms]]
 
 
-def candidate_pattern(robot: Robot, effects: Sequence[Effect], columns: Sequence[Column]) -> np.ndarray:
+def candidate_pattern(robot: Robot, effects: Sequence[Effect], columns: Sequence[CandidateColumn]) -> np.ndarray:
     """Return (n, M) whether a candidate column can act on a joint, found at a few random states."""
     rng = np.random.default_rng(0)
     shape = (16, len(robot.joints))

@@ -25,7 +25,7 @@ _FEW = 4.0  # groups' worth of weight that the spread of the other variants has 
 
 
 @dataclass(frozen=True)
-class Evidence:
+class HypothesisEvidence:
     """V variants beside a fit, G parts of the equations (`System.parts`); squares in units of the noise.
 
     explained (V,); said, missed (V, G): what each adds to a part, and the score that this leaves there; values (V, k
@@ -70,7 +70,7 @@ class Evidence:
 
 def evidence(
     system: System, moments: Sequence[Moments], chosen: Sequence[int], variants: Sequence[Variant]
-) -> Evidence:
+) -> HypothesisEvidence:
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
     total = Summed(moments)
     asked = asked_columns(total, [k for variant in variants for k in variant.columns])
@@ -96,7 +96,7 @@ def evidence(
             missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
     shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
-    return Evidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
+    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
 
 
 def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Variant]) -> np.ndarray:

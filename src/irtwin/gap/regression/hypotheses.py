@@ -36,7 +36,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Column:
+class CandidateColumn:
     """One candidate column: the k-th of an effect, or (k None) what all its known coefficients give."""
 
     effect: Effect
@@ -49,20 +49,20 @@ def place_of(term: Term) -> str | None:
     return term.joint if term.link is None else None
 
 
-def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[Column, ...]:
+def candidate_columns(robot: Robot, effects: Sequence[Effect]) -> tuple[CandidateColumn, ...]:
     """Return the columns of effects with their terms; those of an effect without any free term become one."""
-    columns: list[Column] = []
+    columns: list[CandidateColumn] = []
     for effect in effects:
         terms = effect.terms(robot)
         if terms and all(term.fixed for term in terms):
-            columns.append(Column(effect, None, Term("share", "1", spread=1.0, lowest=0.0)))
+            columns.append(CandidateColumn(effect, None, Term("share", "1", spread=1.0, lowest=0.0)))
         else:
-            columns.extend(Column(effect, k, term) for k, term in enumerate(terms) if not term.fixed)
+            columns.extend(CandidateColumn(effect, k, term) for k, term in enumerate(terms) if not term.fixed)
     return tuple(columns)
 
 
 def hypotheses(
-    columns: Sequence[Column], first: int, scope: str, *, inside: Set[tuple[str, str | None]] = frozenset()
+    columns: Sequence[CandidateColumn], first: int, scope: str, *, inside: Set[tuple[str, str | None]] = frozenset()
 ) -> list[Hypothesis]:
     """Group candidate columns (the first of index `first`) into hypotheses of one scope, joint by joint.
 

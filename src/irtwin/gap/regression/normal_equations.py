@@ -15,7 +15,7 @@ import numpy as np
 from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.hypotheses import Column
+from irtwin.gap.regression.hypotheses import CandidateColumn
 from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, Summed, numbers
 from irtwin.identification.accumulate import Block
 
@@ -39,7 +39,7 @@ class System:
     """
 
     terms: tuple[tuple[Effect, Term], ...]
-    columns: tuple[Column, ...]
+    columns: tuple[CandidateColumn, ...]
     pattern: np.ndarray
     blocks: tuple[Block, ...]
     group: np.ndarray
@@ -127,7 +127,7 @@ class System:
         """The index of the first candidate column that is zero outside observed runs."""
         return self.base + len(self.columns)
 
-    def column(self, k: int) -> Column:
+    def column(self, k: int) -> CandidateColumn:
         """Return the candidate column of an index, as it is or as a change."""
         return self.columns[(k - self.base) % len(self.columns)]
 

@@ -13,7 +13,7 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.data.noise_floor import sensor_noise
 from irtwin.gap.repeats.lines import Line, lines
-from irtwin.gap.repeats.series import Series, following
+from irtwin.gap.repeats.series import EvenSeries, following
 from irtwin.gap.repeats.slow import creep, from_start, slow
 from irtwin.gap.repeats.switching import Switching, Watched, switching
 from irtwin.gap.thresholds import Matters
@@ -76,7 +76,7 @@ class _Channel:
     name: str
     joint: str | None
     unit: str
-    series: Sequence[Series]
+    series: Sequence[EvenSeries]
     pairs: Sequence[Pair]
     noise: float
     load: Switching | None = None
@@ -107,7 +107,7 @@ class _Channel:
             Quantity("A", self.joint, line.amplitude, self.unit, *line.interval),
         )
 
-    def _slow(self, series: Sequence[Series], tests: int) -> list[Located]:
+    def _slow(self, series: Sequence[EvenSeries], tests: int) -> list[Located]:
         """Return the drift and the offset between runs; what drifts is held against the offset that it began with."""
         found = self._most(DRIFT, f"{self.unit}/s", [slow(one)[1] for one in series], tests)
         flat = [from_start(one) for one in series] if found else series
@@ -138,13 +138,13 @@ def _torque(case: Case, run: Run, motion: Motion) -> np.ndarray:
     return interpolated(signals.time, values, motion.time)
 
 
-def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> Series:
+def _of_joint(pair: Pair, raw: Mapping[str, np.ndarray], joint: int) -> EvenSeries:
     """Return what two runs differ by in a joint's torque, beside what follows its motion."""
     values = pair.of(*(raw[name][:, joint] for name in _names(pair)))
-    return Series(pair.time, values, following(pair.first, joint)[pair.inside]).tamed()
+    return EvenSeries(pair.time, values, following(pair.first, joint)[pair.inside]).tamed()
 
 
-def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Series], Switching | None]:
+def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[EvenSeries], Switching | None]:
     """Return what two runs differ by in power, beside what the motion may and a drift, and the load that switches."""
     motions = {motion.run: motion for pair in pairs for motion in (pair.first, pair.second)}
     by_torque = all(motion.torque is not None for motion in motions.values())  # the same columns in all of them
@@ -158,7 +158,7 @@ def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Seri
     return [creep(one, each.squares).tamed() for one, each in zip(found, watched, strict=True)], load
 
 
-def _watched(pair: Pair, runs: Mapping[str, Series]) -> Watched:
+def _watched(pair: Pair, runs: Mapping[str, EvenSeries]) -> Watched:
     """Return the power of two runs, beside what their motion may take of their difference, and of their sum."""
     first, second = (runs[name].values for name in _names(pair))
     time, inside, torque = pair.time, pair.inside, pair.first.torque
@@ -168,12 +168,12 @@ def _watched(pair: Pair, runs: Mapping[str, Series]) -> Watched:
     taken = [*slow, runs[pair.first.run].beside[inside]]
     apart, total = pair.of(first, second), pair.of(first, -second)
     return Watched(
-        _names(pair), pair.shift, Series(time, apart, np.column_stack(beside)),
-        Series(time, total, np.column_stack(taken)), squares,
+        _names(pair), pair.shift, EvenSeries(time, apart, np.column_stack(beside)),
+        EvenSeries(time, total, np.column_stack(taken)), squares,
     )  # fmt: skip
 
 
-def _of_run(run: Run, motion: Motion, by_torque: bool) -> Series:
+def _of_run(run: Run, motion: Motion, by_torque: bool) -> EvenSeries:
     """Return a run's power as logged, at its motion's times, beside what that may take, and its torque if it counts."""
     assert run.signals.power is not None
     values = interpolated(run.signals.time, run.signals.power, motion.time)
@@ -182,7 +182,7 @@ def _of_run(run: Run, motion: Motion, by_torque: bool) -> Series:
         beside += [*(motion.torque * motion.dq).T, *(motion.torque**2).T]
     else:
         beside += [*(motion.dq * motion.ddq).T, *(motion.ddq**2).T, *(motion.dq * np.cos(motion.q)).T]
-    return Series(motion.time, values, np.column_stack(beside))
+    return EvenSeries(motion.time, values, np.column_stack(beside))
 
 
 def _in_band(left: np.ndarray, pair: Pair) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from irtwin.effects.effect import NORMAL
-from irtwin.gap.repeats.series import Series, waves
+from irtwin.gap.repeats.series import EvenSeries, waves
 
 _PERIODS = 3  # of a line in a run at least: the window blurs what is slower
 _HIGHEST = 0.95  # of half the sampling rate
@@ -48,7 +48,7 @@ class Line:
         return self.amplitude**2 / 2
 
 
-def lines(series: Sequence[Series], tests: int) -> tuple[list[Line], list[Series]]:
+def lines(series: Sequence[EvenSeries], tests: int) -> tuple[list[Line], list[EvenSeries]]:
     """Return the lines that all series show together, the strongest first, and the series with these beside them.
 
     Each series is the difference of two runs. `tests`: how many channels are searched, for which p is adjusted. A line
@@ -73,7 +73,7 @@ def lines(series: Sequence[Series], tests: int) -> tuple[list[Line], list[Series
     return found, series
 
 
-def _grid(series: Sequence[Series]) -> np.ndarray:
+def _grid(series: Sequence[EvenSeries]) -> np.ndarray:
     """Return the frequencies to try, (F,) Hz: even, so that those of a run cut short are told apart too."""
     seconds = [one.seconds for one in series]
     step = 1 / (_FINE * max(seconds))
@@ -81,7 +81,7 @@ def _grid(series: Sequence[Series]) -> np.ndarray:
     return np.asarray(step * np.arange(np.ceil(_PERIODS / min(seconds) / step), np.floor(highest / step) + 1))
 
 
-def _power(one: Series, grid: np.ndarray) -> np.ndarray:
+def _power(one: EvenSeries, grid: np.ndarray) -> np.ndarray:
     """Return the power that what is left of a series has at even frequencies, (F,): of white noise its mean square.
 
     Nothing, where the columns beside it leave less than `_FREE` of a wave.
@@ -114,11 +114,11 @@ def _noise(power: np.ndarray, grid: np.ndarray) -> np.ndarray:
 
 
 def _line(
-    series: Sequence[Series], grid: np.ndarray, best: int, noise: np.ndarray
-) -> tuple[tuple[float, float, float, tuple[float, float]], list[Series]]:
+    series: Sequence[EvenSeries], grid: np.ndarray, best: int, noise: np.ndarray
+) -> tuple[tuple[float, float, float, tuple[float, float]], list[EvenSeries]]:
     """Place a line between the points of the grid; return its frequency and amplitude, and the series beside it."""
 
-    def beside(frequency: float) -> list[Series]:
+    def beside(frequency: float) -> list[EvenSeries]:
         return [one.with_columns(*waves(one.time, frequency)) for one in series]
 
     def missed(frequency: float) -> float:

@@ -16,7 +16,7 @@ _WINDOW = 5.0  # times the correlation time: further lags add noise alone (Sokal
 
 
 @dataclass(frozen=True)
-class Series:
+class EvenSeries:
     """Even samples: `time` (N,) s, `values` (N,), and `beside` (N, m), columns that may explain any part of them."""
 
     time: np.ndarray
@@ -33,7 +33,7 @@ class Series:
         """Samples per second, Hz."""
         return (len(self.time) - 1) / self.seconds
 
-    def with_columns(self, *columns: np.ndarray) -> Series:
+    def with_columns(self, *columns: np.ndarray) -> EvenSeries:
         """Return the series with more columns beside it, (N,) each."""
         return replace(self, beside=np.column_stack([self.beside, *columns]))
 
@@ -54,7 +54,7 @@ class Series:
         basis = self.basis()
         return np.asarray(self.values - basis @ (basis.T @ self.values))
 
-    def tamed(self) -> Series:
+    def tamed(self) -> EvenSeries:
         """Return the series with wild samples cut: what is far beyond the spread of what is left."""
         left = self.left()
         most = _WILD * SPREAD * float(np.median(np.abs(left)))

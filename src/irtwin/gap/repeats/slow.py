@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from irtwin.gap.repeats.series import Series, correlation_samples
+from irtwin.gap.repeats.series import EvenSeries, correlation_samples
 
 _SLOW = 2  # columns of a series: a constant, and how it drifts, stand first beside it
 _CONSTANTS = (0.1, 0.25, 0.6)  # times the run's length: a longer one is a ramp
 _DRIFT = 1  # the column of the drift: a constant stands before it
 
 
-def slow(series: Series) -> np.ndarray:
+def slow(series: EvenSeries) -> np.ndarray:
     """Return of the offset of a difference, and of its drift a second: value, deviation, p, mean square in one run.
 
     (2, 4); what is left remembers, so its samples count for fewer.
@@ -33,14 +33,14 @@ def slow(series: Series) -> np.ndarray:
     return np.column_stack([values, deviations, p, values**2 / 2 * [1.0, np.var(beside[:, 1])]])
 
 
-def from_start(series: Series) -> Series:
+def from_start(series: EvenSeries) -> EvenSeries:
     """Return a series whose offset is that where it begins, before anything has drifted."""
     beside = series.beside.copy()
     beside[:, 1] -= beside[0, 1]
     return replace(series, beside=beside)
 
 
-def creep(series: Series, squares: np.ndarray | None) -> Series:
+def creep(series: EvenSeries, squares: np.ndarray | None) -> EvenSeries:
     """Return a difference with its likeliest drift beside it, by the least description.
 
     The drift's column rises by 1 a second, in the mean: its coefficient is the slope of the nearest straight line.

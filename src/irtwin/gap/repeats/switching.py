@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.gap.repeats.series import SPREAD, Series, correlation_samples
+from irtwin.gap.repeats.series import SPREAD, EvenSeries, correlation_samples
 from irtwin.gap.repeats.slow import creep
 
 _ROUNDS = 7  # of fitting what the motion takes and what is on, in turn
@@ -29,8 +29,8 @@ class Watched:
 
     names: tuple[str, str]
     shift: float
-    difference: Series
-    total: Series
+    difference: EvenSeries
+    total: EvenSeries
     squares: np.ndarray | None
 
 
@@ -66,7 +66,7 @@ class Switching:
         return [float(value) for times in on for value in np.diff(times)]
 
 
-def switching(pairs: Sequence[Watched], runs: Mapping[str, Series]) -> Switching | None:
+def switching(pairs: Sequence[Watched], runs: Mapping[str, EvenSeries]) -> Switching | None:
     """Return the load that switches; None where none explains most of what differs, or a drift says as much.
 
     `runs`: each run's power by name, with columns beside it that the motion may take.
@@ -77,21 +77,23 @@ def switching(pairs: Sequence[Watched], runs: Mapping[str, Series]) -> Switching
     return load if load is not None and load.explained > 0.5 and _worth(load, pairs, watched) > 0 else None
 
 
-def _worth(load: Switching, pairs: Sequence[Watched], runs: Mapping[str, Series]) -> float:
+def _worth(load: Switching, pairs: Sequence[Watched], runs: Mapping[str, EvenSeries]) -> float:
     """Return what a load saves in the description of the runs, beside how they drift, less what its course costs."""
     none = {name: np.zeros(len(one.time)) for name, one in runs.items()}
     before, after = ([one for pair in pairs for one in _left_of(pair, states, runs)] for states in (none, load.states))
     return saved(before, after) - load.cost
 
 
-def _left_of(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> list[np.ndarray]:
+def _left_of(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, EvenSeries]) -> list[np.ndarray]:
     """Return what a load and a drift leave of the difference of two runs, and of their sum."""
     first, second = _on_first_clock(pair, states, runs)
     both = ((pair.difference, first - second), (pair.total, first + second))
     return [creep(series.with_columns(column), pair.squares).left() for series, column in both]
 
 
-def _followed(pairs: Sequence[Watched], runs: Mapping[str, Series], states: dict[str, np.ndarray]) -> Switching | None:
+def _followed(
+    pairs: Sequence[Watched], runs: Mapping[str, EvenSeries], states: dict[str, np.ndarray]
+) -> Switching | None:
     """Return the load found from a first guess of its course: when it is on, and how high it is, in turn."""
     level, deviation = _level(pairs, states, runs)
     for _ in range(_ROUNDS):
@@ -111,7 +113,7 @@ def _followed(pairs: Sequence[Watched], runs: Mapping[str, Series], states: dict
     return Switching(level, deviation, states, edges, bins, _explained(pairs, states, runs))
 
 
-def _beside(series: Series, load: Sequence[np.ndarray]) -> np.ndarray:
+def _beside(series: EvenSeries, load: Sequence[np.ndarray]) -> np.ndarray:
     """Return the values (N,) without what follows the motion, which is fitted beside the columns of a load."""
     motion = series.with_columns(*load).coefficients()[: series.beside.shape[1]]
     return np.asarray(series.values - series.beside @ motion)
@@ -119,7 +121,7 @@ def _beside(series: Series, load: Sequence[np.ndarray]) -> np.ndarray:
 
 def _on(
     pair: Watched,
-    runs: Mapping[str, Series],
+    runs: Mapping[str, EvenSeries],
     left: Mapping[str, np.ndarray],
     differ: np.ndarray,
     level: float,
@@ -153,7 +155,7 @@ def _on(
     return found
 
 
-def _bin(one: Series) -> int:
+def _bin(one: EvenSeries) -> int:
     """Return the samples of a bin."""
     return max(1, round(_BIN * one.rate), -(-len(one.time) // _MOST_BINS))
 
@@ -176,26 +178,28 @@ def _edges(time: np.ndarray, state: np.ndarray) -> Edges:
     return [(float(time[k + 1]), float(state[k + 1] - state[k])) for k in np.flatnonzero(np.diff(state))]
 
 
-def _stacked(runs: Mapping[str, Series], states: Mapping[str, np.ndarray]) -> Series:
+def _stacked(runs: Mapping[str, EvenSeries], states: Mapping[str, np.ndarray]) -> EvenSeries:
     """Return all runs one after the other, with what is on as the last column."""
     parts = [runs[name].with_columns(state) for name, state in states.items()]
-    return Series(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "values", "beside")))
+    return EvenSeries(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "values", "beside"))
+    )
 
 
-def _left(runs: Mapping[str, Series], states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _left(runs: Mapping[str, EvenSeries], states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return what the motion does not take of each run's power, fitted to all beside what is on."""
     motion = _stacked(runs, states).coefficients()[:-1]
     return {name: runs[name].values - runs[name].beside @ motion for name in states}
 
 
-def _apart(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> np.ndarray:
+def _apart(pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, EvenSeries]) -> np.ndarray:
     """Return where the first run of a pair has the load and the second not (1), or the other way (-1)."""
     first, second = _on_first_clock(pair, states, runs)
     return np.asarray(first - second)
 
 
 def _on_first_clock(
-    pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, Series]
+    pair: Watched, states: Mapping[str, np.ndarray], runs: Mapping[str, EvenSeries]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return when either run of a pair has the load, (N,) each, at the times of their difference."""
     time = pair.difference.time
@@ -206,7 +210,7 @@ def _on_first_clock(
     return np.asarray(first), np.asarray(second)
 
 
-def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]) -> float:
+def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, EvenSeries]) -> float:
     """Return the part of what differs, beyond white noise and what follows the motion, that the states explain."""
     left = np.zeros(2)
     for pair in pairs:
@@ -218,13 +222,13 @@ def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs:
 
 
 def _level(
-    pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, Series]
+    pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs: Mapping[str, EvenSeries]
 ) -> tuple[float, float]:
     """Return what is taken more while on, W, with its deviation, by what differs; what is left remembers."""
     right, squares, noise = 0.0, 0.0, 0.0
     for pair in pairs:
         column = _apart(pair, states, runs)
-        own = Series(pair.difference.time, column, pair.difference.beside).left()
+        own = EvenSeries(pair.difference.time, column, pair.difference.beside).left()
         left = pair.difference.with_columns(column).left()
         right += float(own @ pair.difference.values)
         squares += float(own @ own)
@@ -246,7 +250,7 @@ def _saved(before: np.ndarray, after: np.ndarray) -> float:
     return len(after) / (2 * correlation_samples(after)) * float(np.log(ratio))
 
 
-def _two_levels(runs: Mapping[str, Series]) -> dict[str, np.ndarray]:
+def _two_levels(runs: Mapping[str, EvenSeries]) -> dict[str, np.ndarray]:
     """Return where each run's power is on the upper of two levels, (N,) of 0 and 1, beside what the motion takes."""
     states = {name: np.zeros(len(one.time)) for name, one in runs.items()}
     for _ in range(_ROUNDS):

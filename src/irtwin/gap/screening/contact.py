@@ -14,7 +14,7 @@ import numpy as np
 
 from irtwin.effects.friction import SLOW
 from irtwin.effects.load import ExternalContact
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
@@ -30,7 +30,7 @@ Clock = tuple[float, float]
 """Start and stop of the run's clock, s."""
 
 
-def contact(robot: Robot, left: Sequence[Remainder], noise: np.ndarray) -> ExternalContact | None:
+def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> ExternalContact | None:
     """Return the clearest contact, in all observed runs that show its force at its clock, to be tried as a cause.
 
     None of an arm of one or two joints, of which hardly any agree. noise: (n,) RMS of each joint's residual, N m.
@@ -83,7 +83,7 @@ class _Run:
     What friction explains is taken out first: it differs from run to run.
     """
 
-    def __init__(self, left: Remainder, jacobian: np.ndarray, noise: np.ndarray):
+    def __init__(self, left: RunResidual, jacobian: np.ndarray, noise: np.ndarray):
         """Take a remainder, the transposed Jacobian (N, n, 3) of its motion, and the noise (n,) N m."""
         motion = left.motion
         self.name, self.time = motion.run, motion.time

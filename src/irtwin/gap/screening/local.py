@@ -13,7 +13,7 @@ import numpy as np
 
 from irtwin.effects.friction import sharp_sign
 from irtwin.effects.local import LocalEffect
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
@@ -21,7 +21,7 @@ _CELLS = 160  # of angle over a joint's way, in either direction: four for the w
 _SLOW = (0.03, 0.15)  # of the joint's largest speed: over so much, friction that sticks lets go
 
 
-def local_effects(robot: Robot, effects: Sequence[LocalEffect], left: Sequence[Remainder]) -> Iterator[LocalEffect]:
+def local_effects(robot: Robot, effects: Sequence[LocalEffect], left: Sequence[RunResidual]) -> Iterator[LocalEffect]:
     """Yield each effect at each joint that moves, in the places that explain most of what is left in observed runs."""
     observed = [one for one in left if one.observed]
     for k, joint in enumerate(robot.joints):
@@ -52,7 +52,7 @@ class _Passed:
     smooth: np.ndarray
 
     @classmethod
-    def of(cls, left: Sequence[Remainder], joint: int) -> _Passed | None:
+    def of(cls, left: Sequence[RunResidual], joint: int) -> _Passed | None:
         """Sum the joint's residual; None where it does not move, or nothing is left."""
         q, dq, ddq, residual = (
             np.concatenate([values[:, joint] for values in each])

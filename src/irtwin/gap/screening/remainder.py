@@ -16,7 +16,7 @@ from irtwin.signals.motion import Motion
 
 
 @dataclass(frozen=True)
-class Remainder:
+class RunResidual:
     """What the twin left of one run's torque: residual (N, n) N m, NaN where undecided."""
 
     motion: Motion
@@ -26,7 +26,7 @@ class Remainder:
 
 def remainders(
     case: Case, stack: Stack, values: np.ndarray, load: tuple[Payload, np.ndarray] | None = None
-) -> list[Remainder]:
+) -> list[RunResidual]:
     """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any."""
     left = []
     for motion in case.with_torque:
@@ -35,7 +35,7 @@ def remainders(
         residual = torque_residual(stack, motion, values)
         if load is not None and load[0].acts_in(motion):
             residual = residual - as_filtered(motion, load[0].columns(case.robot, motion) @ load[1])
-        left.append(Remainder(_every(motion, step), residual[::step], motion.run in case.observed))
+        left.append(RunResidual(_every(motion, step), residual[::step], motion.run in case.observed))
     return left
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from irtwin.effects.effect import Effect
 from irtwin.effects.transmission import SLOW_ORDERS, TorqueRipple
-from irtwin.gap.screening.remainder import Remainder
+from irtwin.gap.screening.remainder import RunResidual
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
@@ -16,7 +16,7 @@ _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at 
 _FINE = 4  # points of the spectrum for each that is independent
 
 
-def known_ripples(robot: Robot, left: Sequence[Remainder]) -> list[Effect]:
+def known_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[Effect]:
     """Return the ripples of known orders, each at the joints that move through one of its periods in observed runs.
 
     Within less than a period a ripple is any curve over the angle: also that of a hose, which stiffens.
@@ -32,7 +32,7 @@ def known_ripples(robot: Robot, left: Sequence[Remainder]) -> list[Effect]:
     return found
 
 
-def fast_ripples(robot: Robot, left: Sequence[Remainder]) -> list[TorqueRipple]:
+def fast_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[TorqueRipple]:
     """Return for each joint the ripple beyond the slow orders that explains most of its residual in observed runs.
 
     Slow orders are tried one by one; of the fast ones there are too many, and a line is told from its neighbours only

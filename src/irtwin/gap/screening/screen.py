@@ -20,7 +20,7 @@ from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
 from irtwin.gap.screening.payloads import beside, untold_payload
-from irtwin.gap.screening.remainder import Remainder, remainders
+from irtwin.gap.screening.remainder import RunResidual, remainders
 from irtwin.gap.screening.ripples import fast_ripples, known_ripples
 from irtwin.identification.progress import tell_step
 from irtwin.identification.two_processes import begun
@@ -105,7 +105,7 @@ def _apart_from(system: System, touch: ExternalContact | None) -> System:
     return replace(system, blocks=blocks, group=system.group[kept], observed=system.observed[kept])
 
 
-def _beside(case: Case, stack: Stack, system: System, noise: np.ndarray, payload: Payload) -> list[Remainder] | None:
+def _beside(case: Case, stack: Stack, system: System, noise: np.ndarray, payload: Payload) -> list[RunResidual] | None:
     """Return what the twin and the payload leave of the runs."""
     both = beside(case.robot, system, noise, payload)
     if both is None:
@@ -114,7 +114,7 @@ def _beside(case: Case, stack: Stack, system: System, noise: np.ndarray, payload
     return remainders(case, stack, twin_values(system, values), (payload, load))
 
 
-def _rms(left: list[Remainder], noise: np.ndarray) -> np.ndarray:
+def _rms(left: list[RunResidual], noise: np.ndarray) -> np.ndarray:
     """Return the RMS (n,) of what is left of each joint; `noise` where nothing is known, as the joint never moves."""
     residual = np.concatenate([one.residual for one in left])
     known = np.isfinite(residual)

@@ -19,7 +19,7 @@ from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
-from irtwin.knowledge.store.table import Table
+from irtwin.knowledge.store.table import AnswerTable
 from irtwin.knowledge.vocabulary import IRT
 from irtwin.resources import MOST_BYTES, Files, Resources, shipped
 
@@ -30,7 +30,7 @@ _QUERY_FORM = re.compile(r"\b(select|ask|construct|describe|prefix|base|insert|d
 
 
 @dataclass(frozen=True)
-class Question:
+class NamedQuery:
     """A named SPARQL query; `question` is what it answers, in words.
 
     One that is `of_robot` can be asked of one robot, its variable `?arm`, instead of all. `concluded` are the classes
@@ -46,19 +46,19 @@ class Question:
     text: str
 
 
-def named_questions(resources: Resources | None = None) -> Mapping[str, Question]:
+def named_questions(resources: Resources | None = None) -> Mapping[str, NamedQuery]:
     """Return the questions that have a name, in the order of their themes and names; those that ship if None."""
     return _questions((resources or shipped()).of("questions"))
 
 
 @lru_cache(maxsize=16)
-def _questions(files: Files) -> Mapping[str, Question]:
+def _questions(files: Files) -> Mapping[str, NamedQuery]:
     questions = [read_question(file.path) for file in files]
     questions.sort(key=lambda question: (THEMES.index(question.theme), question.name))
     return {question.name: question for question in questions}
 
 
-def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Table:
+def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> AnswerTable:
     """Answer a named question, of all robots or of the one called `robot`, or a question in SPARQL.
 
     Where SPARQL has no answer, its faults name terms that the ontology lacks. InputError where the question or the
@@ -102,13 +102,13 @@ def robot_named(graph: KnowledgeGraph, name: str | None) -> str:
     return str(arms[name])
 
 
-def to_json(table: Table) -> str:
+def to_json(table: AnswerTable) -> str:
     """Write the rows as a JSON array of objects; what is unbound or not finite is null."""
     rows = [{name: _plain(value) for name, value in row.items()} for row in table]
     return json.dumps(rows, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def to_csv(table: Table) -> str:
+def to_csv(table: AnswerTable) -> str:
     """Write the rows as CSV with a header (RFC 4180); what is unbound is empty."""
     out = io.StringIO()
     writer = csv.writer(out)
@@ -125,7 +125,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def read_question(file: Path) -> Question:
+def read_question(file: Path) -> NamedQuery:
     """Read a named question. Raises InputError where it is not UTF-8, or its header lacks something."""
     text = read_text(file, MOST_BYTES)
     header = dict(_HEADER.findall(text))
@@ -136,7 +136,7 @@ def read_question(file: Path) -> Question:
         raise InputError(f"{file}: its theme is {header['theme']!r}; take one of {', '.join(THEMES)}")
     concluded = tuple(header.get("concluded", "").split(", ")) if "concluded" in header else ()
     of_robot = header.get("of") == "robot"
-    return Question(file.stem, header["title"], header["question"], header["theme"], of_robot, concluded, text)
+    return NamedQuery(file.stem, header["title"], header["question"], header["theme"], of_robot, concluded, text)
 
 
 def _text(question: str, resources: Resources) -> str:

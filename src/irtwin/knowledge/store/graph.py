@@ -32,7 +32,7 @@ from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.syntax_error import in_words
-from irtwin.knowledge.store.table import Table, table_of
+from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, by_doing, check
@@ -320,7 +320,7 @@ class KnowledgeGraph:
         return self._store.quads_for_pattern(None, None, None, NamedNode(name))
 
     @telling
-    def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> Table:
+    def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> AnswerTable:
         """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
 
         `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
@@ -334,7 +334,7 @@ class KnowledgeGraph:
             kept = table_of(self.answer(text, faults=faults), faults)
             if len(kept) * len(kept.columns) <= _MOST_KEPT:
                 answers.keep(kept, text)
-        return Table(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
+        return AnswerTable(kept.columns, tuple(map(dict, kept.rows)), kept.faults)  # rows that may be written to
 
     @telling
     def construct(self, text: str) -> set[Triple]:

@@ -20,7 +20,7 @@ _FLOATS = {XSD + name for name in ("double", "float", "decimal")}
 
 
 @dataclass(frozen=True)
-class Table(Sequence[Row]):
+class AnswerTable(Sequence[Row]):
     """The rows that answer a query, with its variables in the order of the query.
 
     `faults` says why functions of the query had no answer, each reason once.
@@ -45,15 +45,15 @@ class Table(Sequence[Row]):
         return len(self.rows)
 
 
-def table_of(answer: QuerySolutions | QueryBoolean | QueryTriples, faults: Collection[str] = ()) -> Table:
+def table_of(answer: QuerySolutions | QueryBoolean | QueryTriples, faults: Collection[str] = ()) -> AnswerTable:
     """Return an answer as a table; `faults` may be told while its rows are found. InputError where it has too many."""
     if isinstance(answer, QueryBoolean):
-        return Table(("answer",), ({"answer": bool(answer)},))
+        return AnswerTable(("answer",), ({"answer": bool(answer)},))
     if isinstance(answer, QuerySolutions):
         columns = tuple(variable.value for variable in answer.variables)
-        return Table(columns, tuple(_row(columns, solution) for solution in _counted(answer)), faults)
+        return AnswerTable(columns, tuple(_row(columns, solution) for solution in _counted(answer)), faults)
     columns = ("subject", "predicate", "object")
-    return Table(columns, tuple(_row(columns, triple) for triple in _counted(answer)))
+    return AnswerTable(columns, tuple(_row(columns, triple) for triple in _counted(answer)))
 
 
 def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from irtwin.document.curves import Apart, Curves
+from irtwin.document.curves import Curves, FarthestApart
 from irtwin.document.document import FALSE_PLACES, LEAST_SHARE, LIKELY, Document
 from irtwin.errors import InputError
 from irtwin.json_text import parse_json
@@ -69,7 +69,7 @@ def render_gap(
     write(out, _page(resources, answers, bindings, curves, picture).encode())
 
 
-def _picture(apart: Apart, robot: Robot, meshes: Mapping[str, Mesh]) -> Fragment:
+def _picture(apart: FarthestApart, robot: Robot, meshes: Mapping[str, Mesh]) -> Fragment:
     before, after = (wording.quantity(1e3 * off, "mm", 2) for off in (apart.off_before, apart.off_after))
     poses = {f"The simulator as it is: {before} off": np.array(apart.before)}
     if apart.after != apart.before:

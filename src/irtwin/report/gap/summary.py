@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
 from irtwin.document.document import Cause, Document, pooled
-from irtwin.knowledge.store.table import Row, Table
+from irtwin.knowledge.store.table import AnswerTable, Row
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _STEPS = 3  # motions to log that are told
 
 
-def gap(diagnosis: Document) -> Table:
+def gap(diagnosis: Document) -> AnswerTable:
     """Return the gap on runs outside the fit: torque, power and position as RMSE, energy as its error."""
     changes = (
         ("torque (RMSE)", diagnosis.shrink.torque_rmse, "N m"),  # of joints that slide, N
@@ -31,10 +31,10 @@ def gap(diagnosis: Document) -> Table:
         for name, one, unit in changes
         if one is not None
     ]
-    return Table(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
+    return AnswerTable(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
 
 
-def runs(curves: Curves) -> Table:
+def runs(curves: Curves) -> AnswerTable:
     """Return the tracking error of each run that was played, over its joints and at the flange."""
     columns = ("run", "tracking error, rad", "with the causes", "flange, m", "with the causes, m")
     of_run: dict[str, list[RunError]] = {}
@@ -45,14 +45,14 @@ def runs(curves: Curves) -> Table:
         (run, *(None if value is None else _short(value) for one in some for value in (one.before, one.after)))
         for run, some in of_run.items()
     ]
-    return Table(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+    return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
 
 
-def horizons(diagnosis: Document) -> Table:
+def horizons(diagnosis: Document) -> AnswerTable:
     """Return how tracking error grows after a run is begun anew as the robot was."""
     columns = ("s since it was begun anew", "tracking error, rad", "with the causes, rad")
     rows = [(one.seconds, _short(one.before), _short(one.after)) for one in diagnosis.horizons or ()]
-    return Table(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+    return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
 
 
 def filtered(diagnosis: Document) -> list[str]:
@@ -61,7 +61,7 @@ def filtered(diagnosis: Document) -> list[str]:
     return [f"Signals were low-pass filtered at {cutoff.hz:.{_DIGITS}g} Hz ({cutoff.why})."] if cutoff else []
 
 
-def causes(diagnosis: Document) -> Table:
+def causes(diagnosis: Document) -> AnswerTable:
     """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals.
 
     Beside a simulator's model the value is the change from its number to the robot's.
@@ -70,7 +70,7 @@ def causes(diagnosis: Document) -> Table:
     beside = diagnosis.simulator is not None
     value = ("simulator", "robot", "change") if beside else ("value",)
     columns = ("cause", "joints", "sure, %", "parameter", *value, "95 % from", "to", "unit")
-    return Table(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))
+    return AnswerTable(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))
 
 
 def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pyoxigraph import QuerySolutions, Store
 
-from irtwin.knowledge.questions.queries import THEMES, Question, named_questions
+from irtwin.knowledge.questions.queries import THEMES, NamedQuery, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report import wording
 from irtwin.report.energy.page import content_policy
@@ -35,7 +35,7 @@ ASKED_BY = {
 class Competency:
     """A named question as the page shows it: its columns by variable and heading, and rows of a sample answer."""
 
-    asked: Question
+    asked: NamedQuery
     columns: Mapping[str, str]
     rows: tuple[tuple[str, ...], ...] = ()
     more: int = 0  # rows that the answer has beyond
@@ -80,7 +80,7 @@ def competencies(known: Resources, graph: KnowledgeGraph | None = None) -> Itera
         yield Competency(question, columns, rows, max(len(answer) - MOST_ROWS, 0))
 
 
-def _columns(question: Question) -> list[str]:
+def _columns(question: NamedQuery) -> list[str]:
     """Return the variables that a question selects; no data are needed for that."""
     solutions = Store().query(question.text)
     return [one.value for one in solutions.variables] if isinstance(solutions, QuerySolutions) else []
