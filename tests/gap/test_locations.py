@@ -204,7 +204,7 @@ def test_a_coupling_acts_on_both_joints_of_its_pair():
     variant = Variant(effect, (0,), effect.terms(ROBOT)[:1])
     found = FoundCause("", MISSING, (JOINTS[2],), (variant,), gain=1.0, log_odds=9.0, probability=1.0)
     assert found.touched(ROBOT) == JOINTS[1:]
-    empty = dict.fromkeys(("refitted", "after", "seen", "acts", "reference", "level", "least"))
+    empty = dict.fromkeys(("after", "seen", "acts", "reference", "level", "least"))
     finding = SimpleNamespace(places=JOINTS)
     left = ChannelResidual(finding, [], added=[], touched=[JOINTS[1:]], **empty)
     assert left.acting.tolist() == [False, True, True]
