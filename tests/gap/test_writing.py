@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from tests.gap_cases import document
 from tests.synthetic import arm
 
+from irtwin.document.document import CauseParameter
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.gap.writing import _joints, _members, beside_unknown, folded
+from irtwin.gap.writing import _joints, _members, beside, beside_unknown, folded
+from irtwin.simulator.differences import not_held
 
 
 def test_members_are_the_cause_and_its_rivals_each_with_its_probability():
@@ -18,6 +21,19 @@ def test_members_are_the_cause_and_its_rivals_each_with_its_probability():
     one = replace(cause, evidence=replace(cause.evidence, probability_of_rivals=likely | {"backlash": 0.02}))
     told = {member.effect: member.confidence for member in _members(one)}
     assert told == {cause.effect: cause.confidence} | likely
+
+
+def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model():
+    thinning = CauseParameter(name="k", joint="joint_a3", value=0.02, unit="1/K", interval95=None)
+    damping = CauseParameter(name="Fv", joint="joint_a3", value=-9.5, unit="N m s/rad", interval95=None)
+    cause = document("attributed").causes[0]
+    warm = replace(
+        cause, effect="temperature_dependent_friction", scope="changed", confidence=0.9, parameters=(thinning, damping)
+    )
+    model = SimpleNamespace(name="m", numbers=lambda joint: {"damping": 19.0})
+    told = beside(model, warm)
+    assert [(one.simulator, one.robot) for one in told.parameters] == [(None, None), (19.0, 9.5)]
+    assert not_held(SimpleNamespace(causes=(told,))) == (told,)
 
 
 def test_a_cause_that_no_finding_that_matters_has_is_marked():

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +15,16 @@ from irtwin.live.broadcast import SOCKET
 from irtwin.serve import samples as room
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
+
+
+@asynccontextmanager
+async def serving(send: Callable[..., Any], address: Path) -> AsyncIterator[None]:
+    """Send what a live process does; from Python 3.12 on a server that is left would wait for its connections."""
+    server = await asyncio.start_unix_server(send, address)
+    try:
+        yield
+    finally:
+        server.close()
 
 
 async def taken(page: Page, count: int) -> list[dict]:
@@ -32,7 +45,7 @@ def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
             await writer.drain()
 
         (tmp_path / "live").mkdir()
-        async with await asyncio.start_unix_server(send, tmp_path / "live" / SOCKET):
+        async with serving(send, tmp_path / "live" / SOCKET):
             samples = Samples(tmp_path)
             pages = [samples.page("a", "10.0.0.1"), samples.page("b", "10.0.0.1"), samples.page("b", "10.0.0.1")]
             found = await asyncio.wait_for(asyncio.gather(*(taken(page, 3) for page in pages)), 30)
@@ -62,10 +75,10 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
             await writer.drain()
 
         address = tmp_path / "live" / SOCKET
-        async with await asyncio.start_unix_server(send, address):
+        async with serving(send, address):
             await asyncio.sleep(0.1)
         address.unlink(missing_ok=True)
-        async with await asyncio.start_unix_server(send_well, address):
+        async with serving(send_well, address):
             assert await asyncio.wait_for(reading, 30) == [{"robot": "a", "time": 1}]
             samples.close()
 

@@ -19,6 +19,8 @@ _SHEET = (
     ("torque_constant", 12.0, "N m/A, reflected to the joint: makes torque of the motor's current"),
     ("winding_resistance", 2.0, "ohm"),
     ("acceleration", 10.0, "rad/s^2 (m/s^2): the joint's limit; irtwin robot excite and plan keep to it"),
+    ("kp", 500.0, "N m/rad (N/m): gain of the joint's controller, by which a URDF is played"),
+    ("kd", 20.0, "N m s/rad (N s/m): the same for its speed"),
 )
 _POWER_AT = "where power (voltage and current) is measured: mains or dc_bus"
 

@@ -288,10 +288,15 @@ class ChangedFrictionWithTemperature(TemperatureDependentFriction):
         return (thinning, np.zeros_like(motion.dq) if motion.temperature is None else motion.dq)
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
-        """Return k, relative to the joint's former Fv: (k (Fv + dFv) - k dFv)/Fv."""
+        """Return k, relative to the joint's former Fv, (k (Fv + dFv) - k dFv)/Fv, and by how much Fv is another."""
         thinning = np.kron(np.eye(len(self.acting(robot))), [1.0, -self.k])
         former = Coefficients(thinning @ given.values, thinning @ given.covariance @ thinning.T, given.known)
-        return super().parameters(robot, former)
+        changes = zip(self.acting(robot), given.values[1::2], given.deviations[1::2], strict=True)
+        changed = (
+            quantity("Fv", joint.name, value, f"{force_unit(joint)} s/{joint.unit}", deviation)
+            for joint, value, deviation in changes
+        )
+        return (*super().parameters(robot, former), *changed)
 
 
 @dataclass(frozen=True)

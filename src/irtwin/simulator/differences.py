@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from irtwin.document.document import Cause, Document
-from irtwin.effects.catalogue import catalogue
+from irtwin.effects.catalogue import names_in_mjcf
 from irtwin.simulator.model import Model
 from irtwin.simulator.model_file import Tag
 from irtwin.twin.twin import Twin
@@ -16,8 +16,8 @@ Key = tuple[str, str, str]  # effect, joint, name of a parameter
 
 
 def not_held(document: Document) -> tuple[Cause, ...]:
-    """Return the likely causes that no number of the simulator's model can hold."""
-    return tuple(cause for cause in _likely(document) if all(one.simulator is None for one in cause.parameters))
+    """Return the likely causes that numbers of the simulator's model cannot hold, or not all of."""
+    return tuple(cause for cause in _likely(document) if any(one.simulator is None for one in cause.parameters))
 
 
 def written(model: Model, document: Document, off: Mapping[Key, float] | None = None) -> bytes:
@@ -27,7 +27,7 @@ def written(model: Model, document: Document, off: Mapping[Key, float] | None = 
     """
     changed: dict[Tag, dict[str, float]] = {}
     for (effect, joint, name), robot in _numbers(document).items():
-        tag, attribute = model.file.number(joint, catalogue()[effect].in_mjcf[name])
+        tag, attribute = model.file.number(joint, names_in_mjcf()[name])
         number = robot + (off or {}).get((effect, joint, name), 0.0)
         changed.setdefault(tag, {})[attribute] = max(number, 0.0)
     return model.file.changed(changed)
