@@ -73,8 +73,8 @@ def test_longer_runs_and_power_take_more():
 @pytest.mark.parametrize(
     ("seconds", "line"),
     [
-        (44.0, "30 joints, 12 runs: about 40 s of processor and 1.7 GB"),
-        (170.0, "30 joints, 12 runs: about 3 minutes of processor and 1.7 GB"),
+        (44.0, "30 joints, 12 runs: about 40 s of processor, more where much differs, and 1.7 GB"),
+        (170.0, "30 joints, 12 runs: about 3 minutes of processor, more where much differs, and 1.7 GB"),
     ],
 )
 def test_it_is_said_in_words_where_it_is_long(seconds, line):

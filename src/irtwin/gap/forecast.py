@@ -38,7 +38,8 @@ class Forecast:
         """It in words."""
         minutes = self.seconds / 60
         time = f"{minutes:.0f} minutes" if minutes >= 1.5 else f"{10 * round(self.seconds / 10)} s"
-        return f"{self.joints} joints, {self.runs} runs: about {time} of processor and {self.memory / 1e9:.1f} GB"
+        taken = f"about {time} of processor, more where much differs, and {self.memory / 1e9:.1f} GB"
+        return f"{self.joints} joints, {self.runs} runs: {taken}"
 
 
 def forecast(data_set: DataSet) -> Forecast:
