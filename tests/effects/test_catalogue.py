@@ -26,6 +26,7 @@ OTHER_MEANINGS = {
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet
     "simulator/fit.py": {"payload"},  # a number of a model, told as the effect of that name
     "simulator/servos.py": {"payload", "base_tilt"},
+    "simulator/sysid.py": {"payload"},
     "simulator/writing.py": {"payload"},
     "twin/files.py": {"rotor_inertia"},
 }
