@@ -91,9 +91,9 @@ def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
     assert irtwin("query", "parameters", "--workspace", workspace, "--format", "csv").out == before
 
 
-def test_an_exciting_motion_is_designed_and_said(tmp_path, small_data_set):
-    out = tmp_path / "motion.csv"
-    done = irtwin("robot", "excite", small_data_set / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
+def test_an_exciting_motion_is_designed_and_said(tmp_path):
+    out, logs = tmp_path / "motion.csv", data_set(tmp_path / "logs", "Arm", joints=1)
+    done = irtwin("robot", "excite", logs / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
     assert done.status == 0, done.err
     assert "condition number" in done.out
     motion = np.genfromtxt(out, delimiter=",", names=True)

@@ -41,4 +41,11 @@ def test_each_step_of_the_tutorials_can_be_done(tmp_path: Path) -> None:
             done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
             assert done.returncode == 0, f"{name}: {block}\n{done.stderr}"
     assert "<html" in (tmp_path / "gap.html").read_text(encoding="utf-8")
-    assert (tmp_path / "better.xml").read_text() != (tmp_path / "faulty.xml").read_text()
+    told, planted, mended = (damping(tmp_path / f"{name}.xml", "joint_a2") for name in ("kr6", "faulty", "better"))
+    assert planted == 2 * told and mended == pytest.approx(told, rel=0.2)
+
+
+def damping(model: Path, joint: str) -> float:
+    tag = re.search(rf'<joint name="{joint}"[^>]* damping="([^"]+)"', model.read_text(encoding="utf-8"))
+    assert tag is not None
+    return float(tag[1])
