@@ -34,6 +34,8 @@ def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model()
     told = beside(model, warm)
     assert [(one.simulator, one.robot) for one in told.parameters] == [(None, None), (19.0, 9.5)]
     assert not_held(SimpleNamespace(causes=(told,))) == (told,)
+    coupled = replace(warm, effect="joint_coupling", parameters=(damping,))
+    assert beside(model, coupled) == coupled  # a friction of its own
 
 
 def test_a_cause_that_no_finding_that_matters_has_is_marked():

@@ -109,11 +109,6 @@ def catalogue() -> dict[str, Effect]:
     return effects
 
 
-def names_in_mjcf() -> dict[str, str]:
-    """Return what MuJoCo's models call a joint's coefficients, by their names here, whichever effect changes them."""
-    return {name: called for effect in catalogue().values() for name, called in effect.in_mjcf.items()}
-
-
 @cache
 def _registered() -> tuple[type[Effect], ...]:
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)

@@ -237,6 +237,11 @@ class Effect(ABC):
         return {}
 
     @property
+    def changed_in_mjcf(self) -> Mapping[str, str]:
+        """What MuJoCo's models call the numbers that are others where it has changed: its own, if they have them."""
+        return self.in_mjcf
+
+    @property
     def shape(self) -> dict[str, Any]:
         """The fields that are the effect's shape, by name."""
         names = [each.name for each in fields(self) if each.name not in ("joints", "runs")]

@@ -239,6 +239,11 @@ class TemperatureDependentFriction(JointEffect):
         """Return slow and fast thinning."""
         return self.variants(k=(0.005, 0.02, 0.05))
 
+    @property
+    def changed_in_mjcf(self) -> Mapping[str, str]:
+        """Viscous friction's, which a change may have made another."""
+        return ViscousFriction.in_mjcf
+
     def changes(self) -> tuple[Effect, ...]:
         """Return the change that leaves another friction at T0."""
         return (ChangedFrictionWithTemperature(self.k, self.T0, joints=self.joints, runs=self.runs),)

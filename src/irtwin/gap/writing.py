@@ -10,7 +10,7 @@ import numpy as np
 
 from irtwin.document import document
 from irtwin.document.document import cause_ids
-from irtwin.effects.catalogue import catalogue, names_in_mjcf
+from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
@@ -177,7 +177,7 @@ def beside(simulator: Simulator, cause: document.Cause) -> document.Cause:
     def told(one: document.CauseParameter) -> document.CauseParameter:
         if one.joint is None or cause.scope != CHANGED:
             return one
-        own = simulator.numbers(one.joint).get(names_in_mjcf().get(one.name, ""))
+        own = simulator.numbers(one.joint).get(catalogue()[cause.effect].changed_in_mjcf.get(one.name, ""))
         return one if own is None else replace(one, simulator=own, robot=max(0.0, own + one.value))
 
     return replace(cause, parameters=tuple(map(told, cause.parameters)))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from irtwin.document.document import Cause, Document
-from irtwin.effects.catalogue import names_in_mjcf
+from irtwin.effects.catalogue import catalogue
 from irtwin.simulator.model import Model
 from irtwin.simulator.model_file import Tag
 from irtwin.twin.twin import Twin
@@ -27,7 +27,7 @@ def written(model: Model, document: Document, off: Mapping[Key, float] | None = 
     """
     changed: dict[Tag, dict[str, float]] = {}
     for (effect, joint, name), robot in _numbers(document).items():
-        tag, attribute = model.file.number(joint, names_in_mjcf()[name])
+        tag, attribute = model.file.number(joint, catalogue()[effect].changed_in_mjcf[name])
         number = robot + (off or {}).get((effect, joint, name), 0.0)
         changed.setdefault(tag, {})[attribute] = max(number, 0.0)
     return model.file.changed(changed)
