@@ -44,6 +44,9 @@ _SAID = (
     ("diagnosed", "LastGapDiagnosed", ua.VariantType.DateTime, datetime.fromtimestamp(0, UTC)),
 )
 
+Variables = dict[str, tuple[Node, ua.VariantType]]
+"""A robot's nodes by column of `plant_now`, each with its type."""
+
 
 @asynccontextmanager
 async def answering(asking: Asking, question: str, host: str, port: int) -> AsyncIterator[None]:
@@ -73,8 +76,7 @@ class _Plant:
 
     def __init__(self, server: Server, asking: Asking, question: str) -> None:
         self._server, self._asking, self._question = server, asking, question
-        self._robots: dict[str, Node] = {}
-        self._variables: dict[tuple[str, str], tuple[Node, ua.VariantType]] = {}
+        self._robots: dict[str, tuple[Node, Variables]] = {}
 
     async def follow(self) -> None:
         """Look at the graph again and again."""
@@ -88,27 +90,26 @@ class _Plant:
             await asyncio.sleep(EVERY)
 
     async def _show(self, rows: tuple[Row, ...]) -> None:
-        now = {row["robot"] for row in rows}
-        for name in [name for name in self._robots if name not in now]:
-            await self._server.delete_nodes([self._robots.pop(name)], recursive=True)
+        for name in self._robots.keys() - {row["robot"] for row in rows}:
+            await self._server.delete_nodes([self._robots.pop(name)[0]], recursive=True)
         for row in rows:
             if row["robot"] not in self._robots:
-                await self._add(row["robot"])
-            for (robot, column), (node, kind) in self._variables.items():
-                if robot == row["robot"]:
-                    await self._server.write_attribute_value(node.nodeid, _value(row[column], kind))
+                self._robots[row["robot"]] = await self._added(row["robot"])
+            for column, (node, kind) in self._robots[row["robot"]][1].items():
+                await self._server.write_attribute_value(node.nodeid, _value(row[column], kind))
 
-    async def _add(self, robot: str) -> None:
-        machine = self._robots[robot] = await self._machines.add_object(self._ours, robot)
-        main = machine
+    async def _added(self, robot: str) -> tuple[Node, Variables]:
+        main = machine = await self._machines.add_object(self._ours, robot)
+        variables: Variables = {}
         for name in _MAIN:
             main = await main.add_folder(self._machinery, name)
         for column, name, kind, number, unit in _MEASURED:
             node = await main.add_variable(self._ecm, name, 0.0, kind)
             await node.add_property(0, "EngineeringUnits", ua.EUInformation(_UNITS, number, ua.LocalizedText(unit)))
-            self._variables[robot, column] = node, kind
+            variables[column] = node, kind
         for column, name, kind, blank in _SAID:
-            self._variables[robot, column] = await machine.add_variable(self._ours, name, blank, kind), kind
+            variables[column] = await machine.add_variable(self._ours, name, blank, kind), kind
+        return machine, variables
 
 
 def _value(value: Any, kind: ua.VariantType) -> ua.DataValue:
