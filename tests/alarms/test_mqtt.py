@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import queue
-import shutil
 import socket
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,40 +12,23 @@ from typing import Any
 import paho.mqtt.client as paho
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
+from tests.alarms import mosquitto
 
 from irtwin.alarms.delivery import Undelivered
 from irtwin.alarms.mqtt import Broker
-
-MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as found:
-        return int(found.getsockname()[1])
 
 
 @pytest.fixture
 def port(tmp_path: Path) -> Iterator[int]:
     """A broker that wants a user and a password."""
-    if MOSQUITTO is None:
-        pytest.skip("needs mosquitto (Debian: apt install mosquitto)")
-    port, passwords, settings = free_port(), tmp_path / "passwords", tmp_path / "mosquitto.conf"
+    passwords = tmp_path / "passwords"
     subprocess.run(["mosquitto_passwd", "-c", "-b", passwords, "me", "right"], check=True, capture_output=True)
     passwords.chmod(0o644)
-    settings.write_text(f"listener {port} 127.0.0.1\npassword_file {passwords}\nuser root\n")
-    broker = subprocess.Popen([MOSQUITTO, "-c", settings], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        for _ in range(500):
-            with socket.socket() as trying:
-                if trying.connect_ex(("127.0.0.1", port)) == 0:
-                    break
-            time.sleep(0.02)
+    with mosquitto.running(tmp_path, f"password_file {passwords}") as port:
         yield port
-    finally:
-        broker.terminate()
-        broker.wait()
 
 
+@mosquitto.needed
 @pytest.mark.system
 def test_a_message_reaches_who_listens_and_a_wrong_password_is_said(port: int) -> None:
     got: queue.Queue[bytes] = queue.Queue()

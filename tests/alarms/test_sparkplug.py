@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import queue
 import socket
-import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,7 @@ import paho.mqtt.client as paho
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 from sparkplub_b_packets.core.sparkplug_b_pb2 import Payload
-from tests.alarms.test_mqtt import MOSQUITTO, free_port
+from tests.alarms import mosquitto
 
 from irtwin.alarms.mqtt import Broker
 from irtwin.alarms.sparkplug import EdgeNode, payload
@@ -34,19 +33,8 @@ def decoded(message: bytes) -> tuple[int | None, dict[str, Any]]:
 
 @pytest.fixture
 def port(tmp_path: Path) -> Iterator[int]:
-    if MOSQUITTO is None:
-        pytest.skip("needs mosquitto (Debian: apt install mosquitto)")
-    port, settings = free_port(), tmp_path / "mosquitto.conf"
-    settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\nuser root\n")
-    broker = subprocess.Popen([MOSQUITTO, "-c", settings], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    for _ in range(500):
-        with socket.socket() as trying:
-            if trying.connect_ex(("127.0.0.1", port)) == 0:
-                break
-        time.sleep(0.02)
-    yield port
-    broker.terminate()
-    broker.wait()
+    with mosquitto.running(tmp_path, "allow_anonymous true") as port:
+        yield port
 
 
 class Host:
@@ -71,6 +59,7 @@ class Host:
         return self.got.get(timeout=30)
 
 
+@mosquitto.needed
 @pytest.mark.system
 def test_births_data_and_deaths_reach_a_host_in_order(port: int) -> None:
     host, said = Host(port), []
