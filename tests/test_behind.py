@@ -91,6 +91,7 @@ def hold(before: Path, tmp_path: Path, moments: list[int]) -> list[str | None]:
     return stood
 
 
+@pytest.mark.nightly
 def test_a_killed_writer_leaves_a_graph_that_is_whole_or_says_that_it_is_behind(before: Path, tmp_path: Path) -> None:
     assert BEHIND in hold(before, tmp_path, [2, 6])
 

@@ -45,6 +45,7 @@ def text(done: Done) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page).replace("\N{NO-BREAK SPACE}", " ").replace("\u202f", " "))
 
 
+@pytest.mark.nightly
 def test_the_command_says_each_step_and_where_the_page_is(done: Done) -> None:
     said, workspace = done
     assert said.status == 0
@@ -52,6 +53,7 @@ def test_the_command_says_each_step_and_where_the_page_is(done: Done) -> None:
     assert str(workspace / "reports" / "case_study.html") in said.out
 
 
+@pytest.mark.nightly
 def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not_fitted(done: Done, text: str) -> None:
     assert re.search(r"\n +0\.3 s +\d+ W +\d+ J\n", done[0].err)  # as it moves
     (row,) = ask("planned_against_measured", done[1]).rows
@@ -63,6 +65,7 @@ def test_the_plan_comes_nearer_than_the_seed_and_is_judged_on_a_run_that_was_not
     assert f"off by {' '.join(percent(abs(row['difference_percent'])).split())}" in text and "off by 6.54 %" in text
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "figure",
     ["figures 7 and 8", "figure 9 and equations 13 to 15", "figure 10", "figure 11", "figure 12", "figure 13"],
@@ -71,6 +74,7 @@ def test_each_figure_of_the_seed_has_its_counterpart(text: str, figure: str) -> 
     assert f"Seed, {figure}" in text
 
 
+@pytest.mark.nightly
 def test_the_page_shows_the_individual_and_both_configurations(text: str) -> None:
     for property_ in ("irt:IR_Name KUKA_KR6_R700", "irt:Controlled_Axes 6", "irt:Run_Time 1.2 s", "irt:Planned_Energy"):
         assert property_ in text
@@ -84,6 +88,7 @@ def test_individuals_are_named_below_the_workspaces_base() -> None:
     assert [(name, len(its)) for name, _, its in individuals(rows, base)] == [("run/a", 2), ("run/b", 1)]
 
 
+@pytest.mark.nightly
 def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
     again = irtwin("demo", "--case-study", "--workspace", done[1])
     assert again.status == 2
@@ -122,6 +127,7 @@ def test_what_the_plant_cannot_follow_is_said(tmp_path: Path) -> None:
         case_study.measure(data_set, Plan(read_data_set(data_set).robot, far, None, 0.0, True, (), 1.2), print)
 
 
+@pytest.mark.nightly
 def test_each_equation_of_the_seed_has_its_number_in_source_ontology_and_page(text: str) -> None:
     source = " ".join(file.read_text(encoding="utf-8") for file in Path(irtwin_package.__file__).parent.rglob("*.py"))
     said = [re.findall(r"\d+", each) for each in re.findall(r"Yan 2018,\s+eqs?\.\s+([\d, ]*(?:to \d+)?)", source)]
@@ -133,6 +139,7 @@ def test_each_equation_of_the_seed_has_its_number_in_source_ontology_and_page(te
         assert f" ({number}) " in text
 
 
+@pytest.mark.nightly
 @pytest.mark.system
 def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any) -> None:
     file = done[1] / "reports" / "case_study.html"

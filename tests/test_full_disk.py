@@ -14,7 +14,7 @@ from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
 pytestmark = pytest.mark.slow
-BY_DAY = (("run", 1), ("run", 40), ("workspace backup", 40))
+BY_DAY = (("run", 40), ("workspace backup", 40))
 
 
 @pytest.mark.parametrize(

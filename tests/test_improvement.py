@@ -148,6 +148,7 @@ def test_rounds_go_on_until_the_limit_holds(improved: tuple[Path, Said]) -> None
     assert not list((workspace / "next_experiment").iterdir())
 
 
+@pytest.mark.nightly
 def test_each_round_stands_in_the_graph(improved: tuple[Path, Said]) -> None:
     workspace, _ = improved
     one, two = asking.ask("improvement_rounds", workspace)
@@ -190,6 +191,7 @@ def test_the_same_data_set_again_leaves_the_better_twin(improved: tuple[Path, Sa
     assert after == before
 
 
+@pytest.mark.nightly
 def test_a_twin_that_is_no_better_is_not_kept(improved: tuple[Path, Said], tmp_path: Path) -> None:
     workspace = Path(shutil.copytree(improved[0], tmp_path / "workspace"))
     (before,) = asking.ask(TWIN, workspace)

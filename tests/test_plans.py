@@ -228,6 +228,7 @@ def test_a_motion_from_a_file_is_kept_as_well(also_priced: tuple[Path, Said]) ->
     assert f"{rows['laden']['energy_Wh'] * 3600:.4g}" in priced.out
 
 
+@pytest.mark.nightly
 def test_a_live_run_is_held_against_the_plan_that_it_carried_out(watched: Path) -> None:
     pairs = list(asking.ask("planned_against_measured", watched))
     live, done = sorted(pairs, key=lambda row: row["run"] == "done")
@@ -346,6 +347,7 @@ def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Pa
         assert session.scalars(select(schema.Run)).all() == []
 
 
+@pytest.mark.nightly
 def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> None:
     out = tmp_path / "slower.csv"
     here = ("--workspace", performed, "--out", out, "--run", "slower")

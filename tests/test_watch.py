@@ -57,7 +57,7 @@ def workspace(tmp_path: Path) -> Path:
     return fill(tmp_path / "w")
 
 
-@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
+@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(
     on_server: bool, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

@@ -77,6 +77,7 @@ def test_friction_that_moved_is_no_gap_and_fitted_again(twin):
     assert list(found.values()) == pytest.approx(list(1.3 * truth(ROBOT)["Fc"]), rel=0.05)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_only_what_is_new_is_named(twin):
     found = diagnose(logged(40, cable=15.0), twin=twin)

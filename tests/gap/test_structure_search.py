@@ -117,6 +117,7 @@ def test_a_crumb_within_the_misfit_that_no_effect_names_is_no_cause():
     assert found(np.eye(2), [0.3, 0.01]) == ["effect_0"]  # seven standard errors, a tenth of the noise
 
 
+@pytest.mark.nightly
 @given(st.floats(0.1, 1.0))
 def test_a_crumb_does_not_unsay_what_explains_nearly_everything(crumb):
     (first, *_) = causes(*system_of(np.eye(2), [3.0, crumb]))

@@ -201,6 +201,7 @@ def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
     return calls
 
 
+@pytest.mark.nightly
 def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], checked: list[set[str]]) -> None:
     of_b = individual("run", "Arm_B.work_1")
     broken = changed(two_robots, of_b, "Run_Time", Literal(0.0))

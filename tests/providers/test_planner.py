@@ -50,7 +50,7 @@ def waiting(graph: KnowledgeGraph) -> set[tuple[str, str, str]]:
 
 def test_the_ontology_declares_what_the_package_registers(graph):
     declared = {row["name"] for row in graph.query(DECLARED)}
-    assert declared == {point.name for point in provider.entry_points(group=provider.GROUP)}
+    assert declared == set(provider.registered())
 
 
 def test_only_what_lacks_the_result_and_has_the_premises_is_ready(graph):
@@ -123,7 +123,7 @@ def test_a_robot_that_a_provider_refuses_is_set_aside_and_others_go_on(graph, mo
 
 def test_another_package_is_named_with_its_own_version(monkeypatch):
     other = SimpleNamespace(name="co2", dist=SimpleNamespace(name="irtwin-co2", version="2.3"))
-    monkeypatch.setattr(provider, "entry_points", lambda group: [other])
+    monkeypatch.setattr(provider, "registered", lambda: {"co2": other})
     assert provider.software_of("co2") == "irtwin-co2 2.3"
-    monkeypatch.setattr(provider, "entry_points", lambda group: [SimpleNamespace(name="co2", dist=None)])
+    monkeypatch.setattr(provider, "registered", lambda: {"co2": SimpleNamespace(dist=None)})
     assert provider.software_of("co2") == provider.software()

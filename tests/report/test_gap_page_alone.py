@@ -31,7 +31,13 @@ def data_set() -> DataSet:
     return DataSet(Path("arm"), robot, tuple(runs), None, 20.0, "dc_bus", simulated=False, notes={})
 
 
-@pytest.mark.parametrize("verdict", gap_cases.VERDICTS)
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        pytest.param(verdict, marks=() if verdict in ("attributed", "ambiguous") else pytest.mark.nightly)
+        for verdict in gap_cases.VERDICTS
+    ],
+)
 def test_it_is_the_page_of_a_workspace_and_no_other_file(
     verdict: str, data_set: DataSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -35,6 +35,7 @@ def wait(server: Server, standing: str | None) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.nightly
 def test_it_catches_up_by_itself(left_behind: Path, tmp_path: Path) -> None:
     shutil.copytree(left_behind, tmp_path / "workspace")
     with serving(tmp_path / "workspace/graph") as server:

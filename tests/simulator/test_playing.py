@@ -116,6 +116,7 @@ def test_a_simulator_that_is_right_agrees():
 
 
 @pytest.mark.nightly
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_small_change_is_told_beside_a_joint_that_falls(tmp_path):
     numbers = {"torque_limit": (0.52, 30 * np.pi), "armature": (0.02, 0.06)}
@@ -199,6 +200,7 @@ def with_torque(folder, **numbers):
     return servo_arm.played(data_set, own, servo_arm.changed(own, **numbers), torque_noise=5e-3), model
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_torque_says_what_motion_leaves_open(tmp_path):

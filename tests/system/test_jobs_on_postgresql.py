@@ -73,6 +73,7 @@ def test_a_plan_is_held_against_the_run_that_was_watched(plant: Plant) -> None:
     assert row["measured_Wh"] * 3600 == pytest.approx(sampled["joules"], rel=1e-4)
 
 
+@pytest.mark.nightly
 def test_a_sample_that_was_stored_is_known_by_its_time(plant: Plant) -> None:
     run = live_run(plant)
     assert run.started is not None and run.ended is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points, version
 
 import pyarrow as pa
@@ -71,11 +72,16 @@ def activity(provider: str, robot_id: str, subject: str, started: datetime, by: 
     )
 
 
+@cache  # all installed packages are looked through: as long as a small run takes in a provider
+def registered() -> dict[str, EntryPoint]:
+    """Return what installed packages register as providers, by name."""
+    return {point.name: point for point in entry_points(group=GROUP)}
+
+
 def _entry_point(name: str) -> EntryPoint:
-    points = [point for point in entry_points(group=GROUP) if point.name == name]
-    if not points:
+    if name not in registered():
         raise InputError(
             f'provider "{name}" is declared in the ontology, but no installed package registers it as an entry '
             f"point of {GROUP}; install that package, or remove the declaration"
         )
-    return points[0]
+    return registered()[name]

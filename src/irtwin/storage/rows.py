@@ -94,7 +94,8 @@ def insert_values(session: Session, rows: Rows) -> None:
 def recorded_rows(session: Session, robot_id: str) -> Rows:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
     return {
-        table.name: [dict(row) for row in session.execute(query).mappings()] for table, query in _recorded(robot_id)
+        table.name: [] if query is None else [dict(row) for row in session.execute(query).mappings()]
+        for table, query in _recorded(session, robot_id)
     }
 
 
@@ -218,18 +219,19 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
     return whole
 
 
-def _recorded(robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
-    """Yield each table with the query of a robot's rows in it, without its live runs'."""
+def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[Any] | None]]:
+    """Yield each table with the query of a robot's rows in it, without its live runs'; None where there are none."""
     runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind.not_in(WATCHED_RUNS))
-    made = select(Activity.activity_id).where(
+    activities = select(Activity.activity_id).where(
         Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
     )
+    made = set(session.scalars(activities))  # by name: a query within that of each table takes longer to compile
     for table in Base.metadata.sorted_tables:
         rows = select(table)
         if table.name == Run.__tablename__ or table.name == Series.__tablename__:
             yield table, rows.where(table.columns["run_id"].in_(runs))
         elif "activity_id" in table.columns:
-            yield table, _made_by(table, made)
+            yield table, _made_by(table, made) if made else None
         elif "robot_id" in table.columns:
             yield table, rows.where(table.columns["robot_id"] == robot_id)
 
@@ -240,7 +242,7 @@ def _of_live(robot_id: str) -> Select[Any]:
     return energies.where(RunEnergy.twin_id.is_not(None))
 
 
-def _made_by(table: Table, activities: Select[Any] | AbstractSet[str]) -> Select[Any]:
+def _made_by(table: Table, activities: AbstractSet[str]) -> Select[Any]:
     return select(table).where(table.columns["activity_id"].in_(activities))
 
 
