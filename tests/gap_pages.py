@@ -14,7 +14,7 @@ from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
-from irtwin.providers.records import robot_iri
+from irtwin.providers.names import robot_iri
 from irtwin.report.gap.page import render_gap
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace

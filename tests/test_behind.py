@@ -14,7 +14,7 @@ from irtwin.errors import GraphBehind, InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_CHANGED, GRAPH_REASONED, GRAPH_SOURCE
-from irtwin.providers.records import find_robot
+from irtwin.providers.names import find_robot
 from irtwin.status import status
 from irtwin.storage import turns
 from irtwin.storage.database import Workspace

@@ -19,7 +19,7 @@ from irtwin.modelling import Announce
 from irtwin.planning.plan import Plan, Task
 from irtwin.planning.poses import read_target
 from irtwin.providers.mesh_files import meshes_of_graph
-from irtwin.providers.records import identifier, robot_iri
+from irtwin.providers.names import identifier, robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.case_study.page import render
 from irtwin.report.energy.scene import draw_scene

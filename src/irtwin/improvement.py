@@ -11,7 +11,8 @@ from irtwin.modelling import Announce, sound
 from irtwin.next_experiment import NextExperiment, next_experiment
 from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
-from irtwin.providers.records import check_run_name, find_robot, keep_run, load_robot, load_twin
+from irtwin.providers.names import check_run_name, find_robot
+from irtwin.providers.records import keep_run, load_robot, load_twin
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged

@@ -18,14 +18,8 @@ from irtwin.planning.plan import Plan, Task
 from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.planning.waiting import PauseProposal, proposals
 from irtwin.providers.energy import stored_price
-from irtwin.providers.records import (
-    check_run_name,
-    find_robot,
-    find_run,
-    keep_run,
-    load_run,
-    load_twin,
-)
+from irtwin.providers.names import check_run_name, find_robot, find_run
+from irtwin.providers.records import keep_run, load_run, load_twin
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition

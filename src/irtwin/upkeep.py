@@ -17,7 +17,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
 from irtwin.modelling import Announce
 from irtwin.next_experiment import proposal_files
-from irtwin.providers.records import find_robot, find_run, run_iri
+from irtwin.providers.names import find_robot, find_run, run_iri
 from irtwin.resources import resources_of
 from irtwin.storage import files
 from irtwin.storage.database import Workspace

@@ -32,18 +32,9 @@ from irtwin.providers.effects_of_ontology import check_effects
 from irtwin.providers.gap import adopt as adopt_twin
 from irtwin.providers.gap import record
 from irtwin.providers.mesh_files import meshes_of_graph
+from irtwin.providers.names import check_name, find_robot, identifier, robot_iri
 from irtwin.providers.planner import populate
-from irtwin.providers.records import (
-    check_name,
-    check_plans,
-    find_robot,
-    followed,
-    identifier,
-    ingest,
-    is_described,
-    known_twin,
-    robot_iri,
-)
+from irtwin.providers.records import check_plans, followed, ingest, is_described, known_twin
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene

@@ -15,7 +15,8 @@ from irtwin.knowledge.explain.provenance import told_in
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import term
-from irtwin.providers.records import inputs, run_iri, twin_iri
+from irtwin.providers.names import run_iri, twin_iri
+from irtwin.providers.records import inputs
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import SourceFile
 

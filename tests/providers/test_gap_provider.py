@@ -15,7 +15,8 @@ from irtwin.document.document import Document
 from irtwin.errors import InputError
 from irtwin.providers import energy, identification
 from irtwin.providers.gap import adopt, record
-from irtwin.providers.records import ingest, robot_iri, run_iri
+from irtwin.providers.names import robot_iri, run_iri
+from irtwin.providers.records import ingest
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema

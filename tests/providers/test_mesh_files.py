@@ -15,7 +15,8 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.mesh_files import mesh_copies, meshes_of_graph
-from irtwin.providers.records import ingest, robot_iri
+from irtwin.providers.names import robot_iri
+from irtwin.providers.records import ingest
 from irtwin.resources import folder
 from irtwin.robot.meshes import Mesh
 from irtwin.storage.database import Workspace

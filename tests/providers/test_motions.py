@@ -19,7 +19,8 @@ from irtwin.document.document import Cutoff, Document, Gap, Shrink
 from irtwin.providers import energy, identification, motions, run_state
 from irtwin.providers.gap import adopt, record
 from irtwin.providers.motions import robot_motions
-from irtwin.providers.records import ingest, robot_iri, run_iri
+from irtwin.providers.names import robot_iri, run_iri
+from irtwin.providers.records import ingest
 from irtwin.signals import conditioning
 from irtwin.signals.conditioning import choose_cutoff
 from irtwin.signals.log import DataSet, Run

@@ -15,7 +15,8 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
-from irtwin.providers.records import identifier, ingest, robot_iri
+from irtwin.providers.names import identifier, robot_iri
+from irtwin.providers.records import ingest
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.resources import folder
 from irtwin.robot.denavit_hartenberg import ChainTable, Row

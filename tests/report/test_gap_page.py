@@ -16,7 +16,7 @@ from tests.gap_pages import figures_of, graph_of, page_of, six_axis
 from irtwin.document.curves import Curves
 from irtwin.errors import InputError
 from irtwin.providers.gap import record
-from irtwin.providers.records import robot_iri
+from irtwin.providers.names import robot_iri
 from irtwin.report.gap.page import render_gap
 from irtwin.storage.database import Workspace
 

@@ -13,7 +13,8 @@ from tests.gap_pages import graph_of
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.providers.gap import record
-from irtwin.providers.records import identifier, ingest, robot_iri
+from irtwin.providers.names import identifier, robot_iri
+from irtwin.providers.records import ingest
 from irtwin.report.gap.page import render_alone, render_gap
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import DataSet

@@ -16,7 +16,7 @@ from tests.gap_pages import figures_of, graph_of, page_of
 from tests.rows import ROBOT
 
 from irtwin.document.document import Document
-from irtwin.providers.records import robot_iri
+from irtwin.providers.names import robot_iri
 from irtwin.report import wording
 from irtwin.report.gap.page import render_gap
 from irtwin.storage.database import Workspace

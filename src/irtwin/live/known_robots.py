@@ -10,7 +10,7 @@ from irtwin.errors import InputError
 from irtwin.live.joint_stream import State
 from irtwin.live.stored_times import StoredTimes
 from irtwin.providers.live_energy import KnownTwin, known_twin
-from irtwin.providers.records import find_run
+from irtwin.providers.names import find_run
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import PLANNED_RUN, Joint, Robot
 

@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.providers.live_energy import watching
-from irtwin.providers.records import run_iri
+from irtwin.providers.names import run_iri
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.signals.motion import STILL_SHARE, STILL_SPEED
 from irtwin.storage.journal import Header, Rows

@@ -17,7 +17,7 @@ from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_OWL_RL, GRAPH_SHACL, GRAPH_SOURCE, term
 from irtwin.live.live_run import Tables, activities
-from irtwin.providers.records import run_iri
+from irtwin.providers.names import run_iri
 from irtwin.storage.database import Workspace
 
 _STATE, _REASON = term("Alarm_State"), term("Alarm_Reason")

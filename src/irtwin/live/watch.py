@@ -21,7 +21,8 @@ from irtwin.live.refusals import RefusedLines
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
 from irtwin.location import Location
-from irtwin.providers.records import find_robot, find_run, load_robot
+from irtwin.providers.names import find_robot, find_run
+from irtwin.providers.records import load_robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN

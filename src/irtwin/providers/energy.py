@@ -12,8 +12,9 @@ import scipy
 from irtwin.identification.validation import APART
 from irtwin.providers import live_energy
 from irtwin.providers.motions import robot_motions
+from irtwin.providers.names import twin_iri
 from irtwin.providers.provider import Made
-from irtwin.providers.records import inputs, load_run, load_twin, twin_iri
+from irtwin.providers.records import inputs, load_run, load_twin
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill

@@ -21,8 +21,9 @@ from irtwin.providers import gap_rows
 from irtwin.providers.gap_rows import Of
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
+from irtwin.providers.names import identifier, robot_iri
 from irtwin.providers.provider import Made, activity
-from irtwin.providers.records import identifier, inputs, robot_iri, rows_of
+from irtwin.providers.records import inputs, rows_of
 from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace

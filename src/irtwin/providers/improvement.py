@@ -20,8 +20,9 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import fitted_data_set, twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
+from irtwin.providers.names import robot_iri, twin_iri
 from irtwin.providers.provider import Made, activity
-from irtwin.providers.records import inputs, load_twin, robot_iri, twin_iri
+from irtwin.providers.records import inputs, load_twin
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace

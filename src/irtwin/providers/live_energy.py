@@ -20,8 +20,9 @@ from sqlalchemy import select
 from irtwin.errors import InputError
 from irtwin.identification.validation import APART, energy_error
 from irtwin.providers import records
+from irtwin.providers.names import run_iri, twin_iri
 from irtwin.providers.provider import Made
-from irtwin.providers.records import inputs, run_iri, twin_iri
+from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import live_schema, schema
 from irtwin.storage.database import Workspace

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import math
-import re
-import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -22,6 +19,7 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.json_text import parse_json
 from irtwin.planning.admission import check_motion
 from irtwin.providers.mesh_files import MeshCopy, mesh_copies
+from irtwin.providers.names import check_run_name, find_run, identifier, run_iri
 from irtwin.providers.structure_rows import device_rows, structure_rows
 from irtwin.robot import description
 from irtwin.robot.collision import CollisionModel
@@ -53,8 +51,6 @@ from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
 _HAVE_TERMS = {*log.ROBOT_KEYS} - {"torque_scale_uncertainty"}  # keys of [robot] that are no notes in the graph
-_PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
-_READABLE = 40  # characters of a name that is not plain
 
 
 def ingest(
@@ -142,15 +138,6 @@ def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], ru
     return row.run_id
 
 
-def check_run_name(workspace: Workspace, robot_id: str, name: str) -> None:
-    """Raise InputError where a robot has a run of this name, in any form of Unicode, upper or lower case."""
-    with workspace.reading() as session:
-        known = session.scalars(select(Run.name).where(Run.robot_id == robot_id)).all()
-    for other in known:
-        if _folded(other) == _folded(name):
-            raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; choose another name')
-
-
 def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[Run]) -> None:
     """Raise InputError where a data set does not go with the runs of no data set that the workspace keeps."""
     with workspace.reading() as session:
@@ -175,84 +162,6 @@ def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet,
             )
 
 
-def identifier(name: str) -> str:
-    """Return a name as it stands in IRIs, keys and names of files; other names have others.
-
-    Letters, digits, "_" and "-" stay as they are. Any other name, and one too long for a file's, is what of it can be
-    read, "~", and a checksum of the whole. Two ways to write the same letters in Unicode are the same name.
-    """
-    name = unicodedata.normalize("NFC", name)
-    if _PLAIN.fullmatch(name):
-        return name
-    readable = re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:_READABLE]
-    return f"{readable}~{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:16]}"
-
-
-def find_robot(workspace: Workspace, name: str | None) -> str:
-    """Return the robot_id of a robot by its name, of the only one where None.
-
-    Raises InputError, with the nearest name, where there is none, or where there are others.
-    """
-    known = _names(workspace)
-    if name is None and len(known) == 1:
-        return next(iter(known))
-    if name is None:
-        shown = ", ".join(sorted(known.values())[:10]) or "none: run a data set first"
-        raise InputError(f"{workspace.folder}: say which robot by --robot; known are {shown}")
-    for robot_id, of in known.items():
-        if name == robot_id or identifier(of) == identifier(name):
-            return robot_id
-    near = difflib.get_close_matches(name, known.values(), 1, 0.0)
-    hint = f'the nearest is "{near[0]}"' if near else "it has none; run a data set first"
-    raise InputError(f'{workspace.folder}: no robot "{name}" here; {hint}')
-
-
-_CALLED = {None: "run", PLANNED_RUN: "planned run", MEASURED_RUN: "measured run"}
-
-
-def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = None) -> Run:
-    """Return a robot's run, of a kind if one is given, by its name; InputError, with the nearest, where there is none.
-
-    kind: PLANNED_RUN or MEASURED_RUN.
-    """
-    of_robot = select(Run).where(Run.robot_id == robot_id)
-    with workspace.reading() as session:
-        rows = session.scalars(of_robot if kind is None else of_robot.where(Run.kind == kind))
-        known = {row.name: row for row in rows}
-        session.expunge_all()
-    for row in known.values():
-        if name == row.run_id or identifier(row.name) == identifier(name):
-            return row
-    near = difflib.get_close_matches(name, known, 1, 0.0)
-    hint = f'the nearest is "{near[0]}"' if near else "it has none"
-    raise InputError(f'{workspace.folder}: the robot has no {_CALLED[kind]} "{name}"; {hint}')
-
-
-def check_name(workspace: Workspace, name: str) -> None:
-    """Raise InputError where a robot of this name would be taken for another of the workspace, or be there twice."""
-    for robot_id, known in _names(workspace).items():
-        same = unicodedata.normalize("NFC", known) == unicodedata.normalize("NFC", name)
-        if (robot_id == identifier(name)) != same:
-            raise InputError(
-                f'{workspace.folder}: robot "{known}" has the identifier {robot_id} of an earlier irtwin, which does '
-                f'not tell it from others; remove it with `irtwin workspace drop "{known}"` and run its data set again'
-            )
-        if not same and _folded(known) == _folded(name):
-            raise InputError(
-                f'{workspace.folder}: robot "{name}" differs from "{known}" there in upper and lower case or in the '
-                f"form of letters alone; use the same spelling for the same robot, another name for another"
-            )
-
-
-def _names(workspace: Workspace) -> dict[str, str]:
-    with workspace.reading() as session:
-        return {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}
-
-
-def _folded(name: str) -> str:
-    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
-
-
 def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[str]:
     """Return the IRIs, below the base, of what is read of some runs: they, their samples, files that say of what."""
     ids = list(run_ids)
@@ -262,21 +171,6 @@ def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[
     with workspace.reading() as session:
         series = [f"series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
         return [*map(run_iri, ids), *series, *(f"source_file/{it}" for it in session.scalars(files))]
-
-
-def robot_iri(robot_id: str) -> str:
-    """Return the IRI of a robot's individual, below the workspace's base: see `KnowledgeGraph.iri`."""
-    return f"robot/{robot_id}"
-
-
-def run_iri(run_id: str) -> str:
-    """Return the IRI of a run's individual, likewise."""
-    return f"run/{run_id}"
-
-
-def twin_iri(twin_id: str) -> str:
-    """Return the IRI of a twin's individual, likewise."""
-    return f"twin/{twin_id}"
 
 
 def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:

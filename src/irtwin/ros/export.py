@@ -14,7 +14,8 @@ from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import robot_named
 from irtwin.location import Location
 from irtwin.providers.mesh_files import mesh_copies_of_graph
-from irtwin.providers.records import find_robot, known_twin, load_robot, load_run
+from irtwin.providers.names import find_robot
+from irtwin.providers.records import known_twin, load_robot, load_run
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.robot.description import Robot
 from irtwin.ros.bags import write_bag

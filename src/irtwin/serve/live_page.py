@@ -18,7 +18,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.location import Location
 from irtwin.providers.mesh_files import meshes_of_graph
-from irtwin.providers.records import robot_iri
+from irtwin.providers.names import robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal

@@ -5,8 +5,8 @@ from __future__ import annotations
 import tomllib
 from importlib.resources import files
 
+from irtwin.providers.names import run_iri
 from irtwin.providers.provider import Made
-from irtwin.providers.records import run_iri
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run, RunEnergy
 from irtwin_co2.tables import RunEmission

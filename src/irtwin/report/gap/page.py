@@ -19,7 +19,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.packing import Fragment
 from irtwin.providers.gap import unrecorded
-from irtwin.providers.records import identifier, robot_iri
+from irtwin.providers.names import identifier, robot_iri
 from irtwin.report import wording
 from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
