@@ -22,6 +22,7 @@ from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.evidence import evidence
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import MISSING, Hypothesis, hypotheses
+from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification import progress
 from irtwin.identification.programmes import programmes
@@ -55,7 +56,7 @@ def channel_of(motions, tried, cause=None, rivals=(), part=1.0):
     causes = ()
     if cause:
         (own,) = (one for one in found if (one.effect, one.joint) == (cause, "joint_2"))
-        shown = evidence(system, system.moments(np.full(2, NOISE)), (), own.variants).explained
+        shown = evidence(Projection(system, np.full(2, NOISE), own.variants), (), own.variants).explained
         shape = own.variants[int(np.argmax(shown))]
         causes = (FoundCause(cause, MISSING, ("joint_2",), (shape,), 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
     attribution = Attribution(causes, np.full(2, NOISE), found, np.zeros((len(found), 2)), np.zeros(0))

@@ -16,6 +16,7 @@ from irtwin.gap.isolation.structure_search import _Search, attribute
 from irtwin.gap.regression.evidence import evidence
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.accumulate import Block, triangle
 
@@ -225,8 +226,8 @@ def test_effects_that_share_nothing_are_no_rivals():
 def test_the_unit_of_noise_does_not_matter(unit):
     system, candidates = system_of(np.eye(2), [0.3, 0.1])
     variants = [one.variants[0] for one in candidates]
-    plain = evidence(system, system.moments(np.array([1.0])), (), variants)
-    other = evidence(system, system.moments(np.array([unit])), (), variants)
+    plain = evidence(Projection(system, np.array([1.0]), variants), (), variants)
+    other = evidence(Projection(system, np.array([unit]), variants), (), variants)
     np.testing.assert_allclose(other.explained, plain.explained / unit**2, rtol=1e-3)
     np.testing.assert_allclose(other.rows_that_speak, plain.rows_that_speak, rtol=1e-3)
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant
-from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
 
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
@@ -68,8 +68,7 @@ class Posterior:
     @classmethod
     def beside(
         cls,
-        system: System,
-        moments: Sequence[Moments],
+        projection: Projection,
         found: Sequence[tuple[Hypothesis, Variant]],
         candidates: Sequence[Hypothesis],
         prior: HypothesisPrior,
@@ -81,14 +80,12 @@ class Posterior:
         owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
         chosen = [k for _, variant in found for k in variant.columns]
         known = [one for one, _ in found]
-        log_prior = [
-            prior.log_odds(one, known) - np.log(len(one.variants) * (_SCREENED if shape.effect.screened else 1))
-            for one in candidates
-            for shape in one.variants
-        ]
-        seen = evidence(system, moments, chosen, variants)
-        own = np.sqrt(_where_it_explains(system, misfit, seen))
-        return cls(tuple(candidates), owner, np.array(log_prior), seen, own, limits)
+        odds = [prior.log_odds(one, known) - np.log(len(one.variants)) for one in candidates]
+        screened = [one.effect.screened for one in variants]
+        log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)
+        seen = evidence(projection, chosen, variants)
+        own = np.sqrt(_where_it_explains(projection.system, misfit, seen))
+        return cls(tuple(candidates), owner, log_prior, seen, own, limits)
 
     @cached_property
     def variance(self) -> np.ndarray:
@@ -208,9 +205,7 @@ def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvide
     What it explains in one half of the equations counts by the misfit there.
     """
     explained, own = np.zeros((2, len(seen.variants), len(system.halves)))
-    acts = np.zeros((len(seen.variants), len(misfit)), dtype=bool)
-    for place, variant in enumerate(seen.variants):
-        acts[place] = system.equations(variant.columns)
+    acts = system.equations([variant.columns for variant in seen.variants])
     for k, half in enumerate(system.halves):
         inside = [each == half for each, _ in system.parts]
         explained[:, k] = (seen.said + 2 * seen.missed)[:, inside].sum(axis=1).clip(min=0.0)

@@ -10,15 +10,15 @@ import numpy as np
 
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior, overlap
-from irtwin.gap.regression.evidence import visibility
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
-from irtwin.gap.regression.moments import Moments
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
 from irtwin.identification.progress import tell_step
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
+_KEPT = 2  # projections, each by another noise: a look by what is left, and one back
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
 Found = tuple[Hypothesis, Variant]
@@ -55,7 +55,7 @@ def attribute(
     before = search.beside((), noise)
     tell_step("  how far each effect would show")
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
-    visible = visibility(system, system.moments(noise), shapes)
+    visible = search.projection(noise).visible(shapes)
     found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
     after = search.beside(found, noise)
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
@@ -89,7 +89,8 @@ class _Search:
     limits: Criterion
     floor: np.ndarray | None
     tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
-    weighed: dict[bytes, list[Moments]] = field(default_factory=dict)  # by the last noise
+    leaves: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
+    projections: dict[bytes, Projection] = field(default_factory=dict)  # by the noise of the last looks
 
     def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
         """Try what may stand beside a structure, once; equations are weighed by `noise` (g,)."""
@@ -105,27 +106,26 @@ class _Search:
 
     def _beside(self, found: Sequence[Found], noise: np.ndarray, some: Sequence[Hypothesis] | None = None) -> Posterior:
         """Try all candidates, or some of them."""
-        chosen = _columns(found)
-        taken = set(chosen)
+        taken = set(_columns(found))
         left = [
             one
             for one in (self.candidates if some is None else some)
             if not any(set(variant.columns) & taken for variant in one.variants)
             and not any(_same_place(one, each) for each, _ in found)
         ]
-        line = f"  {len(left)} hypotheses, beside {len(found)} that are found"
-        tell_step(line)
-        moments = self.system.without_noise(self.moments(noise), noise, chosen)
-        tell_step(line)
-        return Posterior.beside(self.system, moments, found, left, self.prior, self.limits, self.misfit(noise))
+        tell_step(f"  {len(left)} hypotheses, beside {len(found)} that are found")
+        return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
 
-    def moments(self, noise: np.ndarray) -> list[Moments]:
-        """Return the products of columns weighed by `noise`; most looks at them are by that of the look before."""
+    def projection(self, noise: np.ndarray) -> Projection:
+        """Return what the twin leaves of all variants by `noise`; most looks are by that of the two looks before."""
         asked = noise.tobytes()
-        if asked not in self.weighed:
-            self.weighed.clear()
-            self.weighed[asked] = self.system.moments(noise)
-        return self.weighed[asked]
+        found = self.projections.pop(asked, None)
+        if len(self.projections) == _KEPT:
+            del self.projections[next(iter(self.projections))]
+        if found is None:
+            found = Projection(self.system, noise, [shape for one in self.candidates for shape in one.variants])
+        self.projections[asked] = found
+        return found
 
     def misfit(self, noise: np.ndarray) -> np.ndarray:
         """Return (g,) the misfit along any effect, squared, as a part of the mean square that is left, `noise`.
@@ -242,8 +242,14 @@ class _Search:
         return pairs[int(np.argmax(-0.5 * count * behind - costs))]
 
     def left(self, found: Sequence[Found], noise: np.ndarray) -> np.ndarray:
-        """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations."""
-        return self.system.residual_rms(_columns(found), noise)
+        """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations.
+
+        Whichever way a structure was come by, it is the same to the last digit, and so are looks by it.
+        """
+        asked = tuple(sorted(_columns(found))), noise.tobytes()
+        if asked not in self.leaves:
+            self.leaves[asked] = self.system.residual_rms(asked[0], noise)
+        return self.leaves[asked]
 
     def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[FoundCause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""

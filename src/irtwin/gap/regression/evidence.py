@@ -15,9 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.gap.regression.hypotheses import Variant, bounds
-from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
-from irtwin.gap.regression.projection import Projected, asked_columns, projected, projected_in
+from irtwin.gap.regression.projection import Projection
 
 _SPEAKS = 1e-3  # of what a variant says in its strongest group: a group with less says nothing of it
 _NOTHING = 1e-12  # squares, in units of the noise: what adds less acts nowhere
@@ -68,70 +67,27 @@ class HypothesisEvidence:
         return np.asarray(np.maximum((more * own + _FEW * typical) / (more + _FEW), 1.0))
 
 
-def evidence(
-    system: System, moments: Sequence[Moments], chosen: Sequence[int], variants: Sequence[Variant]
-) -> HypothesisEvidence:
+def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[Variant]) -> HypothesisEvidence:
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
-    total = Summed(moments)
-    asked = asked_columns(total, [k for variant in variants for k in variant.columns])
-    inside = system.fitted(chosen)
-    whole = projected(system, total, inside, asked)
-    explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(moments)))
+    system = projection.system
+    explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(system.parts)))
     information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
     values: list[np.ndarray] = [np.zeros(0)] * len(variants)
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
-    batches = _batches(system, variants, known)
-    for batch in batches:
-        products, right = _parted(whole, batch.columns)
-        solved = _bounded(products + np.eye(products.shape[1]), right, batch.lowest)
-        explained[batch.place] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
-        for place, own, value in zip(batch.place, products, solved, strict=True):
+    beside = projection.beside(chosen)
+    for places, columns, found, parts in beside.batches(variants):
+        lowest = np.array([_lowest(system, variants[place], known) for place in places])
+        lowest /= system.scale[[variants[place].columns for place in places]]
+        products, right = found[..., :-1], found[..., -1]
+        solved = _bounded(products + np.eye(products.shape[1]), right, lowest)
+        explained[places] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
+        squares, measured = beside.in_parts(columns, parts, solved)
+        said[places], missed[places] = squares.T, (measured - squares).T
+        for place, own, value in zip(places, products, solved, strict=True):
             information[place], values[place] = own, value
-    for group, part in enumerate(moments):
-        seen = projected_in(part, whole, inside)
-        for batch in batches:
-            products, right = _parted(seen, batch.columns)
-            solved = np.array([values[place] for place in batch.place])
-            said[batch.place, group] = _squares(products, solved)
-            missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
     shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
     return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
-
-
-def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Variant]) -> np.ndarray:
-    """Return (V, 2) what each variant adds, with coefficients as large as expected, beyond what the twin imitates.
-
-    As a mean square in units of the noise, and as the part of its columns' squares.
-    """
-    total = Summed(moments)
-    columns = [k for variant in variants for k in variant.columns]
-    whole = projected(system, total, system.fitted(()), asked_columns(total, columns))
-    ends = np.cumsum([len(variant.columns) for variant in variants])[:-1]
-    rows = max(float(system.rows.sum(axis=0).max(initial=0.0)), 1.0)
-    both = zip(*(np.split(each.squares(columns), ends) for each in (whole, total)), strict=True)
-    return np.array([[left.sum() / rows, left.sum() / max(every.sum(), 1e-300)] for left, every in both])
-
-
-@dataclass(frozen=True)
-class _Batch:
-    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, k), `lowest` (V, k)."""
-
-    place: np.ndarray
-    columns: np.ndarray
-    lowest: np.ndarray
-
-
-def _batches(system: System, variants: Sequence[Variant], known: Set[str]) -> list[_Batch]:
-    sizes: dict[int, list[int]] = {}
-    for place, variant in enumerate(variants):
-        sizes.setdefault(len(variant.columns), []).append(place)
-    batches = []
-    for places in sizes.values():
-        columns = np.array([variants[place].columns for place in places])
-        lowest = np.array([_lowest(system, variants[place], known) for place in places])
-        batches.append(_Batch(np.array(places), columns, lowest / system.scale[columns]))
-    return batches
 
 
 def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:
@@ -139,13 +95,6 @@ def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:
     if system.both and variant.columns[0] >= system.changed and variant.effect.id in known:
         return np.full(len(variant.columns), -np.inf)
     return bounds(variant)
-
-
-def _parted(projected: Projected, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the products among columns (V, k), (V, k, k), and with the measurement, (V, k)."""
-    target = np.full((len(columns), 1), projected.whole.size - 1)
-    products = projected.of(np.concatenate([columns, target], axis=1))
-    return products[:, :-1, :-1], products[:, :-1, -1]
 
 
 def _squares(products: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from functools import cached_property, reduce
 
 import numpy as np
 
+_AT_ONCE = 4096  # pairs of columns whose rows are picked
 _AS_ROWS = 4  # an equation with so many times more columns than rows is kept as these rows
 
 
@@ -77,6 +78,13 @@ class Products:
         products *= scale[:, None] * scale
         return cls(places.spread, np.pad(products, (missing, missing)), False)
 
+    @classmethod
+    def summed(cls, parts: Sequence[Products]) -> Products:
+        """Return the products of several groups' rows together."""
+        return cls(
+            parts[0].places, sum((p.held.T @ p.held if p.as_rows else p.held for p in parts), np.zeros(())), False
+        )
+
     @cached_property
     def diagonal(self) -> np.ndarray:
         """(u,) the squares of what is held."""
@@ -91,20 +99,26 @@ class Products:
         """Return the products (r, c) of some held columns with others."""
         if self.as_rows:
             return np.asarray(self.held[:, rows].T @ self.held[:, columns])
+        if len(rows) > len(columns):  # whole rows are picked first: of what is symmetric the fewer
+            return self.held.take(columns, axis=0).take(rows, axis=1).T
         return self.held.take(rows, axis=0).take(columns, axis=1)
 
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        """Return the products (V, k, k) among each row of held columns (V, k)."""
-        if self.as_rows:
-            picked = np.moveaxis(self.held[:, columns], 0, 1)
-            return np.asarray(picked.swapaxes(1, 2) @ picked)
-        return np.asarray(self.held[columns[:, :, None], columns[:, None, :]])
+    def pairs(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Return the product (N,) of each held column with another."""
+        if not self.as_rows:
+            return np.asarray(self.held[one, other])
+        pieces = range(0, len(one), _AT_ONCE)
+        rows = ((self.held[:, side[k : k + _AT_ONCE]] for side in (one, other)) for k in pieces)
+        return np.concatenate([np.zeros(0), *(np.einsum("rn,rn->n", *both) for both in rows)])
 
     def squares(self, weights: np.ndarray) -> float:
         """Return the squares of the sum of all columns, each times its weight (D + 1,)."""
         own = np.bincount(self.places.own, weights[self.places.every], self.held.shape[1])
-        left = self.held @ own
-        return float(left @ left if self.as_rows else own @ left)
+        some = np.flatnonzero(own)  # of many columns few are fitted
+        if self.as_rows:
+            left = self.held[:, some] @ own[some]
+            return float(left @ left)
+        return float(own[some] @ self.among(some, some) @ own[some])
 
 
 class Moments(ABC):
@@ -116,10 +130,6 @@ class Moments(ABC):
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the products (r, c) of some columns with others."""
 
-    @abstractmethod
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        """Return the products (V, k, k) among each row of columns (V, k)."""
-
     def of(self, rows: np.ndarray) -> np.ndarray:
         """Return the products (r, D + 1) of some columns with all."""
         return self.among(rows, np.arange(self.size))
@@ -128,10 +138,6 @@ class Moments(ABC):
     def whole(self) -> np.ndarray:
         """All products, (D + 1, D + 1): of many columns more than fits into memory."""
         return self.of(np.arange(self.size))
-
-    def squares(self, columns: Sequence[int]) -> np.ndarray:
-        """Return the squares (k,) of some columns."""
-        return self.blocks(np.array(columns)[:, None])[:, 0, 0]
 
     def __sub__(self, other: Moments) -> Moments:
         return _Less(self, other)
@@ -145,7 +151,6 @@ class GroupMoments(Moments):
         self.size = products[0].places.size
         order = sorted(range(len(products)), key=lambda equation: not products[equation].places.wide)
         self._weighed = [(products[equation], weights[equation]) for equation in order]
-        self._known: dict[bytes, np.ndarray] = {}  # blocks by their columns: a search asks for the same again and again
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Add up the equations that have any of both: of mostly more columns than rows, each column's side by side."""
@@ -163,29 +168,6 @@ class GroupMoments(Moments):
                 found[here] = part
         return found.T
 
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        """Return each block as it was worked out when it was first asked for."""
-        asked = [row.tobytes() for row in columns]
-        new = [k for k, row in enumerate(asked) if row not in self._known]
-        if new:
-            self._known.update(zip((asked[k] for k in new), self._worked_out(columns[new]), strict=True))
-        return np.array([self._known[row] for row in asked])
-
-    def _worked_out(self, columns: np.ndarray) -> np.ndarray:
-        """Add up the equations: of most blocks they have one column alone, the measurement, and so its square."""
-        found = np.zeros((*columns.shape, columns.shape[1]))
-        for products, weight in self._weighed:
-            places = products.places.at[columns]
-            inside = places >= 0
-            count = inside.sum(axis=1)
-            block, k = np.nonzero(inside & (count == 1)[:, None])
-            found[block, k, k] += products.diagonal[places[block, k]] * weight
-            several = np.flatnonzero(count > 1)
-            if len(several):
-                both = inside[several, :, None] & inside[several, None, :]
-                found[several] += np.where(both, products.blocks(places[several]) * weight, 0.0)
-        return found
-
 
 class Summed(Moments):
     """Those of several groups; what was asked last is kept, as it is asked again beside each group left out."""
@@ -195,7 +177,6 @@ class Summed(Moments):
         self.size = parts[0].size
         self._parts = parts
         self._among: tuple[tuple[bytes, bytes], np.ndarray] | None = None
-        self._blocks: dict[tuple[int, bytes], np.ndarray] = {}
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Add up those of all groups."""
@@ -203,13 +184,6 @@ class Summed(Moments):
         if self._among is None or self._among[0] != asked:
             self._among = asked, _sum(part.among(rows, columns) for part in self._parts)
         return self._among[1]
-
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        """Add up those of all groups."""
-        asked = columns.shape[1], columns.tobytes()
-        if asked not in self._blocks:
-            self._blocks[asked] = _sum(part.blocks(columns) for part in self._parts)
-        return self._blocks[asked]
 
 
 class _Less(Moments):
@@ -221,31 +195,6 @@ class _Less(Moments):
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         return np.asarray(self._whole.among(rows, columns) - self._part.among(rows, columns))
-
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        return np.asarray(self._whole.blocks(columns) - self._part.blocks(columns))
-
-
-class Shifted(Moments):
-    """Those of a group, less (D + 1,) products with the measurement; its own square stays."""
-
-    def __init__(self, whole: Moments, products: np.ndarray):
-        """Take both."""
-        self.size = whole.size
-        self._whole, self._less = whole, np.append(products[:-1], 0.0)
-
-    def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Take off what is with the measurement, which is the last."""
-        found = self._whole.among(rows, columns).copy()  # what is kept elsewhere stays
-        found[:, columns == self.size - 1] -= self._less[rows, None]
-        found[rows == self.size - 1] -= self._less[columns]
-        return found
-
-    def blocks(self, columns: np.ndarray) -> np.ndarray:
-        """Take off what is with the measurement, which is the last."""
-        last, less = columns == self.size - 1, self._less[columns]
-        both = less[:, :, None] * last[:, None, :] + last[:, :, None] * less[:, None, :]
-        return np.asarray(self._whole.blocks(columns) - both)
 
 
 def _sum(arrays: Iterable[np.ndarray]) -> np.ndarray:

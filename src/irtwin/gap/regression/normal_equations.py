@@ -16,12 +16,12 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import CandidateColumn
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, Shifted, Summed, numbers
+from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, numbers
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
 _MOST_BYTES = 3_000_000_000  # of blocks, of all groups' products, and of what is worked out of them:
-_AT_WORK = 6  # products of the twin's columns with all, held at once
+_AT_WORK = 2  # projections, each of them all parts' products of the twin's columns with all
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
 
 
@@ -131,12 +131,16 @@ class System:
         """Return the candidate column of an index, as it is or as a change."""
         return self.columns[(k - self.base) % len(self.columns)]
 
-    def equations(self, columns: Sequence[int]) -> np.ndarray:
-        """Return (g,) whether an equation of their own signal has any of some candidate columns of one effect."""
-        own = [k - len(self.columns) if k >= self.changed else k for k in columns]
-        found = np.asarray(self.pattern[:, own].any(axis=1))
-        if self.beside_power and found[: self.halves[0].stop - 1].any():
-            found[[half.stop - 1 for half in self.halves]] = False
+    def equations(self, columns: Sequence[Sequence[int]]) -> np.ndarray:
+        """Return whether an equation of their own signal has any of candidate columns of V effects, (V, g)."""
+        if not columns:
+            return np.zeros((0, len(self.pattern)), dtype=bool)
+        flat, first = np.concatenate(columns), np.cumsum([0, *map(len, columns[:-1])])
+        own = np.where(flat >= self.changed, flat - len(self.columns), flat)
+        found: np.ndarray = np.logical_or.reduceat(self.pattern[:, own], first, axis=1).T
+        if self.beside_power:
+            of_torque = found[:, : self.halves[0].stop - 1].any(axis=1, keepdims=True)
+            found[:, [half.stop - 1 for half in self.halves]] &= ~of_torque
         return found
 
     @property
@@ -173,7 +177,7 @@ class System:
     @cached_property
     def scale(self) -> np.ndarray:
         """(D,) the prior's standard deviations; factors are taken in units of it."""
-        return np.array([term.spread for term in self.all_terms[: self._size]])
+        return np.array([term.spread for term in self.all_terms[: self.size]])
 
     @cached_property
     def expected(self) -> np.ndarray:
@@ -193,7 +197,8 @@ class System:
         return np.asarray(self.prior_rows.T @ self.prior_rows)
 
     @property
-    def _size(self) -> int:
+    def size(self) -> int:
+        """D, how many columns there are; the measurement's index."""
         return self.base + len(self.columns) * (2 if self.both else 1)
 
     @cached_property
@@ -216,7 +221,7 @@ class System:
     def _among_all(self, equation: int, observed: bool, products: np.ndarray) -> np.ndarray:
         """Return products with what an equation holds, (k + 1,), as those with all columns, (D + 1,)."""
         places = self._places[observed][equation]
-        found = np.zeros(self._size + 1)
+        found = np.zeros(self.size + 1)
         found[places.every] = products[places.own] * self._units[places.every]
         found[-1] -= products @ self._expected[equation]
         return found
@@ -244,16 +249,16 @@ class System:
         for row in self.pattern:
             used = np.flatnonzero(row)
             own, held = int((used < self.base).sum()), np.arange(len(used) + 1)
-            alone.append(Places(np.append(used, self._size), held, self._size + 1))
-            every = np.concatenate([used, used[own:] + len(self.columns), [self._size]])
-            twice.append(Places(every, np.concatenate([held[:-1], held[own:]]), self._size + 1))
+            alone.append(Places(np.append(used, self.size), held, self.size + 1))
+            every = np.concatenate([used, used[own:] + len(self.columns), [self.size]])
+            twice.append(Places(every, np.concatenate([held[:-1], held[own:]]), self.size + 1))
         return alone, twice if self.both else alone
 
     def _fits_in_memory(self) -> None:
         """Refuse what would take too much, before more is taken."""
         columns = self.pattern.sum(axis=1) + 1
         rows = np.minimum([[len(factor) for factor in block.factors] for block in self.blocks], columns)
-        held = float((rows * columns).sum()) + _AT_WORK * self.base * self._size
+        held = float((rows * columns).sum()) + _AT_WORK * len(self.parts) * self.base * self.size
         for group in range(self.groups):
             own = rows[self.group == group].sum(axis=0)
             held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))
@@ -277,38 +282,58 @@ class System:
         """The halves of the groups, (P,): of which equations, and of which group."""
         return [(half, group) for half in self.halves for group in range(self.groups)]
 
-    def without_noise(self, moments: Sequence[Moments], noise: np.ndarray, chosen: Sequence[int]) -> list[Moments]:
-        """Return each part's `moments`, weighted by `noise` (g,), less what noise of positions seems to explain.
+    def shaken_products(self, coefficients: np.ndarray, noise: np.ndarray) -> np.ndarray | None:
+        """Return the products (P, D + 1) of all columns with what noise of positions seems to explain, in each part.
 
-        A fit of the twin's terms and the chosen columns leaves the noise of these, times their coefficients; the
-        products of all columns with that are taken off those with the measurement.
+        That is the noise of all columns times their (D + 1,) coefficients, in units of the prior. Equations are
+        weighted by `noise` (g,). None where no noise of positions is known.
         """
         if self.shaken is None:
-            return list(moments)
-        left = np.append(-self.solution(chosen, Summed(moments)), 1.0)
+            return None
         weights = np.maximum(noise, self.quietest) ** -2.0
         a_row = [
             np.array(
                 [
-                    weight * self._among_all(k, observed, products @ self._held(k, observed, left))
+                    weight * self._among_all(k, observed, _times(products, self._held(k, observed, coefficients)))
                     for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
                 ]
             )
             for observed in (False, True)
         ]
+        return np.array(
+            [self.rows[group, half] @ a_row[int(self.group_observed[group])][half] for half, group in self.parts]
+        )
+
+    def products_of(self, one: np.ndarray, other: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Return in each part the product of each column with another, (N,) indices: (P, N); weighted by `noise`."""
+        found = np.zeros((len(self.halves), self.groups, len(one)))
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        for equation, weight in enumerate(weights):
+            half = equation // (len(weights) // len(self.halves))
+            for observed in (False, True):
+                at = self._places[observed][equation].at
+                some = np.flatnonzero((at[one] >= 0) & (at[other] >= 0))
+                held = at[one[some]], at[other[some]]
+                for group in np.flatnonzero(self.group_observed == observed):
+                    found[half, group, some] += weight * self._products[group][equation].pairs(*held)
+        return found.reshape(-1, len(one))
+
+    @cached_property
+    def _together(self) -> list[list[Products]]:
+        """Each equation's products over all groups: those that are observed, and the others."""
+        kinds = [np.flatnonzero(self.group_observed == kind) for kind in np.unique(self.group_observed)]
         return [
-            Shifted(own, self.rows[group, half] @ a_row[int(self.group_observed[group])][half])
-            for own, (half, group) in zip(moments, self.parts, strict=True)
+            [Products.summed(own) for own in zip(*(self._products[k] for k in kind), strict=True)] for kind in kinds
         ]
 
     def _weighted_among(
-        self, inside: np.ndarray, groups: Sequence[int] | np.ndarray, noise: np.ndarray
+        self, inside: np.ndarray, groups: Sequence[Sequence[Products]], noise: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the products among `inside` columns (k, k), and with the measurement (k,), over some groups."""
-        every = np.append(inside, self._size)
+        """Return the products among `inside` columns (k, k), and with the measurement (k,), over some groups' own."""
+        every = np.append(inside, self.size)
         total = np.zeros((len(every), len(every)))
-        for group in groups:
-            for products, level in zip(self._products[group], np.maximum(noise, self.quietest), strict=True):
+        for own in groups:
+            for products, level in zip(own, np.maximum(noise, self.quietest), strict=True):
                 held = products.places.at[every]
                 there = np.flatnonzero(held >= 0)
                 total[np.ix_(there, there)] += products.among(held[there], held[there]) / float(level) ** 2
@@ -319,7 +344,10 @@ class System:
 
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
-        found = self.rms(chosen, noise, range(self.groups), range(self.groups))
+        inside, every = self.fitted(chosen), self._together
+        vector = self._solved(inside, *self._weighted_among(inside, every, noise))
+        rows = np.maximum(self.rows.sum(axis=0), 1)
+        found = np.sqrt(np.sum([_squares(own, vector) for own in every], axis=0) / rows)
         found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
         if self.apart:  # few rows are fitted easily: no law is known better where friction turns
             fast, slow = np.split(found, 2)
@@ -340,14 +368,14 @@ class System:
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
         inside = self.fitted(chosen)
-        vector = self._solved(inside, *self._weighted_among(inside, fitted, noise))
+        vector = self._solved(inside, *self._weighted_among(inside, [self._products[k] for k in fitted], noise))
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
     def solution(self, chosen: Sequence[int], total: Moments) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
         inside = self.fitted(chosen)
-        products = total.among(inside, np.append(inside, self._size))
+        products = total.among(inside, np.append(inside, self.size))
         return self._solved(inside, products[:, :-1], products[:, -1])
 
     def fitted(self, chosen: Sequence[int]) -> np.ndarray:
@@ -355,14 +383,23 @@ class System:
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
 
     def _solved(self, inside: np.ndarray, among: np.ndarray, right: np.ndarray) -> np.ndarray:
-        vector = np.zeros(self._size)
+        vector = np.zeros(self.size)
         vector[inside] = solved(factored(among, self.prior(inside[self.base :])), right)
         return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
         """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
-        weights = np.append(-vector, 1.0)
-        return np.maximum([products.squares(weights) for products in self._products[group]], 0.0)
+        return _squares(self._products[group], vector)
+
+
+def _times(products: np.ndarray, values: np.ndarray) -> np.ndarray:
+    some = np.flatnonzero(values)  # of many columns few are fitted
+    return np.asarray(values[some] @ products[some])
+
+
+def _squares(products: Sequence[Products], vector: np.ndarray) -> np.ndarray:
+    weights = np.append(-vector, 1.0)
+    return np.maximum([own.squares(weights) for own in products], 0.0)
 
 
 def _change(term: Term) -> Term:

@@ -1,64 +1,199 @@
-"""What a fit leaves of columns: their products."""
+"""What a fit of the twin's terms leaves of candidate columns: their products, part by part, by one noise.
+
+A search asks again and again what variants explain beside this structure or that. The twin's terms are in all of them:
+they are taken off once. What was found is a few columns, and is taken off what is left then.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
-from irtwin.gap.regression.moments import Moments
+from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import System
 
-_PANEL = 256  # rows of a product of matrices, at least
+
+class Projection:
+    """Products of what the twin's terms leave of variants' columns; fitted to all parts (P,), weighted by `noise` (g,).
+
+    A columns are asked for, the measurement is the last. Raises InputError where they would take too much memory.
+    """
+
+    def __init__(self, system: System, noise: np.ndarray, variants: Sequence[Variant]):
+        """Take the twin's terms off the columns of variants."""
+        self.system, self._noise = system, noise
+        self._moments = system.moments(noise)
+        self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
+        base = np.arange(system.base)
+        found = [own.among(base, np.append(base, self._asked)) for own in self._moments]
+        self._inner = np.array([own[:, : system.base] for own in found])  # (P, K, K)
+        self._across = np.array([own[:, system.base :].T for own in found])  # (P, A, K)
+        self._all = self._across.sum(axis=0)
+        self._factor = factored(self._inner.sum(axis=0), system.prior())
+        self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
+        self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: products with all, and in each part
+        self._batches: list[tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = []
+        self._squares: dict[tuple[int, ...], tuple[float, float]] = {}  # of variants: what is left, and all
+        self._project(variants)
+
+    def _project(self, variants: Sequence[Variant]) -> None:
+        """Work out the products among each variant's columns, those of one number at once."""
+        sizes: dict[int, list[tuple[int, ...]]] = {}
+        for one in variants:
+            sizes.setdefault(len(one.columns), []).append(one.columns)
+        if not sizes:
+            return
+        each = [self._at([[*columns, self.system.size] for columns in own]) for own in sizes.values()]
+        pairs = [np.broadcast_arrays(columns[:, :-1, None], columns[:, None, :]) for columns in each]
+        flat = [self._asked[np.concatenate([one[side].ravel() for one in pairs])] for side in (0, 1)]
+        products = self.system.products_of(flat[0], flat[1], self._noise)
+        ends = np.cumsum([one.size for one, _ in pairs])[:-1]
+        every = [
+            found.reshape(-1, *one.shape)
+            for found, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
+        ]
+        before = [found.sum(axis=0) for found in every]
+        imitated = [self._imitated[columns] for columns in each]
+        for part, inner in enumerate(self._inner):
+            half = self._across[part] - self._imitated @ inner / 2  # what is left is symmetric in it
+            for columns, own, found in zip(each, imitated, every, strict=True):
+                other = half[columns]
+                found[part] -= _pairs(own[:, :-1], other) + _pairs(other[:, :-1], own)
+        for known, columns, own, whole, found in zip(sizes.values(), each, imitated, before, every, strict=True):
+            after = whole - _pairs(own[:, :-1], self._all[columns])
+            squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, whole)), strict=True)
+            self._squares |= zip(known, squares, strict=True)
+            self._batches.append((dict(zip(known, range(len(known)), strict=True)), after, found))
+
+    def visible(self, variants: Sequence[Variant]) -> np.ndarray:
+        """Return (V, 2) what variants add, with coefficients as large as expected, beyond what the twin imitates.
+
+        As a mean square in units of the noise, and as the part of its columns' squares.
+        """
+        rows = max(float(self.system.rows.sum(axis=0).max(initial=0.0)), 1.0)
+        left, every = np.array([self._squares[one.columns] for one in variants]).reshape(-1, 2).T
+        return np.column_stack([left / rows, left / np.maximum(every, 1e-300)])
+
+    def _at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
+        return np.searchsorted(self._asked, np.array(columns, dtype=int))
+
+    def _of(self, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products of chosen columns with all, over all parts (c, A) and in each (P, c, A)."""
+        new = [k for k in chosen if k not in self._rows]
+        if new:
+            at = self._at(new)
+            own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
+            whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
+            left = self._across[:, at] - self._imitated[at] @ self._inner
+            own -= self._imitated[at] @ self._across.swapaxes(1, 2) + left @ self._imitated.T
+            self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
+        size = len(self._asked)
+        whole = np.array([self._rows[k][0] for k in chosen]).reshape(-1, size)
+        parts = [self._rows[k][1] for k in chosen]
+        return whole, np.stack(parts, axis=1) if parts else np.zeros((len(self._moments), 0, size))
+
+    def beside(self, chosen: Sequence[int]) -> Beside:
+        """Take `chosen` columns off as well, and what noise of positions seems to explain off the measurement."""
+        at, (whole, parts) = self._at(chosen), self._of(chosen)
+        factor = factored(whole[:, at]) if len(at) else None
+        imitated = whole if factor is None else solved(factor, whole)  # (c, A)
+        shaken = self._shaken(at, imitated[:, -1])
+        if shaken is not None:
+            of_all, of_parts = self.less_noise(at, shaken)
+            whole[:, -1] += of_all
+            parts[..., -1] += of_parts
+            imitated = whole if factor is None else solved(factor, whole)
+        return Beside(self, at, whole, parts, imitated, shaken)
+
+    def _shaken(self, at: np.ndarray, imitated: np.ndarray) -> Shaken | None:
+        """Return what noise of positions seems to explain beside columns at places `at` (c,); None where it is unknown.
+
+        The twin's terms and these columns leave their own noise times their coefficients, `imitated` (c,) of columns.
+        """
+        coefficients = np.zeros(self.system.size + 1)
+        coefficients[self._asked[at]] = -imitated
+        coefficients[: self.system.base] = imitated @ self._imitated[at] - self._imitated[-1]
+        coefficients[-1] = 1.0
+        less = self.system.shaken_products(coefficients, self._noise)
+        return None if less is None else Shaken(less, solved(self._factor, less[:, : self.system.base].sum(axis=0)))
+
+    def less_noise(self, at: np.ndarray, shaken: Shaken) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the products of columns at places `at` (n,) with the measurement gain without noise of positions.
+
+        Over all parts (n,) and in each (P, n).
+        """
+        less, change = shaken
+        of_base, of_own = less[:, : self.system.base], less[:, self._asked[at]]
+        parts = (
+            self._across.take(at, axis=1) @ change - of_own + (of_base - self._inner @ change) @ self._imitated[at].T
+        )
+        return self._all[at] @ change - of_own.sum(axis=0), parts
+
+    def batches(self, variants: Sequence[Variant]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Yield of the variants of one number of columns, k, which they are (V,), the places of these columns (V, k).
+
+        And the products among these and with the measurement, (V, k, k + 1), over all parts and in each (P, ...).
+        """
+        for known, whole, parts in self._batches:
+            some = [(place, known[one.columns]) for place, one in enumerate(variants) if one.columns in known]
+            if some:
+                which, own = np.array(some).T
+                yield which, self._at([variants[place].columns for place in which]), whole[own], parts[:, own]
+
+
+class Shaken(NamedTuple):
+    """What noise of positions seems to explain: its products `less` (P, D + 1) with all columns.
+
+    `change` (K,): by how much less the twin's terms imitate of the measurement without it.
+    """
+
+    less: np.ndarray
+    change: np.ndarray
 
 
 @dataclass(frozen=True)
-class Projected:
-    """Products of what a fit leaves of the columns that are `asked` (a,), worked out where they are needed.
+class Beside:
+    """What the twin's terms and c columns, at places `at`, leave.
 
-    `whole`: products of the columns as they are; of each pair (a, c) the product is taken off.
+    whole, imitated (c, A): products of these columns with all, and how they imitate all; parts (P, c, A).
     """
 
-    whole: Moments
-    asked: np.ndarray
-    pairs: tuple[tuple[np.ndarray, np.ndarray], ...]
+    projection: Projection
+    at: np.ndarray
+    whole: np.ndarray
+    parts: np.ndarray
+    imitated: np.ndarray
+    shaken: Shaken | None
 
-    def of(self, columns: np.ndarray) -> np.ndarray:
-        """Return the products among each row of columns: (V, k) -> (V, k, k)."""
-        found = self.whole.blocks(columns)
-        places = np.searchsorted(self.asked, columns)
-        for left, right in self.pairs:
-            found = found - left[places] @ right[places].swapaxes(1, 2)
-        return found
+    def batches(self, variants: Sequence[Variant]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Yield what `Projection.batches` does, over all parts beside these columns."""
+        for which, columns, whole, parts in self.projection.batches(variants):
+            if self.shaken is not None:
+                of_all, of_parts = self.projection.less_noise(columns.ravel(), self.shaken)
+                whole[..., -1] += of_all.reshape(columns.shape)
+                parts[..., -1] += of_parts.reshape(-1, *columns.shape)
+            beside = np.column_stack([columns, np.full(len(columns), -1)])
+            whole -= np.einsum("cvi,cvj->vij", self.imitated[:, columns], self.whole[:, beside])
+            yield which, columns, whole, parts
 
-    def squares(self, columns: Sequence[int]) -> np.ndarray:
-        """Return the squares (k,) of some columns."""
-        return self.of(np.array(columns)[:, None])[:, 0, 0]
+    def in_parts(self, columns: np.ndarray, products: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the squares (P, V) of columns (V, k) times values (V, k), and their products with the measurement.
 
-
-def projected(system: System, total: Moments, inside: np.ndarray, asked: np.ndarray) -> Projected:
-    """Return the products of what a fit of the columns `inside` to all groups leaves of the columns `asked`."""
-    products = total.among(inside, np.append(inside, asked))
-    among, beside = products[:, : len(inside)], products[:, len(inside) :]
-    weights = solved(factored(among, system.prior(inside[system.base :])), beside)
-    return Projected(total, asked, ((np.ascontiguousarray(beside.T), np.ascontiguousarray(weights.T)),))
-
-
-def projected_in(part: Moments, whole: Projected, inside: np.ndarray) -> Projected:
-    """Return the same products in one group, by the fit to all."""
-    asked, own = whole.asked, whole.pairs[0][1]
-    seen = part.among(inside, np.append(inside, asked))
-    across = np.ascontiguousarray(seen[:, len(inside) :].T)
-    return Projected(part, asked, ((own, across - own @ seen[:, : len(inside)]), (across, own)))
+        In each part beside these columns, of the `products` (P, V, k, k + 1) that `batches` gives.
+        """
+        weights = np.einsum("cvi,vi->cv", self.imitated[:, columns], values)
+        across = np.einsum("pcvi,vi->pcv", self.parts.take(columns, axis=2), values)
+        inner = self.parts[..., self.at] @ weights
+        squares = np.einsum("pvij,vi,vj->pv", products[..., :-1], values, values)
+        squares -= np.einsum("cv,pcv->pv", weights, 2 * across - inner)
+        measured = np.einsum("pvi,vi->pv", products[..., -1], values) - self.parts[..., -1] @ weights
+        return squares, measured - np.einsum("c,pcv->pv", self.imitated[:, -1], across - inner)
 
 
-def asked_columns(total: Moments, columns: Sequence[int]) -> np.ndarray:
-    """Return the columns that are asked for and the measurement, in order.
-
-    A few are made more by repeating the last: BLAS rounds products of few rows in a way of its own, and what comes out
-    should not depend on what else is asked.
-    """
-    asked = np.unique([*columns, total.size - 1])
-    return np.pad(asked, (0, max(0, _PANEL - len(asked))), mode="edge")
+def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the products (V, i, j) of each variant's rows, (V, i, K) and (V, j, K)."""
+    return np.asarray(np.einsum("vik,vjk->vij", left, right))
