@@ -16,7 +16,7 @@ STEPS = {
     "windows": "windows of",
     "ripples": "ripples of",
     "places of effects": "places of",
-    "trials": "hypotheses, beside",
+    "trials": "hypotheses tried for the next cause",
     "judged": "how far the gap closes, group",
     "shares": "causes leave",
     "estimate": "coefficients, weighed",

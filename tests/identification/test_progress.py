@@ -5,7 +5,7 @@ from tests.synthetic import arm, swing
 
 from irtwin.identification import progress
 from irtwin.identification.accumulate import Rows, accumulate
-from irtwin.identification.progress import tell, tell_step, telling
+from irtwin.identification.progress import tell, tell_step, telling, told
 
 MOTIONS = [swing(arm(2), seed, seconds=4.0) for seed in (1, 2)]
 
@@ -24,6 +24,15 @@ def said(every, monkeypatch):
 
 def test_long_work_says_how_far_it_has_come(monkeypatch):
     assert said(0.0, monkeypatch) == [f"  run {number} of 2, 0 % of it" for number in (1, 2)]
+
+
+def test_what_is_done_and_what_is_left_is_told_where_both_are_known(monkeypatch):
+    monkeypatch.setattr(progress, "_EVERY", 0.0)
+    lines = []
+    with telling(lines.append):
+        assert list(told("ab", "a letter")) == ["a", "b"]
+        assert list(told(range(1), lambda number: f"number {number}")) == [0]
+    assert lines == ["  a letter, 1 of 2", "  a letter, 2 of 2", "  number 0, 1 of 1"]
 
 
 def test_short_work_says_nothing(monkeypatch):

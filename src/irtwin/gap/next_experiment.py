@@ -18,7 +18,7 @@ from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.gap.rehearsal import Equations, Rehearsal
 from irtwin.gap.thresholds import Criterion, Thresholds
 from irtwin.identification.programmes import LONGEST, ExperimentProgramme, programmes
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import told
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -111,7 +111,8 @@ def next_experiment(
     names = tuple(dict.fromkeys(name for one in asked for name in (one.effect, *one.rivals)))
     joints = tuple(joint for joint in robot.joint_names if any(joint in one.joints for one in asked))
     effects = [catalogue()[name] for name in names]
-    weighed = [(one, _weighed(one, asked)) for one in programmes(robot, joints, seen, effects)]
+    every = told(programmes(robot, joints, seen, effects), lambda one: f"weighing {one.kind.replace('_', ' ')}")
+    weighed = [(one, [question for each in asked for question in each.answered(one)]) for one in every]
     note = _note([told for _, told in weighed], enough)
     weighed = _answerable(weighed, enough)
     chosen, questions = _best(weighed, enough)
@@ -190,11 +191,6 @@ def _known(finding: ChannelFinding) -> tuple[tuple[Hypothesis, ...], dict[int, f
     ]
     fitted = zip(finding.used, finding.estimate.values.tolist(), strict=True)
     return tuple(true), {k: value for k, value in fitted if k >= finding.system.base}
-
-
-def _weighed(programme: ExperimentProgramme, asked: Sequence[_Asked]) -> list[Question]:
-    tell_step(f"  weighing {programme.kind.replace('_', ' ')}")
-    return [question for one in asked for question in one.answered(programme)]
 
 
 def _answerable(weighed: list[Weighed], enough: float) -> list[Weighed]:

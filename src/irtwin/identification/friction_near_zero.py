@@ -16,7 +16,7 @@ from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import told
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -70,11 +70,8 @@ def _found(
 ) -> list[Turn | None]:
     """Return the best of the turns that are tried in each joint; None where there is none."""
     blocks, pattern = _reduced(stack, open_shapes, motions, tried)
-    found = []
-    for joint, turns in enumerate(tried):
-        tell_step(f"  friction near zero speed, joint {joint + 1} of {len(tried)}")
-        found.append(_best(blocks, pattern, joint, turns) if turns else None)
-    return found
+    every = told(enumerate(tried), "friction near zero speed, joint")
+    return [_best(blocks, pattern, joint, turns) if turns else None for joint, turns in every]
 
 
 def _around(found: Turn) -> list[Turn]:

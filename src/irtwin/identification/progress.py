@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from typing import TypeVar
 
 from irtwin.identification.two_processes import in_copy
+
+Item = TypeVar("Item")
 
 _EVERY = 2.5  # s between two lines at least: with a step that long there is one each 5 s, and short work says none
 
@@ -49,3 +52,11 @@ def tell_step(line: str) -> None:
     one = _listener.get()
     if one is not None and time.monotonic() - one.last >= _EVERY and not in_copy():
         tell(line)
+
+
+def told(items: Iterable[Item], line: str | Callable[[Item], str]) -> Iterator[Item]:
+    """Yield items; tell of each, as `tell_step` does, the line, which it is, and of how many."""
+    every = list(items)
+    for number, one in enumerate(every, start=1):
+        tell_step(f"  {line if isinstance(line, str) else line(one)}, {number} of {len(every)}")
+        yield one

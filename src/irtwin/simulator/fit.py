@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import tell_step, told
 from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import PlayedStretch, play
@@ -206,7 +206,7 @@ class Fit:
             best = self.best((best, *tried), together)
             damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
             left = 1e3 * np.sqrt(best.squares[:, 0].mean())
-            tell_step(f"  numbers of servos, pass {number + 1}: {left:.3g} mrad left")
+            tell_step(f"  numbers of servos, pass {number + 1} of {passes} at most: {left:.3g} mrad left")
             if (before - self.cost(best) < _WORTH).all():
                 break
         return best
@@ -292,7 +292,7 @@ class Fit:
         own, tried = self.servos.numbers, []
         free = self.servos.can_differ.copy()
         free[[NAMES.index("stiffness"), NAMES.index("holding")]] = False
-        for times in _TIMES:
+        for times in told(_TIMES, "stiffness to begin with"):
             stiffness = own[0] * times
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
             grid = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]

@@ -18,7 +18,7 @@ from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import told
 
 _DRAWN = 32  # partitions into halves; of five groups there are ten
 _EXACT = 8  # causes: 256 subsets
@@ -124,15 +124,13 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     def left(members: frozenset[int]) -> np.ndarray:
         chosen = [k for player in sorted(members) for k in players[player]]
         total, moments = totals[bool(members)], weighed[bool(members)]
-        found = []
-        for group in judged:
-            tell_step(f"  what {len(members)} of {len(players)} causes leave, group {group + 1} of {len(moments)}")
-            found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
-        return np.array(found)
+        every = [system.solution(chosen, total - moments[group]) for group in judged]
+        return np.array([system.squares(one, int(group)) for group, one in zip(judged, every, strict=True)])
 
     count = len(players)
     values = np.zeros((count, len(judged), len(system.pattern)))
-    for player, before, weight in _exact(count) if count <= _EXACT else _drawn(count, seed):
+    sets = _exact(count) if count <= _EXACT else _drawn(count, seed)
+    for player, before, weight in told(sets, "what causes leave, each set of them"):
         values[player] += weight * (left(before) - left(before | {player}))
     return apart.counted(values)
 

@@ -14,7 +14,7 @@ from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import told
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
@@ -48,12 +48,10 @@ def attribute(
     """
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
-    tell_step("  what the twin leaves")
-    noise = system.residual_rms((), np.ones(len(system.pattern)))
-    tell_step("  what the twin leaves")
-    noise = system.residual_rms((), noise)
+    noise = np.ones(len(system.pattern))
+    for _ in told(range(2), "what the twin leaves, look"):
+        noise = system.residual_rms((), noise)
     before = search.beside((), noise)
-    tell_step("  how far each effect would show")
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = search.projection(noise).visible(shapes)
     found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
@@ -113,7 +111,6 @@ class _Search:
             if not any(set(variant.columns) & taken for variant in one.variants)
             and not any(_same_place(one, each) for each, _ in found)
         ]
-        tell_step(f"  {len(left)} hypotheses, beside {len(found)} that are found")
         return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
 
     def projection(self, noise: np.ndarray) -> Projection:
@@ -146,7 +143,9 @@ class _Search:
         Two effects of one joint hide each other: neither is likely until both are there.
         """
         found: list[Found] = []
-        while len(found) < _MOST and (new := self.likely(posterior, found, noise, _HOPELESS)) is not None:
+        for _ in told(range(_MOST), f"{len(self.candidates)} hypotheses tried for the next cause"):
+            if (new := self.likely(posterior, found, noise, _HOPELESS)) is None:
+                break
             found.append(new)
             noise = self.left(found, noise)
             posterior = self.beside(found, noise)
@@ -173,7 +172,7 @@ class _Search:
     def pruned(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Drop what is less likely than nothing beside the others, the least likely first."""
         while found:
-            odds = [self.odds(one, found, noise) for one in found]
+            odds = [self.odds(one, found, noise) for one in told(found, "whether each cause is needed")]
             worst = int(np.argmin(odds))
             if odds[worst] > 0:
                 break
@@ -190,7 +189,7 @@ class _Search:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
         for _ in range(_SWEEPS):
             before = list(found)
-            for one in before:
+            for one in told(before, "each cause taken out and looked for anew"):
                 rest = [each for each in found if each is not one]
                 new = self.likely(self.beside(rest, noise), rest, noise)
                 found = rest if new is None else [*rest, new]
@@ -204,12 +203,12 @@ class _Search:
     def paired(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
         for _ in range(_SWEEPS):
-            for one, other in combinations(found, 2):
-                if one[0].joint and _where(one[0]) == _where(other[0]):
-                    rest = [each for each in found if each is not one and each is not other]
-                    pair = self.likeliest_pair(rest, noise, one[0])
-                    if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
-                        break
+            pairs = [(a, b) for a, b in combinations(found, 2) if a[0].joint and _where(a[0]) == _where(b[0])]
+            for one, other in told(pairs, "two causes of one joint looked for anew"):
+                rest = [each for each in found if each is not one and each is not other]
+                pair = self.likeliest_pair(rest, noise, one[0])
+                if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
+                    break
             else:
                 break
             found = [*rest, *pair]
@@ -225,8 +224,9 @@ class _Search:
         explained, costs, scales = [], [], []
         there = [one for one in self.candidates if _where(one) == _where(like)]
         alone = self._beside(rest, noise, there)
-        for first, hypothesis in enumerate(alone.hypotheses):
-            found = hypothesis, alone.variant(first)
+        firsts = [(hypothesis, alone.variant(place)) for place, hypothesis in enumerate(alone.hypotheses)]
+        self.projection(noise).prepare(_columns(firsts))
+        for first, found in enumerate(firsts):
             beside = self._beside([*rest, found], noise, there)
             second = beside.first(-np.inf)
             if second is not None:
@@ -254,7 +254,7 @@ class _Search:
     def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[FoundCause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
         parts: dict[tuple[str, str], list[FoundCause]] = {}
-        for one in found:
+        for one in told(found, "what could be in each cause's place"):
             parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.instead(one, found, noise)))
         return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
 

@@ -10,7 +10,7 @@ import scipy
 
 from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import tell_step
+from irtwin.identification.progress import told
 
 _RESAMPLED = 1000
 
@@ -87,8 +87,6 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
 
 def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
     """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
-    total, found = Summed(moments), []
-    for group in judged:
-        tell_step(f"  how far the gap closes, group {group + 1} of {len(moments)} left out")
-        found.append(system.squares(system.solution(chosen, total - moments[group]), int(group)))
-    return np.array(found)
+    total, every = Summed(moments), told(judged, "how far the gap closes, group left out")
+    left = [system.squares(system.solution(chosen, total - moments[group]), int(group)) for group in every]
+    return np.array(left)

@@ -15,6 +15,7 @@ import numpy as np
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import System
+from irtwin.identification.progress import told
 
 
 class Projection:
@@ -29,7 +30,8 @@ class Projection:
         self._moments = system.moments(noise)
         self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
         base = np.arange(system.base)
-        found = [own.among(base, np.append(base, self._asked)) for own in self._moments]
+        every = told(self._moments, "what the twin imitates, part")
+        found = [own.among(base, np.append(base, self._asked)) for own in every]
         self._inner = np.array([own[:, : system.base] for own in found])  # (P, K, K)
         self._across = np.array([own[:, system.base :].T for own in found])  # (P, A, K)
         self._all = self._across.sum(axis=0)
@@ -81,16 +83,22 @@ class Projection:
     def _at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
         return np.searchsorted(self._asked, np.array(columns, dtype=int))
 
+    def prepare(self, chosen: Sequence[int]) -> None:
+        """Work out what is asked of columns that are to be `beside`: of many at once it takes little longer."""
+        new = [k for k in chosen if k not in self._rows]
+        if not new:
+            return
+        at = self._at(new)
+        own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
+        whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
+        left = self._across[:, at] - self._imitated[at] @ self._inner
+        for found, across, own_left in zip(own, self._across, left, strict=True):
+            found -= self._imitated[at] @ across.T + own_left @ self._imitated.T
+        self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
+
     def _of(self, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
         """Return the products of chosen columns with all, over all parts (c, A) and in each (P, c, A)."""
-        new = [k for k in chosen if k not in self._rows]
-        if new:
-            at = self._at(new)
-            own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
-            whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
-            left = self._across[:, at] - self._imitated[at] @ self._inner
-            own -= self._imitated[at] @ self._across.swapaxes(1, 2) + left @ self._imitated.T
-            self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
+        self.prepare(chosen)
         size = len(self._asked)
         whole = np.array([self._rows[k][0] for k in chosen]).reshape(-1, size)
         parts = [self._rows[k][1] for k in chosen]
