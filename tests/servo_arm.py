@@ -36,6 +36,7 @@ MODEL = """<mujoco model="arm">
 </mujoco>
 """
 STOPPED = MODEL.replace('name="lift"', 'name="lift" limited="true" range="-1.2 1.2"')  # what falls ends there
+GAINS = "[robot.joint.lift]\nkp = 20.0\nkd = 0.8\n[robot.joint.elbow]\nkp = 15.0\nkd = 0.6\n"
 _LINK = """<link name="{}"><inertial><origin xyz="0.1 0 0"/><mass value="{}"/>
 <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>"""
 _JOINT = """<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><origin xyz="{} 0 0"/>

@@ -201,10 +201,10 @@ def _played(data_set: DataSet, model: Model) -> Playing | None:
 
 def _check_playable(data_set: DataSet, model: Model | None, asked: bool) -> None:
     """Raise InputError where nothing is played that MuJoCo's own system identification could fit."""
-    if asked or model is None or model.gains or not (data_set.is_commanded or _can_play(data_set, model)):
+    if asked or model is None or not (data_set.is_commanded or _can_play(data_set, model)):
         raise InputError(
             f"{data_set.folder}: a script for mujoco.sysid fits what is played: it needs commands (cmd_JOINT) in all "
-            "runs, and a simulator's model with position servos of its own"
+            "runs, and a simulator's model with position servos, or the gains of its controller (kp, kd)"
         )
 
 

@@ -74,7 +74,6 @@ def test_commands_beyond_the_models_range_are_counted(tmp_path):
     assert own.clipped(np.array([[0.0, 1.0], [0.0, 1.6], [0.0, -1.7], [1.0, 0.0]])) == {"elbow": 0.5}
 
 
-GAINS = "[robot.joint.lift]\nkp = 20.0\nkd = 0.8\n[robot.joint.elbow]\nkp = 15.0\nkd = 0.6\n"
 OWN = '<dynamics damping="0.1" friction="0.05"/>'
 BARE = servo_arm.MODEL.replace('armature="0.02"', 'armature="0"').replace(' forcerange="-5 5"', "")
 UNDRIVEN = re.sub("(?s)<actuator>.*</actuator>", "", BARE)
@@ -84,7 +83,7 @@ def with_gains(tmp_path, model_text, suffix):
     """Return the data set that tells a controller's gains, and the servos of a model that has none."""
     data, _ = servo_arm.write(tmp_path, {"a": servo_arm.swings(4, 0)}, BARE)
     file = data / "dataset.toml"
-    file.write_text(file.read_text().replace("[[run]]", f"{GAINS}[[run]]", 1), encoding="utf-8")
+    file.write_text(file.read_text().replace("[[run]]", f"{servo_arm.GAINS}[[run]]", 1), encoding="utf-8")
     model = tmp_path / f"told{suffix}"
     model.write_text(model_text, encoding="utf-8")
     return servo_arm.read(data, model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -64,24 +65,48 @@ def test_without_commands_no_script_is_asked_for(tmp_path):
     assert "--simulator: give that too" in irtwin("diagnose", tmp_path, "--save-sysid", tmp_path / "fit.py").err
 
 
-def test_mujocos_own_fit_ends_at_the_robots_numbers(arm, tmp_path, capsys):
-    """It begins a fifth beside them, and is told that the model lacks a dead band."""
-    pytest.importorskip("tabulate", reason="mujoco[sysid] is not installed")
-    data, model, (data_set, _, own) = arm
-    made = servo_arm.played(data_set, own, servo_arm.changed(own, **ROBOT))
+def fitted(data, model, read, folder, robot, capsys):
+    """Run the script that begins a fifth beside what a robot has, on a log of it; return what it prints."""
+    data_set, _, own = read
+    made = servo_arm.played(data_set, own, servo_arm.changed(own, **robot))
     for run in made.runs:
         servo_arm.log(run.file, data_set.robot, run.signals)
-    near = chosen(own, **{name: tuple(1.2 * one for one in some) for name, some in ROBOT.items()})
-    place = tmp_path / "fits" / "fit.py"
-    place.parent.mkdir()
-    place.write_bytes(written(free(near), ["servo_dead_band of lift"], model, data, place))
+    near = chosen(own, **{name: tuple(1.2 * one for one in some) for name, some in robot.items()})
+    place = folder / "fit.py"
+    folder.mkdir()
+    place.write_bytes(written(free(near), ["servo_dead_band of lift"], model, data, place, own.model.gains))
     spec = importlib.util.spec_from_file_location("fit", place)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     module.main()
-    said = capsys.readouterr().out
+    return capsys.readouterr().out
+
+
+def test_gains_that_are_told_are_fitted_too_and_written_as_servos(tmp_path, capsys):
+    """Of a URDF, whose controller damps towards commanded speeds."""
+    pytest.importorskip("tabulate", reason="mujoco[sysid] is not installed")
+    data, _ = servo_arm.write(tmp_path, {"a": servo_arm.swings(6, 0)})
+    file, model = data / "dataset.toml", tmp_path / "arm.urdf"
+    file.write_text(file.read_text().replace("[[run]]", f"{servo_arm.GAINS}[[run]]", 1), encoding="utf-8")
+    model.write_text(servo_arm.URDF, encoding="utf-8")
+    data_set, *rest = servo_arm.read(data, model)
+    (run,) = data_set.runs
+    speed = np.gradient(run.signals.command, run.signals.time, axis=0)
+    run = replace(run, signals=replace(run.signals, command_speed=speed))
+    robot = {"stiffness": (14.0, 15.0), "damping": (0.8, 0.9)}
+    said = fitted(data, model, (replace(data_set, runs=(run,)), *rest), tmp_path / "fits", robot, capsys)
+    assert "lift kp" in said
+    assert "elbow damping" in said
+    found = servos(read_model(tmp_path / "fits" / "fit-fitted.xml", data_set.robot)).numbers
+    assert found[:2] == pytest.approx(np.array(list(robot.values())), rel=0.03)
+
+
+def test_mujocos_own_fit_ends_at_the_robots_numbers(arm, tmp_path, capsys):
+    """It begins a fifth beside them, and is told that the model lacks a dead band."""
+    pytest.importorskip("tabulate", reason="mujoco[sysid] is not installed")
+    said = fitted(*arm, tmp_path / "fits", ROBOT, capsys)
     assert "cannot say: servo_dead_band of lift" in said
     assert "elbow delay" in said
-    found = servos(read_model(tmp_path / "fits" / "fit-fitted.xml", data_set.robot)).numbers
+    found = servos(read_model(tmp_path / "fits" / "fit-fitted.xml", arm[2][0].robot)).numbers
     for name, robot in ROBOT.items():
         assert found[NAMES.index(name)] == pytest.approx(robot, rel=0.02, abs=1e-3), name

@@ -165,8 +165,8 @@ def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tupl
         raise InputError(f"{file.path}: reading a model needs MuJoCo; install irtwin[mujoco]") from error
     try:
         spec = mujoco.MjSpec.from_file(str(file.path))
-        _drop_pictures(spec, mujoco, file.is_urdf)
-        added = {joint: both for joint, both in gains.items() if _add_servo(spec, joint, both, mujoco)}
+        drop_pictures(spec, file.is_urdf)
+        added = {joint: both for joint, both in gains.items() if add_servo(spec, joint, both)}
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
         for one in spec.actuators:
             one.delay, one.nsample = 0.0, 0
@@ -182,8 +182,10 @@ def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tupl
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
 
 
-def _add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float], mujoco: Any) -> bool:
+def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bool:
     """Give a joint a position servo in place of its motors; return whether it has none of its own."""
+    import mujoco
+
     own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
     if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
         return False
@@ -204,11 +206,13 @@ def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:
     second.forcelimited, second.forcerange = True, (-1.0, 1.0)
 
 
-def _drop_pictures(spec: mujoco.MjSpec, mujoco: Any, is_urdf: bool) -> None:
+def drop_pictures(spec: mujoco.MjSpec, is_urdf: bool) -> None:
     """Take out what a body with an inertia of its own needs for pictures and contacts alone: files may be missing.
 
     A URDF has all inertia in its <inertial>.
     """
+    import mujoco
+
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         return
     for body in spec.bodies if is_urdf else spec.bodies[1:]:

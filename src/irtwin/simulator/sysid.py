@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +38,26 @@ Free = tuple[str, str, list[float], list[float], list[float], list[float]]  # as
 def script(chosen: DifferingNumbers, document: Document, logs: Path, out: Path) -> bytes:
     """Return the script that fits what a diagnosis says differs to `logs`, a data set, to be written to `out`."""
     lacking = [f"{one.effect} of {', '.join(one.joints)}" for one in not_held(document)]
-    return written(free(chosen), lacking, chosen.fit.servos.model.file.path, logs, out)
+    model = chosen.fit.servos.model
+    return written(free(chosen), lacking, model.file.path, logs, out, model.gains)
 
 
-def written(some: Iterable[Free], lacking: Iterable[str], model: Path, logs: Path, out: Path) -> bytes:
-    """Return the script that frees some numbers of a model; it names files from where it is."""
+def written(
+    some: Iterable[Free],
+    lacking: Iterable[str],
+    model: Path,
+    logs: Path,
+    out: Path,
+    gains: Mapping[str, tuple[float, float]] | None = None,
+) -> bytes:
+    """Return the script that frees some numbers of a model; it names files from where it is.
+
+    gains: of the controllers of joints that have no servo in the model.
+    """
     files = [os.path.relpath(one.absolute(), out.absolute().parent) for one in (model, logs)]
     told = {
         "MODEL, LOGS, FITTED": ", ".join(map(repr, [*files, f"{out.stem}-fitted.xml"])),
+        "GAINS": repr(dict(gains or {})),
         "FREE": _lines(some),
         "LACKS": _lines(lacking),
     }
@@ -66,7 +78,7 @@ def free(chosen: DifferingNumbers) -> Iterator[Free]:
         for place in np.flatnonzero(chosen.differs[row]):
             joint = model.joints[place]
             if name == "damping":
-                which = int(ways[0][1, place] > 0)
+                which = int(ways[0][1, place] != ways[1][1, place])  # of two, what differs
                 yield _bounded(joint, ("damping", "kv")[which], *(some[which, place] for some in ways))
             elif name in _CALLED:
                 yield _bounded(joint, _CALLED[name], own[row, place], robots[row, place])

@@ -9,7 +9,7 @@ begins, its bounds, a line more or less. What is fitted is printed beside what w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,12 @@ import numpy as np
 from mujoco import sysid
 
 from irtwin.signals.log import DataSet, read_data_set
+from irtwin.simulator.model import add_servo, drop_pictures
 
 # files, from where this one is
 MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"
+# joint, and the gains of its controller, kp and kd, where the model has no servo of its own
+GAINS: Mapping[str, tuple[float, float]] = {}
 # joint or body, number, the model's, the robot's, and bounds
 FREE: Sequence[tuple[str, str, list[float], list[float], list[float], list[float]]] = ()
 # what the robot has and no number of the model can say
@@ -74,9 +77,19 @@ def parameters() -> sysid.ParameterDict:
     return found
 
 
+def loaded(model: Path) -> mujoco.MjSpec:
+    """Return a model's specification, with servos by the controllers' gains that are told."""
+    spec = mujoco.MjSpec.from_file(str(model))
+    if model.suffix == ".urdf":  # what pictures need may be missing
+        drop_pictures(spec, is_urdf=True)
+    for joint, gains in GAINS.items():
+        add_servo(spec, joint, gains)
+    return spec
+
+
 def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
     """Return a model's specification whose sensors are the positions of the robot's joints."""
-    spec = mujoco.MjSpec.from_file(str(model))
+    spec = loaded(model)
     for sensor in list(spec.sensors):
         spec.delete(sensor)
     for joint in joints:
@@ -88,16 +101,17 @@ def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
     return spec
 
 
-def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> sysid.ModelSequences:
-    """Return stretches of the observed runs."""
+def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> tuple[sysid.ModelSequences, list[np.ndarray]]:
+    """Return stretches of the observed runs, and the speeds (N, nu) that are commanded in each."""
     model, joints = spec.compile(), data_set.robot.joint_names
     places = [model.jnt_qposadr[model.joint(one).id] for one in joints]
     speeds = [model.jnt_dofadr[model.joint(one).id] for one in joints]
     drives = [next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(one).id) for one in joints]
-    names, states, controls, measured = [], [], [], []
+    names, states, controls, measured, speeds_told = [], [], [], [], []
     runs = [one for one in data_set.runs if one.role == "observed"]
     for run in runs:
         signals, commands, lasts = run.signals, np.asarray(run.signals.command), np.ptp(run.signals.time)
+        commanded_speeds = np.zeros_like(commands) if signals.command_speed is None else signals.command_speed
         count = max(1, min(int(lasts // SECONDS), round(STRETCHES / len(runs))))
         for place in range(count):
             begin = signals.time[0] + max(0.0, (place + 0.5) * lasts / count - SECONDS / 2)
@@ -106,15 +120,16 @@ def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> sysid.ModelSequences:
             qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
             few = time <= time[1] + 0.1
             qvel[speeds], qpos[places] = np.polyfit(time[few], q[few], 1)
-            told = np.zeros((len(time), model.nu))
-            told[:, drives] = commands[rows]
             steps = np.arange(0.0, time[-1], model.opt.timestep)
-            held = sysid.TimeSeries(time, told).resample(steps, method="zero_order_hold")
+            held = np.searchsorted(time, steps, side="right") - 1  # each command until the next comes
+            told = np.zeros((2, len(steps), model.nu))
+            told[:, :, drives] = commands[rows][held], commanded_speeds[rows][held]
             names.append(f"{run.name} from {begin:g} s")
             states.append(sysid.create_initial_state(model, qpos, qvel))
-            controls.append(sysid.TimeSeries.from_control_names(held.times, held.data, model))
+            controls.append(sysid.TimeSeries.from_control_names(steps, told[0], model))
+            speeds_told.append(told[1])
             measured.append(sysid.TimeSeries.from_names(time, q, model))
-    return sysid.ModelSequences("robot", spec, names, states, controls, measured)
+    return sysid.ModelSequences("robot", spec, names, states, controls, measured), speeds_told
 
 
 def difference(
@@ -138,15 +153,20 @@ def played_late(
     models: Sequence[mujoco.MjModel],
     control_signal: Sequence[sysid.TimeSeries],
     param_dicts: Sequence[sysid.ParameterDict],
+    speeds: Sequence[np.ndarray],
     **others: Any,
 ) -> Sequence[sysid.SystemTrajectory]:
-    """Play commands, each joint's as late as its `delay` says."""
+    """Play commands, each joint's as late as its `delay` says; controllers of told gains damp towards `speeds`."""
     late = []
     for place, control in enumerate(control_signal):
-        of = param_dicts[place * len(param_dicts) // len(models)]
+        of, model = param_dicts[place * len(param_dicts) // len(models)], models[place]
         told = control.data.copy()
         for drive in range(told.shape[1]):
-            delay = f"{joint_of(models[place], drive)} delay"
+            joint = joint_of(model, drive)
+            if joint in GAINS:
+                lead = -model.actuator_biasprm[drive, 2] / model.actuator_gainprm[drive, 0]
+                told[:, drive] += lead * speeds[place % len(speeds)][:, drive]
+            delay = f"{joint} delay"
             if delay in of:
                 told[:, drive] = np.interp(control.times - of[delay].value[0], control.times, told[:, drive])
         late.append(sysid.TimeSeries(control.times, told, control.signal_mapping))
@@ -161,7 +181,7 @@ def joint_of(model: mujoco.MjModel, drive: int) -> str:
 
 def written(fitted: sysid.ParameterDict, model: Path) -> str:
     """Return the model with what was fitted, as MJCF."""
-    spec = mujoco.MjSpec.from_file(str(model))
+    spec = loaded(model)
     for (of, number, *_), one in zip(FREE, fitted.values(), strict=True):
         one.apply_modifier(spec)
         if number == "delay":
@@ -178,9 +198,9 @@ def main() -> None:
     for line in LACKS:
         print(f"The model cannot say: {line}")
     data_set, free = read_data_set(here / LOGS, commanded=True), parameters()
-    sequences = stretches(data_set, specification(here / MODEL, data_set.robot.joint_names))
+    sequences, speeds = stretches(data_set, specification(here / MODEL, data_set.robot.joint_names))
     residual = sysid.build_residual_fn(
-        models_sequences=[sequences], custom_rollout=played_late, modify_residual=difference
+        models_sequences=[sequences], custom_rollout=partial(played_late, speeds=speeds), modify_residual=difference
     )
     fitted, result = sysid.optimize(
         free,
