@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
-_AT_ONCE = 3_000_000  # positions that are held at a time
+_AT_ONCE = 6_000_000  # positions that are held at a time
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,18 @@ class Alone:
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
         steps = self.load.shape[1]
         begin = np.arange(steps) * self.step
-        leads = [self.servos.lead(each) for each in numbers]
-        told = np.array(
-            [
-                [one.commands(begin, self.step, each, lead) for one in self.stretches]
-                for each, lead in zip(numbers, leads, strict=True)
-            ]
-        )
-        moved = self._moved(numbers, np.moveaxis(told, 2, 0))
+        offset = NAMES.index("offset")
+        known: dict[bytes, np.ndarray] = {}  # many sets have their commands as late, and led as far
+        told = np.empty((steps, len(numbers), len(self.stretches), numbers.shape[2]))
+        for place, own in enumerate(numbers):
+            without = np.where(np.arange(len(NAMES))[:, None] == offset, 0.0, own)
+            lead = self.servos.lead(own)
+            asked = np.append(own[NAMES.index("delay")], lead).tobytes()
+            if asked not in known:
+                every = [one.commands(begin, self.step, without, lead) for one in self.stretches]
+                known[asked] = np.stack(every, axis=1)
+            told[:, place] = known[asked] + own[offset]
+        moved = self._moved(numbers, told)
         at = [one.time / self.step for one in self.stretches]
         return [
             [_between(moved[:, :, one, place], at[place]) for place in range(len(self.stretches))]
@@ -76,7 +80,9 @@ class Alone:
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
         stiffness, damping, friction, holding, armature, _, _, limit, band = own[: len(OF_JOINTS)]
         mass, *off = own[len(OF_JOINTS) :]
-        changes = np.array([mass, *(mass * np.array(off[:3])), *off[3:]])
+        changes = np.array([mass, *(mass * np.array(off[:3])), *off[3:]])[:, :, 0]
+        if (changes == changes[:, :1]).all():  # of most sets bodies are alike
+            changes = changes[:, :1]
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
         lets_go = holding != servos.numbers[NAMES.index("holding")]
@@ -87,18 +93,18 @@ class Alone:
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         load, bodies = (
-            of[0, :, None] + np.einsum("kvn,kspn->svpn", changes[:, :, 0], of[1:]) for of in (self.load, self.inertia)
+            of[0, :, None] + np.einsum("kvn,kspn->svpn", changes, of[1:]) for of in (self.load, self.inertia)
         )
         inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
         gives = step * inverse / (1 + step * damping * inverse)
         held_force, held_speed = inverse / (inverse + soft), back / (inverse + soft)
         lower, upper = self._stops()
         q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
-        followed, below, lets_move = q.copy(), -band, -friction
+        followed, below, lets_move, lags = q, -band, -friction, bool((share < 1).any())
         moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
         moved[0, 0] = q
         for row in range(len(told)):
-            followed += share * (told[row] - followed)
+            followed = followed + share * (told[row] - followed) if lags else told[row]
             off = followed - q
             off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)

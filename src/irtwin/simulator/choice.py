@@ -7,6 +7,7 @@ stand for one. Each joint has the way with more evidence.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,7 +125,8 @@ def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> 
         return best, False
     begun = (best, fit.played(np.where(robots, best.at, own)))
     alone = np.broadcast_to(part, own.shape)
-    found = fit.best([fit.solved(fit.solved(one, alone, _PASSES), free | part) for one in begun], together=True)
+    first = fit.all_solved([(one, alone) for one in begun], _PASSES)
+    found = fit.best(fit.all_solved([(one, free | part) for one in first]), together=True)
     back = _without(fit, found, part, free | part)
     best = fit.best([best, back], together=bool(robots.any()))  # what came with it may be as good without
     there = _odds(fit, (found, free | part), (best, free)) > 0
@@ -174,9 +176,10 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(_FEW):
         fit = fit.about(at)
         best = fit.played(at)
-        evidence = _evidence(fit, best, differs)
-        tried = [_with(fit, best, differs, row) for row in range(len(OF_JOINTS))]
-        evidences = [_evidence(fit, one, more) for one, more in tried]
+        begun = [_with(fit, best, differs, row) for row in range(len(OF_JOINTS))]
+        frees = [more for _, more in begun]
+        tried = list(zip(fit.all_solved(begun, _PASSES), frees, strict=True))
+        evidence, *evidences = _evidences(fit, [(best, differs), *tried])
         chosen = np.argmin(evidences, axis=0)
         better = np.min(evidences, axis=0) < evidence
         for joint in np.flatnonzero(better):
@@ -188,7 +191,7 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played, np.ndarray]:
-    """Return numbers fitted with one more of each joint, and which differ."""
+    """Return numbers to begin with where one more of each joint is to be fitted, and which differ then."""
     more = differs.copy()
     more[row] |= fit.servos.can_differ[row]
     begins = [best]
@@ -201,7 +204,7 @@ def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played
         begun = fit.limited(begun)
     if NAMES[row] == "delay":
         begun = fit.delayed(begun)
-    return fit.solved(begun, more, _PASSES), more
+    return begun, more
 
 
 def _better(fit: Fit, ways: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Fit, Played, np.ndarray]:
@@ -209,21 +212,23 @@ def _better(fit: Fit, ways: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Fit, P
     evidences = []
     for at, differs in ways:
         about = fit.about(at)
-        evidences.append(_evidence(about, about.played(at), differs))
+        evidences += _evidences(about, [(about.played(at), differs)])
     chosen = np.argmin(evidences, axis=0)
     at, differs = (np.choose(chosen, [way[part] for way in ways]) for part in (0, 1))
     fit = fit.about(at)
     return fit, fit.played(at), differs
 
 
-def _evidence(fit: Fit, best: Played, differs: np.ndarray) -> np.ndarray:
-    """Return how bad numbers (n,) are with what those that differ could have been besides."""
-    slopes = fit.slopes(best)
-    found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
-    for joint in range(differs.shape[1]):
-        rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-        found[joint] += np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2
-    return found
+def _evidences(fit: Fit, ways: Sequence[tuple[Played, np.ndarray]]) -> list[np.ndarray]:
+    """Return of each way how bad numbers (n,) are with what those that differ (k, n) could have been besides."""
+    every = []
+    for (best, differs), slopes in zip(ways, fit.all_slopes([(best, SMOOTH) for best, _ in ways]), strict=True):
+        found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
+        for joint in range(differs.shape[1]):
+            rows, normal, _ = _equations(fit, best, slopes, differs, joint)
+            found[joint] += np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2
+        every.append(found)
+    return every
 
 
 def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:

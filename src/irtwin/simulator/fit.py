@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from irtwin.identification.progress import tell_step, told
+from irtwin.identification.progress import tell_step
 from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import PlayedStretch, play
@@ -116,6 +116,7 @@ class Fit:
     floor: np.ndarray
     certainty: np.ndarray
     beyond: tuple[np.ndarray, ...] | None = None  # a stretch: (N, c, n), the whole model beyond single joints
+    known: dict[bytes, list[np.ndarray]] = field(default_factory=dict)  # what the whole model did, by its numbers
 
     @cached_property
     def least(self) -> np.ndarray:
@@ -148,13 +149,18 @@ class Fit:
 
     def rolled(self, at: np.ndarray) -> Played:
         """Play numbers (k, n) of the chart by the whole model."""
-        return self._left(at, play(self.servos, [self.servos.of_chart(at)], self.stretches)[0])
+        return self._left(at, self._whole(at))
+
+    def _whole(self, at: np.ndarray) -> list[np.ndarray]:
+        asked = at.tobytes()
+        if asked not in self.known:
+            self.known[asked] = play(self.servos, [self.servos.of_chart(at)], self.stretches)[0]
+        return self.known[asked]
 
     def about(self, at: np.ndarray) -> Fit:
         """Return the fit that plays as the whole model at numbers (k, n) of the chart, with slopes of single joints."""
-        whole = play(self.servos, [self.servos.of_chart(at)], self.stretches)[0]
         single = self.alone.play([self.servos.of_chart(at)])[0]
-        return replace(self, beyond=tuple(one - other for one, other in zip(whole, single, strict=True)))
+        return replace(self, beyond=tuple(one - other for one, other in zip(self._whole(at), single, strict=True)))
 
     def _left(self, at: np.ndarray, moved: Sequence[np.ndarray]) -> Played:
         left = [
@@ -179,7 +185,15 @@ class Fit:
 
     def slopes(self, one: Played, rows: Sequence[int] = SMOOTH) -> Slopes:
         """Return the normal equations of some rows of the numbers, weighted as the misfit counts."""
-        moved = self.all_played([one.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for row in rows])
+        return self.all_slopes([(one, rows)])[0]
+
+    def all_slopes(self, many: Sequence[tuple[Played, Sequence[int]]]) -> list[Slopes]:
+        """Return the normal equations about several numbers, each of its rows."""
+        stepped = [one.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for one, rows in many for row in rows]
+        moved = iter(self.all_played(stepped))
+        return [self._slopes(one, rows, [next(moved) for _ in rows]) for one, rows in many]
+
+    def _slopes(self, one: Played, rows: Sequence[int], moved: Sequence[Played]) -> Slopes:
         normal, right = [], []
         for place, left in enumerate(one.remainders):
             columns = np.stack(
@@ -191,25 +205,41 @@ class Fit:
         return Slopes(np.array(normal), np.array(right))
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
-        """Return numbers with those that are free (k, n) fitted, by Levenberg's way, each joint with a damping.
+        """Return numbers with those that are free (k, n) fitted."""
+        return self.all_solved([(best, free)], passes)[0]
 
-        A joint keeps what it has where nothing better is found; all of them do where what they share is free.
+    def all_solved(self, begun: Sequence[tuple[Played, np.ndarray]], passes: int = _PASSES) -> list[Played]:
+        """Return several numbers, each with those that are free (k, n) fitted, by Levenberg's way, all played at once.
+
+        Each joint has a damping of its own. It keeps what it has where nothing better is found; all joints do where
+        what they share is free.
         """
-        rows = [row for row in (*SMOOTH, *SHARED) if free[row].any()]
-        together = any(row in SHARED for row in rows)
-        damping = np.full(free.shape[1], 1e-2)
-        for number in range(passes if rows else 0):
-            slopes, before = self.slopes(best, rows), self.cost(best)
-            steps = [self._steps(best.at, slopes, rows, free, damping * times) for times in _DAMPINGS]
-            tried = self.all_played([self.servos.chart(self.servos.of_chart(best.at + step)) for step in steps])
-            chosen = np.argmin(self._costs(tried, together), axis=0)
-            best = self.best((best, *tried), together)
-            damping = np.maximum(damping * np.array(_DAMPINGS)[chosen], 1e-4)
-            left = 1e3 * np.sqrt(best.squares[:, 0].mean())
-            tell_step(f"  numbers of servos, pass {number + 1} of {passes} at most: {left:.3g} mrad left")
-            if (before - self.cost(best) < _WORTH).all():
+        found, free = [best for best, _ in begun], [some for _, some in begun]
+        rows = [[row for row in (*SMOOTH, *SHARED) if some[row].any()] for some in free]
+        damping = np.full((len(begun), len(self.servos.model.joints)), 1e-2)
+        going = [k for k, own in enumerate(rows) if own]
+        for number in range(passes):
+            every = self.all_slopes([(found[k], rows[k]) for k in going])
+            steps = [
+                self._steps(found[k].at, slopes, rows[k], free[k], damping[k] * times)
+                for k, slopes in zip(going, every, strict=True)
+                for times in _DAMPINGS
+            ]
+            ways = [found[k].at for k in going for _ in _DAMPINGS]
+            numbers = [self.servos.of_chart(at + step) for at, step in zip(ways, steps, strict=True)]
+            tried = iter(self.all_played([self.servos.chart(one) for one in numbers]))
+            for k in tuple(going):
+                own, together = [next(tried) for _ in _DAMPINGS], any(row in SHARED for row in rows[k])
+                before, chosen = self.cost(found[k]), np.argmin(self._costs(own, together), axis=0)
+                found[k] = self.best((found[k], *own), together)
+                damping[k] = np.maximum(damping[k] * np.array(_DAMPINGS)[chosen], 1e-4)
+                if (before - self.cost(found[k]) < _WORTH).all():
+                    going.remove(k)
+            if not going:
                 break
-        return best
+            left = 1e3 * np.sqrt(min(found[k].squares[:, 0].mean() for k in going))
+            tell_step(f"  numbers of servos, pass {number + 1} of {passes} at most: {left:.3g} mrad left")
+        return found
 
     def _steps(
         self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], free: np.ndarray, damping: np.ndarray
@@ -289,16 +319,15 @@ class Fit:
 
     def begun(self) -> Played:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
-        own, tried = self.servos.numbers, []
+        own, grids = self.servos.numbers, []
         free = self.servos.can_differ.copy()
         free[[NAMES.index("stiffness"), NAMES.index("holding")]] = False
-        for times in told(_TIMES, "stiffness to begin with"):
+        for times in _TIMES:
             stiffness = own[0] * times
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
-            grid = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]
-            begun = self.best(self.all_played([self.servos.chart(one) for one in grid]))
-            tried.append(self.solved(begun, free, 3))
-        return self.best(tried)
+            grids.append([np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways])
+        begun = [self.best(self.all_played([self.servos.chart(one) for one in grid])) for grid in grids]
+        return self.best(self.all_solved([(one, free) for one in begun], 3))
 
 
 def unjudged(alone: Alone) -> Fit:
