@@ -7,6 +7,7 @@ import pytest
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
+from irtwin.gap.regression import projection
 from irtwin.gap.regression.evidence import evidence
 from irtwin.gap.regression.hypotheses import CandidateColumn, Variant
 from irtwin.gap.regression.normal_equations import System
@@ -35,10 +36,13 @@ def system(*, shaken: bool) -> System:
 
 
 @pytest.mark.parametrize("chosen", [(), (7,), (7, 10, 6)])
-@pytest.mark.parametrize("shaken", [False, True])
-def test_it_is_what_a_fit_to_all_rows_leaves(chosen: tuple[int, ...], shaken: bool) -> None:
+@pytest.mark.parametrize(("shaken", "most"), [(False, 10**6), (True, 10**6), (True, 0)])
+def test_it_is_what_a_fit_to_all_rows_leaves(
+    chosen: tuple[int, ...], shaken: bool, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(projection, "MOST_HELD", most)
     own = system(shaken=shaken)
-    moments = [one.whole for one in own.moments(NOISE)]
+    moments = [one.of(np.arange(one.size)) for one in own.moments(NOISE)]
     inside = [*range(BASE), *chosen]
     total, prior = sum(moments), np.eye(len(inside))
     fit = np.linalg.solve(total[np.ix_(inside, inside)] + prior, total[inside])
@@ -74,7 +78,7 @@ def test_it_is_what_a_fit_to_all_rows_leaves(chosen: tuple[int, ...], shaken: bo
 
 def test_what_is_visible_is_what_the_twin_does_not_imitate() -> None:
     own = system(shaken=False)
-    total = sum(one.whole for one in own.moments(NOISE))
+    total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))
     base = np.arange(BASE)
     left = total - total[:, base] @ np.linalg.solve(total[np.ix_(base, base)] + np.eye(BASE), total[base])
     visible = Projection(own, NOISE, VARIANTS).visible(VARIANTS)

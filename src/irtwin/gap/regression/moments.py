@@ -81,9 +81,8 @@ class Products:
     @classmethod
     def summed(cls, parts: Sequence[Products]) -> Products:
         """Return the products of several groups' rows together."""
-        return cls(
-            parts[0].places, sum((p.held.T @ p.held if p.as_rows else p.held for p in parts), np.zeros(())), False
-        )
+        every = (own.held.T @ own.held if own.as_rows else own.held for own in parts)
+        return cls(parts[0].places, _sum(every), False)
 
     @cached_property
     def diagonal(self) -> np.ndarray:
@@ -133,11 +132,6 @@ class Moments(ABC):
     def of(self, rows: np.ndarray) -> np.ndarray:
         """Return the products (r, D + 1) of some columns with all."""
         return self.among(rows, np.arange(self.size))
-
-    @property
-    def whole(self) -> np.ndarray:
-        """All products, (D + 1, D + 1): of many columns more than fits into memory."""
-        return self.of(np.arange(self.size))
 
     def __sub__(self, other: Moments) -> Moments:
         return _Less(self, other)

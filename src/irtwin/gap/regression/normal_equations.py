@@ -21,7 +21,8 @@ from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
 _MOST_BYTES = 3_000_000_000  # of blocks, of all groups' products, and of what is worked out of them:
-_AT_WORK = 2  # projections, each of them all parts' products of the twin's columns with all
+_AT_WORK = 6  # products of the twin's columns with all, held at once
+MOST_HELD = 20_000_000  # of these in all parts, numbers that each of two projections keeps
 _LEAST_NOISE = 1e-7  # of a column as large as expected: with less, rounding of its squares would hide the prior
 
 
@@ -258,7 +259,8 @@ class System:
         """Refuse what would take too much, before more is taken."""
         columns = self.pattern.sum(axis=1) + 1
         rows = np.minimum([[len(factor) for factor in block.factors] for block in self.blocks], columns)
-        held = float((rows * columns).sum()) + _AT_WORK * len(self.parts) * self.base * self.size
+        held = float((rows * columns).sum()) + _AT_WORK * self.base * self.size
+        held += 2 * min(MOST_HELD, len(self.parts) * self.base * self.size)
         for group in range(self.groups):
             own = rows[self.group == group].sum(axis=0)
             held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))

@@ -14,7 +14,7 @@ import numpy as np
 
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Variant
-from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.normal_equations import MOST_HELD, System
 from irtwin.identification.progress import told
 
 
@@ -29,12 +29,17 @@ class Projection:
         self.system, self._noise = system, noise
         self._moments = system.moments(noise)
         self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
-        base = np.arange(system.base)
-        every = told(self._moments, "what the twin imitates, part")
-        found = [own.among(base, np.append(base, self._asked)) for own in every]
-        self._inner = np.array([own[:, : system.base] for own in found])  # (P, K, K)
-        self._across = np.array([own[:, system.base :].T for own in found])  # (P, A, K)
-        self._all = self._across.sum(axis=0)
+        base, every = np.arange(system.base), told(self._moments, "what the twin imitates, part")
+        self._all, inner = np.zeros((len(self._asked), system.base)), []
+        keeps = len(self._moments) * self._all.size <= MOST_HELD
+        self._kept: list[np.ndarray] = []  # of each part, what is asked for beside the twin's terms (A, K)
+        for own in every:
+            found = own.among(base, np.append(base, self._asked))
+            inner.append(found[:, : system.base])
+            across = np.ascontiguousarray(found[:, system.base :].T)
+            self._all += across
+            self._kept += [across] if keeps else []
+        self._inner = np.array(inner)  # (P, K, K)
         self._factor = factored(self._inner.sum(axis=0), system.prior())
         self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
         self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: products with all, and in each part
@@ -61,7 +66,7 @@ class Projection:
         before = [found.sum(axis=0) for found in every]
         imitated = [self._imitated[columns] for columns in each]
         for part, inner in enumerate(self._inner):
-            half = self._across[part] - self._imitated @ inner / 2  # what is left is symmetric in it
+            half = self._across(part) - self._imitated @ inner / 2  # what is left is symmetric in it
             for columns, own, found in zip(each, imitated, every, strict=True):
                 other = half[columns]
                 found[part] -= _pairs(own[:, :-1], other) + _pairs(other[:, :-1], own)
@@ -70,6 +75,12 @@ class Projection:
             squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, whole)), strict=True)
             self._squares |= zip(known, squares, strict=True)
             self._batches.append((dict(zip(known, range(len(known)), strict=True)), after, found))
+
+    def _across(self, part: int, at: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Return the products (n, K) of what is asked for, at some places, with the twin's terms in a part."""
+        if self._kept:
+            return self._kept[part][at]
+        return self._moments[part].among(np.arange(self.system.base), self._asked[at]).T
 
     def visible(self, variants: Sequence[Variant]) -> np.ndarray:
         """Return (V, 2) what variants add, with coefficients as large as expected, beyond what the twin imitates.
@@ -91,9 +102,10 @@ class Projection:
         at = self._at(new)
         own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
         whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
-        left = self._across[:, at] - self._imitated[at] @ self._inner
-        for found, across, own_left in zip(own, self._across, left, strict=True):
-            found -= self._imitated[at] @ across.T + own_left @ self._imitated.T
+        for part, (found, inner) in enumerate(zip(own, self._inner, strict=True)):
+            across = self._across(part)
+            left = across[at] - self._imitated[at] @ inner
+            found -= self._imitated[at] @ across.T + left @ self._imitated.T
         self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
 
     def _of(self, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
@@ -135,10 +147,9 @@ class Projection:
         Over all parts (n,) and in each (P, n).
         """
         less, change = shaken
-        of_base, of_own = less[:, : self.system.base], less[:, self._asked[at]]
-        parts = (
-            self._across.take(at, axis=1) @ change - of_own + (of_base - self._inner @ change) @ self._imitated[at].T
-        )
+        of_base, of_own = less[:, : self.system.base] - self._inner @ change, less[:, self._asked[at]]
+        across = [self._across(part, at) @ change for part in range(len(self._inner))]
+        parts = np.array(across) - of_own + of_base @ self._imitated[at].T
         return self._all[at] @ change - of_own.sum(axis=0), parts
 
     def batches(self, variants: Sequence[Variant]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
