@@ -39,7 +39,7 @@ class Library:
     @cached_property
     def groups(self) -> list[np.ndarray]:
         """Each group's products of all columns and the measurement, (D + 1, D + 1)."""
-        return [one.whole for one in self.moments]
+        return [one.of(np.arange(one.size)) for one in self.moments]
 
     @cached_property
     def total(self) -> np.ndarray:
