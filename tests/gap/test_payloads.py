@@ -41,7 +41,7 @@ def test_the_search_says_how_far_it_has_come(monkeypatch):
     lines = []
     with progress.telling(lines.append):
         search((1, 4, 5))
-    assert "  payloads in run_7" in lines
+    assert "  payloads in run_7, 8 of 8" in lines
 
 
 def test_the_heavier_part_is_the_one_that_carries():

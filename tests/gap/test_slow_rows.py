@@ -81,7 +81,8 @@ def test_rows_that_stand_apart_say_together_what_they_said() -> None:
     system = reduced(noise=0.0)
     apart = system.by_speed
     noise = np.array([0.05, 0.08])
-    whole, parts = Summed(system.moments(noise)).whole, Summed(apart.moments(np.tile(noise, 2))).whole
+    every = np.arange(system.size + 1)
+    whole, parts = Summed(system.moments(noise)).of(every), Summed(apart.moments(np.tile(noise, 2))).of(every)
     np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
     np.testing.assert_array_equal(apart.rows[:, :2] + apart.rows[:, 2:], system.rows)
     assert np.all(apart.rows > 0)

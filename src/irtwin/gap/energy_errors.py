@@ -53,7 +53,7 @@ def energy_errors(
         total = Summed(moments)
         part = []
         for group in np.flatnonzero(system.group_observed):
-            weights = np.append(-system.solution(columns, total - moments[group]), 1.0)
+            weights = np.append(-system.solution(columns, total, moments[group]), 1.0)
             residual = (moments[group].of(np.array([ones])) @ weights)[0] * level**2 / system.scale[ones]
             blocks = (system.blocks[block] for block in np.flatnonzero(system.group == group))
             energy = sum(mean[block.run] * float(block.rows[0]) for block in blocks)

@@ -124,7 +124,7 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     def left(members: frozenset[int]) -> np.ndarray:
         chosen = [k for player in sorted(members) for k in players[player]]
         total, moments = totals[bool(members)], weighed[bool(members)]
-        every = [system.solution(chosen, total - moments[group]) for group in judged]
+        every = [system.solution(chosen, total, moments[group]) for group in judged]
         return np.array([system.squares(one, int(group)) for group, one in zip(judged, every, strict=True)])
 
     count = len(players)

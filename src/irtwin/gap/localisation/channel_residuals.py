@@ -203,7 +203,7 @@ def fitted_values(finding: ChannelFinding, *, reference: bool) -> Values:
     whole = twin_values(system, system.solution((), total))
     own: dict[str, np.ndarray] = {}
     for group in groups if len(groups) > 1 else ():
-        without = twin_values(system, system.solution((), total - moments[group]))
+        without = twin_values(system, system.solution((), total, moments[group]))
         own |= dict.fromkeys((system.blocks[k].run for k in np.flatnonzero(system.group == group)), without)
     return lambda run: own.get(run, whole)
 

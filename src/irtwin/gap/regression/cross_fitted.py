@@ -33,8 +33,8 @@ class LeftOut:
         self._without: dict[str, np.ndarray] = {}
         for run in told({block.run for block in system.blocks}, lambda one: f"the twin without {one}"):
             groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
-            rest = total - moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else total
-            self._without[run] = twin_values(system, system.solution((), rest))
+            own = moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else None
+            self._without[run] = twin_values(system, system.solution((), total, own))
         self._held: dict[str, tuple[Motion, np.ndarray]] = {}  # each run's: every pass over them asks for it
 
     def torque(self, motion: Motion) -> np.ndarray:

@@ -88,5 +88,5 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
 def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
     """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
     total, every = Summed(moments), told(judged, "how far the gap closes, group left out")
-    left = [system.squares(system.solution(chosen, total - moments[group]), int(group)) for group in every]
+    left = [system.squares(system.solution(chosen, total, moments[group]), int(group)) for group in every]
     return np.array(left)

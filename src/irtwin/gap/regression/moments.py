@@ -6,8 +6,7 @@ Of a robot of 30 joints the products of all pairs would take twenty times what t
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
@@ -82,7 +81,7 @@ class Products:
     def summed(cls, parts: Sequence[Products]) -> Products:
         """Return the products of several groups' rows together."""
         every = (own.held.T @ own.held if own.as_rows else own.held for own in parts)
-        return cls(parts[0].places, _sum(every), False)
+        return cls(parts[0].places, reduce(np.add, every), False)
 
     @cached_property
     def diagonal(self) -> np.ndarray:
@@ -120,36 +119,18 @@ class Products:
         return float(own[some] @ self.among(some, some) @ own[some])
 
 
-class Moments(ABC):
-    """Products of D columns and, last, the measurement, `size` = D + 1 in all."""
+class Moments:
+    """Products of D columns and, last, the measurement, `size` = D + 1 in all: equations', each times its weight."""
 
-    size: int
-
-    @abstractmethod
-    def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the products (r, c) of some columns with others."""
-
-    def of(self, rows: np.ndarray) -> np.ndarray:
-        """Return the products (r, D + 1) of some columns with all."""
-        return self.among(rows, np.arange(self.size))
-
-    def __sub__(self, other: Moments) -> Moments:
-        return _Less(self, other)
-
-
-class GroupMoments(Moments):
-    """Those of one group: of its equations' products, each times the equation's weight (g,)."""
-
-    def __init__(self, products: Sequence[Products], weights: np.ndarray):
-        """Take both; what is wide is added first."""
-        self.size = products[0].places.size
-        order = sorted(range(len(products)), key=lambda equation: not products[equation].places.wide)
-        self._weighed = [(products[equation], weights[equation]) for equation in order]
+    def __init__(self, weighed: Sequence[tuple[Products, float]]):
+        """Take products with their weights; what is wide is added first."""
+        self.size = weighed[0][0].places.size
+        self.weighed = sorted(weighed, key=lambda one: not one[0].places.wide)
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Add up the equations that have any of both: of mostly more columns than rows, each column's side by side."""
+        """Return the products (r, c) of some columns with others: of mostly more columns, each one's side by side."""
         found = np.zeros((len(columns), len(rows)))
-        for products, weight in self._weighed:
+        for products, weight in self.weighed:
             down, across = products.places.at[columns], products.places.at[rows]
             here, there = np.flatnonzero(down >= 0), np.flatnonzero(across >= 0)
             own = products.among(down[here], across[there])
@@ -162,34 +143,22 @@ class GroupMoments(Moments):
                 found[here] = part
         return found.T
 
+    def of(self, rows: np.ndarray) -> np.ndarray:
+        """Return the products (r, D + 1) of some columns with all."""
+        return self.among(rows, np.arange(self.size))
+
 
 class Summed(Moments):
     """Those of several groups; what was asked last is kept, as it is asked again beside each group left out."""
 
     def __init__(self, parts: Sequence[Moments]):
         """Take those of each."""
-        self.size = parts[0].size
-        self._parts = parts
+        super().__init__([own for part in parts for own in part.weighed])
         self._among: tuple[tuple[bytes, bytes], np.ndarray] | None = None
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Add up those of all groups."""
         asked = rows.tobytes(), columns.tobytes()
         if self._among is None or self._among[0] != asked:
-            self._among = asked, _sum(part.among(rows, columns) for part in self._parts)
+            self._among = asked, super().among(rows, columns)
         return self._among[1]
-
-
-class _Less(Moments):
-    """Those of some groups without others."""
-
-    def __init__(self, whole: Moments, part: Moments):
-        self.size = whole.size
-        self._whole, self._part = whole, part
-
-    def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        return np.asarray(self._whole.among(rows, columns) - self._part.among(rows, columns))
-
-
-def _sum(arrays: Iterable[np.ndarray]) -> np.ndarray:
-    return np.asarray(reduce(np.add, arrays))

@@ -16,7 +16,7 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import CandidateColumn
-from irtwin.gap.regression.moments import GroupMoments, Moments, Places, Products, numbers
+from irtwin.gap.regression.moments import Moments, Places, Products, numbers
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
@@ -277,7 +277,10 @@ class System:
         Raises InputError where they would take too much memory.
         """
         weights = np.maximum(noise, self.quietest) ** -2.0
-        return [GroupMoments(self._products[group][half], weights[half]) for half, group in self.parts]
+        return [
+            Moments(list(zip(self._products[group][half], weights[half].tolist(), strict=True)))
+            for half, group in self.parts
+        ]
 
     @property
     def parts(self) -> list[tuple[slice, int]]:
@@ -328,28 +331,12 @@ class System:
             [Products.summed(own) for own in zip(*(self._products[k] for k in kind), strict=True)] for kind in kinds
         ]
 
-    def _weighted_among(
-        self, inside: np.ndarray, groups: Sequence[Sequence[Products]], noise: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the products among `inside` columns (k, k), and with the measurement (k,), over some groups' own."""
-        every = np.append(inside, self.size)
-        total = np.zeros((len(every), len(every)))
-        for own in groups:
-            for products, level in zip(own, np.maximum(noise, self.quietest), strict=True):
-                held = products.places.at[every]
-                there = np.flatnonzero(held >= 0)
-                total[np.ix_(there, there)] += products.among(held[there], held[there]) / float(level) ** 2
-        return total[:-1, :-1], total[:-1, -1]
-
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
 
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
-        inside, every = self.fitted(chosen), self._together
-        vector = self._solved(inside, *self._weighted_among(inside, every, noise))
-        rows = np.maximum(self.rows.sum(axis=0), 1)
-        found = np.sqrt(np.sum([_squares(own, vector) for own in every], axis=0) / rows)
+        found = self._rms(chosen, noise, self._together, self._together, self.rows)
         found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
         if self.apart:  # few rows are fitted easily: no law is known better where friction turns
             fast, slow = np.split(found, 2)
@@ -369,25 +356,38 @@ class System:
         of: Sequence[int] | np.ndarray,
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
-        inside = self.fitted(chosen)
-        vector = self._solved(inside, *self._weighted_among(inside, [self._products[k] for k in fitted], noise))
-        squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
-        return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
+        some, others = ([self._products[group] for group in groups] for groups in (fitted, of))
+        return self._rms(chosen, noise, some, others, self.rows[list(of)])
 
-    def solution(self, chosen: Sequence[int], total: Moments) -> np.ndarray:
-        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns."""
+    def _rms(
+        self,
+        chosen: Sequence[int],
+        noise: np.ndarray,
+        fitted: Sequence[Sequence[Products]],
+        of: Sequence[Sequence[Products]],
+        rows: np.ndarray,
+    ) -> np.ndarray:
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        total = Moments([pair for own in fitted for pair in zip(own, weights.tolist(), strict=True)])
+        vector = self.solution(chosen, total)
+        squares = np.sum([_squares(own, vector) for own in of], axis=0)
+        return np.asarray(np.sqrt(squares / np.maximum(rows.sum(axis=0), 1)))
+
+    def solution(self, chosen: Sequence[int], total: Moments, without: Moments | None = None) -> np.ndarray:
+        """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns.
+
+        `without`: a part of the total that is left out.
+        """
         inside = self.fitted(chosen)
-        products = total.among(inside, np.append(inside, self.size))
-        return self._solved(inside, products[:, :-1], products[:, -1])
+        asked = inside, np.append(inside, self.size)
+        products = total.among(*asked) - (0.0 if without is None else without.among(*asked))
+        vector = np.zeros(self.size)
+        vector[inside] = solved(factored(products[:, :-1], self.prior(chosen)), products[:, -1])
+        return vector
 
     def fitted(self, chosen: Sequence[int]) -> np.ndarray:
         """Return the indices of the columns that are fitted: the twin's and those chosen."""
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))
-
-    def _solved(self, inside: np.ndarray, among: np.ndarray, right: np.ndarray) -> np.ndarray:
-        vector = np.zeros(self.size)
-        vector[inside] = solved(factored(among, self.prior(inside[self.base :])), right)
-        return vector
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
         """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
