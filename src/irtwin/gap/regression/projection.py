@@ -43,7 +43,7 @@ class Projection:
         self._factor = factored(self._inner.sum(axis=0), system.prior())
         self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
         self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: products with all, and in each part
-        self._batches: list[tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = []
+        self.products: list[tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = []
         self._squares: dict[tuple[int, ...], tuple[float, float]] = {}  # of variants: what is left, and all
         self._project(variants)
 
@@ -54,7 +54,7 @@ class Projection:
             sizes.setdefault(len(one.columns), []).append(one.columns)
         if not sizes:
             return
-        each = [self._at([[*columns, self.system.size] for columns in own]) for own in sizes.values()]
+        each = [self.at([[*columns, self.system.size] for columns in own]) for own in sizes.values()]
         pairs = [np.broadcast_arrays(columns[:, :-1, None], columns[:, None, :]) for columns in each]
         flat = [self._asked[np.concatenate([one[side].ravel() for one in pairs])] for side in (0, 1)]
         products = self.system.products_of(flat[0], flat[1], self._noise)
@@ -74,7 +74,7 @@ class Projection:
             after = whole - _pairs(own[:, :-1], self._all[columns])
             squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, whole)), strict=True)
             self._squares |= zip(known, squares, strict=True)
-            self._batches.append((dict(zip(known, range(len(known)), strict=True)), after, found))
+            self.products.append((dict(zip(known, range(len(known)), strict=True)), after, found))
 
     def _across(self, part: int, at: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Return the products (n, K) of what is asked for, at some places, with the twin's terms in a part."""
@@ -91,7 +91,8 @@ class Projection:
         left, every = np.array([self._squares[one.columns] for one in variants]).reshape(-1, 2).T
         return np.column_stack([left / rows, left / np.maximum(every, 1e-300)])
 
-    def _at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
+    def at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
+        """Return the places of columns among those that are asked for."""
         return np.searchsorted(self._asked, np.array(columns, dtype=int))
 
     def prepare(self, chosen: Sequence[int]) -> None:
@@ -99,7 +100,7 @@ class Projection:
         new = [k for k in chosen if k not in self._rows]
         if not new:
             return
-        at = self._at(new)
+        at = self.at(new)
         own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
         whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
         for part, (found, inner) in enumerate(zip(own, self._inner, strict=True)):
@@ -108,17 +109,12 @@ class Projection:
             found -= self._imitated[at] @ across.T + left @ self._imitated.T
         self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
 
-    def _of(self, chosen: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the products of chosen columns with all, over all parts (c, A) and in each (P, c, A)."""
-        self.prepare(chosen)
-        size = len(self._asked)
-        whole = np.array([self._rows[k][0] for k in chosen]).reshape(-1, size)
-        parts = [self._rows[k][1] for k in chosen]
-        return whole, np.stack(parts, axis=1) if parts else np.zeros((len(self._moments), 0, size))
-
     def beside(self, chosen: Sequence[int]) -> Beside:
         """Take `chosen` columns off as well, and what noise of positions seems to explain off the measurement."""
-        at, (whole, parts) = self._at(chosen), self._of(chosen)
+        self.prepare(chosen)
+        at, rows = self.at(chosen), [self._rows[k] for k in chosen]
+        whole = np.array([of_all for of_all, _ in rows]).reshape(-1, len(self._asked))
+        parts = np.array([each for _, each in rows]).reshape(-1, len(self._moments), len(self._asked)).swapaxes(0, 1)
         factor = factored(whole[:, at]) if len(at) else None
         imitated = whole if factor is None else solved(factor, whole)  # (c, A)
         shaken = self._shaken(at, imitated[:, -1])
@@ -152,17 +148,6 @@ class Projection:
         parts = np.array(across) - of_own + of_base @ self._imitated[at].T
         return self._all[at] @ change - of_own.sum(axis=0), parts
 
-    def batches(self, variants: Sequence[Variant]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield of the variants of one number of columns, k, which they are (V,), the places of these columns (V, k).
-
-        And the products among these and with the measurement, (V, k, k + 1), over all parts and in each (P, ...).
-        """
-        for known, whole, parts in self._batches:
-            some = [(place, known[one.columns]) for place, one in enumerate(variants) if one.columns in known]
-            if some:
-                which, own = np.array(some).T
-                yield which, self._at([variants[place].columns for place in which]), whole[own], parts[:, own]
-
 
 class Shaken(NamedTuple):
     """What noise of positions seems to explain: its products `less` (P, D + 1) with all columns.
@@ -189,12 +174,22 @@ class Beside:
     shaken: Shaken | None
 
     def batches(self, variants: Sequence[Variant]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield what `Projection.batches` does, over all parts beside these columns."""
-        for which, columns, whole, parts in self.projection.batches(variants):
+        """Yield of the variants of one number of columns, k, which they are (V,), the places of these columns (V, k).
+
+        And the products among these and with the measurement: over all parts beside these columns (V, k, k + 1), and in
+        each part beside the twin's terms alone (P, V, k, k + 1).
+        """
+        for known, of_all, of_parts in self.projection.products:
+            some = [(place, known[one.columns]) for place, one in enumerate(variants) if one.columns in known]
+            if not some:
+                continue
+            which, own = np.array(some).T
+            columns = self.projection.at([variants[place].columns for place in which])
+            whole, parts = of_all[own], of_parts[:, own]
             if self.shaken is not None:
-                of_all, of_parts = self.projection.less_noise(columns.ravel(), self.shaken)
-                whole[..., -1] += of_all.reshape(columns.shape)
-                parts[..., -1] += of_parts.reshape(-1, *columns.shape)
+                less, less_in_parts = self.projection.less_noise(columns.ravel(), self.shaken)
+                whole[..., -1] += less.reshape(columns.shape)
+                parts[..., -1] += less_in_parts.reshape(-1, *columns.shape)
             beside = np.column_stack([columns, np.full(len(columns), -1)])
             whole -= np.einsum("cvi,cvj->vij", self.imitated[:, columns], self.whole[:, beside])
             yield which, columns, whole, parts
