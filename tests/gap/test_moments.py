@@ -30,8 +30,7 @@ def group(rng: np.random.Generator, count: int, used: list[list[int]]) -> tuple[
         assert every[-1].squares(sums) == pytest.approx(float(((full @ sums) ** 2).sum()))
         one, other = rng.integers(0, len(held), (2, 5))
         products = (full.T @ full)[places.every[one], places.every[other]]
-        for form in (every[-1], Products.summed([every[-1]])):
-            np.testing.assert_allclose(form.pairs(held[one], held[other]), products, atol=1e-9)
+        np.testing.assert_allclose(every[-1].pairs(held[one], held[other]), products, atol=1e-9)
         assert every[-1].largest == pytest.approx((full[:, :-1] ** 2).sum(axis=0).max())
         assert every[-1].held.size >= numbers(*rows.shape)
     return Moments(list(zip(every, WEIGHTS.tolist(), strict=True))), whole

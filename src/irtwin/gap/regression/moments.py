@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 
 import numpy as np
 
@@ -76,12 +76,6 @@ class Products:
         products = rows.T @ rows
         products *= scale[:, None] * scale
         return cls(places.spread, np.pad(products, (missing, missing)), False)
-
-    @classmethod
-    def summed(cls, parts: Sequence[Products]) -> Products:
-        """Return the products of several groups' rows together."""
-        every = (own.held.T @ own.held if own.as_rows else own.held for own in parts)
-        return cls(parts[0].places, reduce(np.add, every), False)
 
     @cached_property
     def diagonal(self) -> np.ndarray:

@@ -323,20 +323,12 @@ class System:
                     found[half, group, some] += weight * self._products[group][equation].pairs(*held)
         return found.reshape(-1, len(one))
 
-    @cached_property
-    def _together(self) -> list[list[Products]]:
-        """Each equation's products over all groups: those that are observed, and the others."""
-        kinds = [np.flatnonzero(self.group_observed == kind) for kind in np.unique(self.group_observed)]
-        return [
-            [Products.summed(own) for own in zip(*(self._products[k] for k in kind), strict=True)] for kind in kinds
-        ]
-
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
 
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
-        found = self._rms(chosen, noise, self._together, self._together, self.rows)
+        found = self.rms(chosen, noise, range(self.groups), range(self.groups))
         found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
         if self.apart:  # few rows are fitted easily: no law is known better where friction turns
             fast, slow = np.split(found, 2)
@@ -356,22 +348,11 @@ class System:
         of: Sequence[int] | np.ndarray,
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
-        some, others = ([self._products[group] for group in groups] for groups in (fitted, of))
-        return self._rms(chosen, noise, some, others, self.rows[list(of)])
-
-    def _rms(
-        self,
-        chosen: Sequence[int],
-        noise: np.ndarray,
-        fitted: Sequence[Sequence[Products]],
-        of: Sequence[Sequence[Products]],
-        rows: np.ndarray,
-    ) -> np.ndarray:
         weights = np.maximum(noise, self.quietest) ** -2.0
-        total = Moments([pair for own in fitted for pair in zip(own, weights.tolist(), strict=True)])
-        vector = self.solution(chosen, total)
-        squares = np.sum([_squares(own, vector) for own in of], axis=0)
-        return np.asarray(np.sqrt(squares / np.maximum(rows.sum(axis=0), 1)))
+        every = [pair for group in fitted for pair in zip(self._products[group], weights.tolist(), strict=True)]
+        vector = self.solution(chosen, Moments(every))
+        squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
+        return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
 
     def solution(self, chosen: Sequence[int], total: Moments, without: Moments | None = None) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns.
@@ -391,17 +372,13 @@ class System:
 
     def squares(self, vector: np.ndarray, group: int) -> np.ndarray:
         """Return each equation's squared residuals (g,) in a group, by (D,) coefficients in units of the prior."""
-        return _squares(self._products[group], vector)
+        weights = np.append(-vector, 1.0)
+        return np.maximum([products.squares(weights) for products in self._products[group]], 0.0)
 
 
 def _times(products: np.ndarray, values: np.ndarray) -> np.ndarray:
     some = np.flatnonzero(values)  # of many columns few are fitted
     return np.asarray(values[some] @ products[some])
-
-
-def _squares(products: Sequence[Products], vector: np.ndarray) -> np.ndarray:
-    weights = np.append(-vector, 1.0)
-    return np.maximum([own.squares(weights) for own in products], 0.0)
 
 
 def _change(term: Term) -> Term:
