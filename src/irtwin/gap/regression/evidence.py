@@ -2,7 +2,7 @@
 
 A variant's columns, less what the fit imitates of them, have the information `A` and the score `b` in units of the
 noise. Its coefficients `x` are those of least squares with the prior, within their bounds; they explain
-`2 x.b - x.A.x - x.x` squares. In each group the score that is left over, `x.(b_g - A_g x)`, is what the group says
+`2 x.b - x.A.x` squares. In each group the score that is left over, `x.(b_g - A_g x)`, is what the group says
 against them.
 """
 
@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.gap.regression.hypotheses import Variant, bounds
+from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projected, asked_columns, projected, projected_in
@@ -29,7 +29,7 @@ class HypothesisEvidence:
     """V variants beside a fit, G parts of the equations (`System.parts`); squares in units of the noise.
 
     explained (V,); said, missed (V, G): what each adds to a part, and the score that this leaves there; values (V, k
-    each), in units of the prior; information (V, k, k each); rows (G,).
+    each), beyond what is expected, in units of the prior; information (V, k, k each); rows (G,).
     """
 
     variants: tuple[Variant, ...]
@@ -80,20 +80,19 @@ def evidence(
     information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
     values: list[np.ndarray] = [np.zeros(0)] * len(variants)
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
-    batches = _batches(system, variants, known)
+    batches, fits = _batches(system, variants, known), []
     for batch in batches:
         products, right = _parted(whole, batch.columns)
-        solved = _bounded(products + np.eye(products.shape[1]), right, batch.lowest)
-        explained[batch.place] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
-        for place, own, value in zip(batch.place, products, solved, strict=True):
+        fits.append(_bounded(products + np.eye(products.shape[1]), right + batch.expected, batch.lowest))
+        explained[batch.place] = 2 * (fits[-1] * right).sum(axis=1) - _squares(products, fits[-1])
+        for place, own, value in zip(batch.place, products, fits[-1] - batch.expected, strict=True):
             information[place], values[place] = own, value
     for group, part in enumerate(moments):
         seen = projected_in(part, whole, inside)
-        for batch in batches:
+        for batch, fit in zip(batches, fits, strict=True):
             products, right = _parted(seen, batch.columns)
-            solved = np.array([values[place] for place in batch.place])
-            said[batch.place, group] = _squares(products, solved)
-            missed[batch.place, group] = (solved * right).sum(axis=1) - said[batch.place, group]
+            said[batch.place, group] = _squares(products, fit)
+            missed[batch.place, group] = (fit * right).sum(axis=1) - said[batch.place, group]
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
     shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
     return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
@@ -115,10 +114,11 @@ def visibility(system: System, moments: Sequence[Moments], variants: Sequence[Va
 
 @dataclass(frozen=True)
 class _Batch:
-    """Variants of one number of coefficients: `place` (V,) in all variants, `columns` (V, k), `lowest` (V, k)."""
+    """Variants of one number of coefficients: `place` (V,) in all variants, `columns`, `expected`, `lowest` (V, k)."""
 
     place: np.ndarray
     columns: np.ndarray
+    expected: np.ndarray
     lowest: np.ndarray
 
 
@@ -129,8 +129,10 @@ def _batches(system: System, variants: Sequence[Variant], known: Set[str]) -> li
     batches = []
     for places in sizes.values():
         columns = np.array([variants[place].columns for place in places])
+        expected = np.array([[system.all_terms[k].expected for k in own] for own in columns])
         lowest = np.array([_lowest(system, variants[place], known) for place in places])
-        batches.append(_Batch(np.array(places), columns, lowest / system.scale[columns]))
+        scale = system.scale[columns]
+        batches.append(_Batch(np.array(places), columns, expected / scale, lowest / scale))
     return batches
 
 
@@ -138,7 +140,7 @@ def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:
     """Return (k,) the lowest values: what is not `known` was nothing before, so that a change cannot take from it."""
     if system.both and variant.columns[0] >= system.changed and variant.effect.id in known:
         return np.full(len(variant.columns), -np.inf)
-    return bounds(variant)
+    return np.array([term.lowest for term in variant.terms])
 
 
 def _parted(projected: Projected, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
