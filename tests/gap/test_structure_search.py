@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
+from irtwin.gap.isolation.posterior import HypothesisPrior
 from irtwin.gap.isolation.structure_search import _Search, attribute
 from irtwin.gap.regression.evidence import evidence
-from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant
+from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import DEFAULT
@@ -196,10 +197,27 @@ def test_what_explains_most_does_not_hide_what_is_likely():
     judged = SimpleNamespace(hypotheses=("most", "likely"), variant=str, log_odds=[-9.0, 2.0], log_prior=[-5.0, -5.0])
     search = SimpleNamespace(beside=lambda found, noise: judged, left=lambda found, noise: noise)
     judged.likeliest_at = judged.hypotheses.index
-    posterior = SimpleNamespace(**{**vars(judged), "first": lambda least: 0, "likeliest": lambda: 1})
+    posterior = SimpleNamespace(**{**vars(judged), "promising": lambda least: [0, 1]})
     assert _Search.likely(search, posterior, [], None) == ("likely", "1")
-    posterior.likeliest = lambda: None
+    posterior.promising = lambda least: [0]
     assert _Search.likely(search, posterior, [], None) is None
+
+
+def test_what_is_expected_in_each_joint_shows_in_all_together():
+    """None of six joints shows it by itself; where some size is expected and not there, that speaks against it."""
+    size, prior = 0.1, HypothesisPrior(effects=20, joints=6)
+    columns = tuple(CandidateColumn(EFFECT, k, Term("k", "1", f"j{k}", expected=size, spread=size)) for k in range(6))
+    each = hypotheses(columns, 1, MISSING)
+
+    def odds(there):
+        system = replace(system_of(np.eye(6), np.full(6, there), size=1.0)[0], columns=columns)
+        search = _Search(system, each, prior, DEFAULT.criterion, np.ones(1))
+        found = search.beside((), system.residual_rms((), np.ones(1)))
+        return {one.joint: float(odds) for one, odds in zip(found.hypotheses, found.log_odds, strict=True)}
+
+    shown, nothing = odds(size), odds(0.0)
+    assert shown.pop(None) > 0 > max(shown.values())
+    assert nothing.pop(None) < min(nothing.values()) < -np.log(20 * 6)
 
 
 def test_effects_that_cannot_be_told_apart_share_the_probability():

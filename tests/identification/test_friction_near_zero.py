@@ -56,11 +56,13 @@ def test_a_soft_law_is_followed_and_its_friction_found(law: str, width: float) -
     assert np.all(left(ROBOT, motions) > 0.07)
     speeds = np.repeat(np.linspace(-4 * width, 4 * width, 81)[:, None], 2, axis=1)
     np.testing.assert_allclose(direction(robot, speeds), LAWS[law](speeds / width), atol=0.12)
+    np.testing.assert_allclose([joint.dry_friction for joint in robot.joints], truth(ROBOT)["Fc"], rtol=0.05)
 
 
 def test_sharp_friction_stays_sharp() -> None:
     robot = with_friction_near_zero(ROBOT, [measured(None, 1.0, seed) for seed in (1, 2)], EFFECTS)
     np.testing.assert_allclose(direction(robot, np.array([[0.006, -0.006]])), [[1, -1]], atol=0.02)
+    np.testing.assert_allclose([joint.dry_friction for joint in robot.joints], truth(ROBOT)["Fc"], rtol=0.05)
 
 
 def test_joints_have_laws_of_their_own() -> None:
@@ -78,7 +80,7 @@ def test_without_torque_friction_turns_at_once() -> None:
         ROBOT, joints=tuple(replace(one, friction_width=0.01, friction_exponent=2.0) for one in ROBOT.joints)
     )
     robot = with_friction_near_zero(known, [replace(measured(None, 1.0, 1), torque=None)], EFFECTS)
-    assert [joint.friction_width for joint in robot.joints] == [None, None]
+    assert [(joint.friction_width, joint.dry_friction) for joint in robot.joints] == [(None, None)] * 2
 
 
 def test_a_twin_keeps_it_in_its_file(tmp_path) -> None:

@@ -323,8 +323,9 @@ class PreslidingHysteresis(JointEffect):
         return self.variants(d=(3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return the Coulomb friction that builds up."""
-        return (Term("Fc", force_unit(joint), joint.name, spread=15.0, lowest=0.0),)
+        """Return the Coulomb friction that builds up: the joint's own, where that is known."""
+        known = joint.dry_friction
+        return (Term("Fc", force_unit(joint), joint.name, expected=known or 0.0, spread=known or 15.0, lowest=0.0),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return z - s, at the acting joints."""

@@ -17,10 +17,11 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
 from irtwin.identification.progress import told
-from irtwin.robot.description import Robot
+from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
 Turn = tuple[float, float]  # width, rad/s or m/s, and exponent of `effects.friction.turn`
+Dry = tuple[Turn | None, float | None]  # how a joint's dry friction turns, None: at once, and how much it is, N m or N
 
 _COARSE = [(width, exponent) for width in (1.5e-3, 3e-3, 6e-3, 0.012, 0.024) for exponent in (1.25, 2.0, 4.0, 10.0)]
 _FINER = [(width, exponent) for width in (0.65, 0.8, 1.0, 1.25, 1.5) for exponent in (0.75, 1.0, 1.35)]  # times these
@@ -30,12 +31,12 @@ _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
 def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> Robot:
-    """Return the robot with the turn of each joint's dry friction, as its torque shows it beside some effects.
+    """Return the robot with each joint's dry friction and its turn, as its torque shows them beside some effects.
 
-    A joint whose torque shows none, or in which it makes no sure difference, has friction that turns at once.
+    A joint whose torque shows no turn, or in which it makes no sure difference, has friction that turns at once.
     """
     measured = [motion for motion in motions if motion.torque is not None]
-    plain = replace(robot, joints=tuple(replace(j, friction_width=None, friction_exponent=None) for j in robot.joints))
+    plain = replace(robot, joints=tuple(_with(joint, (None, None)) for joint in robot.joints))
     if not measured:
         return plain
     named = {effect for effect in effects if isinstance(effect, str)}
@@ -53,25 +54,25 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
         if isinstance(shape, JointEffect) and shape != effect
     ]
     found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints))
-    if any(found):
-        finer = [[] if one is None else _around(one) for one in found]
+    if any(turn for turn, _ in found):
+        finer = [[] if turn is None else _around(turn) for turn, _ in found]
         found = _found(stack, open_shapes, measured, finer)
-    return replace(
-        plain,
-        joints=tuple(
-            joint if one is None else replace(joint, friction_width=one[0], friction_exponent=one[1])
-            for joint, one in zip(plain.joints, found, strict=True)
-        ),
-    )
+    return replace(plain, joints=tuple(_with(*both) for both in zip(plain.joints, found, strict=True)))
+
+
+def _with(joint: Joint, found: Dry) -> Joint:
+    turn, friction = found
+    width, exponent = turn or (None, None)
+    return replace(joint, friction_width=width, friction_exponent=exponent, dry_friction=friction)
 
 
 def _found(
     stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
-) -> list[Turn | None]:
-    """Return the best of the turns that are tried in each joint; None where there is none."""
+) -> list[Dry]:
+    """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none."""
     blocks, pattern = _reduced(stack, open_shapes, motions, tried)
     every = told(enumerate(tried), "friction near zero speed, joint")
-    return [_best(blocks, pattern, joint, turns) if turns else None for joint, turns in every]
+    return [_best(blocks, pattern, joint, turns) for joint, turns in every]
 
 
 def _around(found: Turn) -> list[Turn]:
@@ -117,16 +118,18 @@ def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
         yield turn(dq, width, exponent)[:, None]
 
 
-def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Turn | None:
-    """Return the turn that leaves least of a joint's torque; None where it does not do so all the time."""
+def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Dry:
+    """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always."""
     own = int(pattern[joint].sum()) - len(shapes) - 1
     factors = [block.factors[joint] for block in blocks if block.rows[joint]]
     if not factors:
-        return None
+        return None, None
     whole = combine(factors, pattern[joint])[:, np.append(pattern[joint], True)]
-    left = _left(whole, factors, own)
-    best = min(range(1, len(left)), key=lambda k: float(left[k].sum()))
-    return shapes[best - 1] if _everywhere(left[0] - left[best]) else None
+    left, friction = _left(whole, factors, own)
+    best = int(np.argmin(left.sum(axis=1)))
+    if not _everywhere(left[0] - left[best]):
+        best = 0
+    return shapes[best - 1] if best else None, max(float(friction[best]), 0.0)
 
 
 def _everywhere(saved: np.ndarray) -> bool:
@@ -135,8 +138,8 @@ def _everywhere(saved: np.ndarray) -> bool:
     return bool(ranks[saved > 0].sum() >= _NEARLY_ALL * ranks.sum())
 
 
-def _left(whole: np.ndarray, factors: Sequence[np.ndarray], own: int) -> np.ndarray:
-    """Return the squares that the first `own` columns and each of the S others leave in each block, (S, B).
+def _left(whole: np.ndarray, factors: Sequence[np.ndarray], own: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the first `own` columns and each of the S others leave in each block, (S, B) squares, and these (S,).
 
     The first are decomposed once for all others: of many joints they are many.
     """
@@ -146,7 +149,7 @@ def _left(whole: np.ndarray, factors: Sequence[np.ndarray], own: int) -> np.ndar
     told = squares > _NOTHING**2 * (whole[:, own:-1] ** 2).sum(axis=0)
     values = np.where(told, measured[:, 0] @ shapes, 0.0) / np.where(told, squares, 1.0)
     weights = np.concatenate([beside[:, :-1] * values - beside[:, -1:], -np.diag(values), np.ones((1, len(values)))])
-    return np.array([((factor @ weights) ** 2).sum(axis=0) for factor in factors]).T
+    return np.array([((factor @ weights) ** 2).sum(axis=0) for factor in factors]).T, values
 
 
 def _fitted(columns: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ class Joint:
     `kp`, `kd`: gains of its controller, N m/rad (N/m) and N m s/rad (N s/m) of the joint.
     `friction_width` (rad/s or m/s) and `friction_exponent`: over which speed, and how, dry friction turns at zero
     (`effects.friction.turn`); None: at once. `friction_widest`: the wider of two such widths, where runs show two.
+    `dry_friction`: how large it is by the same fit, N m (N).
     """
 
     name: str
@@ -36,7 +37,8 @@ class Joint:
     kd: float | None = None
     friction_width: float | None = None
     friction_exponent: float | None = None
-    friction_widest: float | None = field(default=None, compare=False)  # no number of a twin
+    friction_widest: float | None = field(default=None, compare=False)  # no number of a twin, as the next
+    dry_friction: float | None = field(default=None, compare=False)
 
     @property
     def unit(self) -> str:

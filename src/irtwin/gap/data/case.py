@@ -176,9 +176,9 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
 
 
 def _turned(before: Joint, joint: Joint) -> Joint:
-    """Return a joint as one side's runs show its turn, where they do, and the wider one of it and the turn before."""
+    """Return a joint as one side's runs show its friction, where they do, and the wider turn of this and `before`."""
     if joint.friction_width is None:
-        return before
+        return replace(before, dry_friction=joint.dry_friction or before.dry_friction)
     return replace(joint, friction_widest=max(before.friction_width or 0.0, joint.friction_width))
 
 

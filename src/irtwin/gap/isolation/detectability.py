@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from irtwin.document.document import Untestable
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.structure_search import Attribution
@@ -27,28 +25,24 @@ def untestable(
     limits: Criterion,
 ) -> tuple[Untestable, ...]:
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
-    measured = {name for name, _ in channels}
     motions = tuple(motions)
-    visible: dict[str, float] = {}
-    share: dict[str, float] = {}
+    visible: dict[str, tuple[float, float]] = {}
     least = {name: limits.visible(len(found.hypotheses)) for name, found in channels}
     for _, found in channels:
         for k, hypothesis in enumerate(found.hypotheses):
             name = hypothesis.effect
-            if found.visible[k, 0] > visible.get(name, -np.inf):
-                visible[name], share[name] = found.visible[k].tolist()
+            visible[name] = max(visible.get(name, (0.0, 0.0)), tuple(found.visible[k].tolist()))
     whys = {}
     for effect in known:
         if effect.id in inside:
             continue
-        channel = effect.signal
-        if channel not in measured:
+        channel, (shown, share) = effect.signal, visible.get(effect.id, (0.0, 0.0))
+        if channel not in least:
             whys[effect.id] = f"no {channel} was measured"
         elif not can_show(effect, motions):
             whys[effect.id] = f"no {' and no '.join(sorted(effect.requires))} was measured"
-        elif effect.id not in visible or visible[effect.id] == 0:
+        elif shown == 0:
             whys[effect.id] = "nothing in these runs brings it about"
-        elif visible[effect.id] < least[channel]:
-            imitated = 100 * (1 - share[effect.id])
-            whys[effect.id] = f"the rest of the twin imitates {imitated:.0f} % of it on these runs"
+        elif shown < least[channel]:
+            whys[effect.id] = f"the rest of the twin imitates {100 * (1 - share):.0f} % of it on these runs"
     return tuple(Untestable(effect=effect, why=why) for effect, why in whys.items())

@@ -3,9 +3,10 @@
 What a structure leaves along a hypothesis' columns is noise, disagreement between groups, and a misfit that no effect
 names. Its variance, a row, is `v = misfit^2 + disagreement / rows`, known as from `certainty` earlier looks; what is
 left is then Student's, and what explains it has a Gaussian prior. The odds of k coefficients that explain `gain` a row,
-of the information `A`, are
+of the information `A`, and `missed` of it where they are as expected, give or take a size s, are
 
-    prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) / sqrt(det(1 + A / (rows v)))
+    prior * ((1 + gain / (certainty v)) / (1 + missed / (certainty v))) ** ((certainty + k) / 2)
+        / sqrt(det(1 + s^2 A / (rows v)))
 
 over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; that
 it is at one more has even odds, whichever that is. In words: `docs/how-it-decides.md`.
@@ -13,7 +14,7 @@ it is at one more has even odds, whichever that is. In words: `docs/how-it-decid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,7 +27,7 @@ from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
 
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
-_SIZES = tuple(4.0**-k for k in range(6))  # of an effect, in units of what is expected: down to a thousandth
+_SIZES = tuple(4.0**-k for k in range(6))  # in units of the catalogue's, which are alike for a base and a wrist
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
@@ -120,17 +121,15 @@ class Posterior:
         """Return the shape of a hypothesis that explains most."""
         return self.evidence.variants[int(self.shape[place])]
 
-    def first(self, least: float) -> int | None:
-        """Return the place of the hypothesis that explains most; None where none explains anything.
+    def promising(self, least: float) -> Iterator[int]:
+        """Yield the place of the hypothesis that explains most, and that of the likeliest, where there are any.
 
         What has less than the `least` log odds, and less still by noise that holds its own effect, is left out.
         """
-        explained = np.where(self.log_odds > least - _HIDDEN, self.evidence.explained[self.shape], 0.0)
-        return int(np.argmax(explained)) if len(explained) and explained.max() > 0 else None
-
-    def likeliest(self) -> int | None:
-        """Return the place of the likeliest hypothesis; None where none is likelier than nothing."""
-        return int(np.argmax(self.log_odds)) if len(self.log_odds) and self.log_odds.max() > 0 else None
+        shown = self.evidence.explained[self.shape]
+        kept = np.flatnonzero((self.log_odds > least - _HIDDEN) & (shown > 0))
+        if len(kept):
+            yield from dict.fromkeys(int(kept[np.argmax(of[kept])]) for of in (shown, self.log_odds))
 
     def explained(self, place: int) -> float:
         """Return the squares that a hypothesis explains in its best shape."""
@@ -176,10 +175,9 @@ class Posterior:
         return 0.5 * (certainty + count) * np.log1p(gain / (certainty * variance))
 
     def _sizes(self, places: np.ndarray, variance: np.ndarray) -> np.ndarray:
-        """Return the log of how much room variants' coefficients have, (P,), in units of what the data leave open.
+        """Return the log of what variants pay, (P,): the room that their coefficients have, and what these miss in it.
 
-        They are as large as one of `_SIZES`, each as likely: the catalogue expects alike of a base and of a wrist.
-        Variants of one count are solved at once.
+        They are off what is expected by one of `_SIZES`, each as likely. Variants of one count are solved at once.
         """
         seen, found = self.evidence, np.zeros(len(places))
         counts = np.array([len(seen.values[place]) for place in places], dtype=int)
@@ -187,10 +185,13 @@ class Posterior:
         for count in np.unique(counts):
             own = np.flatnonzero(counts == count)
             information = np.stack([seen.information[place] for place in places[own]])
-            squares = np.array([seen.values[place] @ seen.values[place] for place in places[own]])
+            values = np.stack([seen.values[place] for place in places[own]])
             scale = seen.rows_that_speak[places[own]] * variance[own]
-            open_ones = np.maximum(np.linalg.eigvalsh(information) / scale[:, None], 0.0)
-            each = 0.5 * (np.log1p(sizes[..., None] ** 2 * open_ones).sum(axis=-1) + squares / sizes**2)
+            squares, axes = np.linalg.eigh(information)
+            known = np.maximum(squares / scale[:, None], 0.0)
+            room = 1 + sizes[..., None] ** 2 * known
+            missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
+            each = 0.5 * np.log(room).sum(axis=-1) + self._explaining(missed, 1.0, count)
             found[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
         return found
 

@@ -54,7 +54,8 @@ def attribute(
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = search.projection(noise).visible(shapes)
-    found, noise = search.paired(*search.settled(*search.pruned(*search.forward(before, noise))))
+    found, noise = search.settled(*search.pruned(*search.forward(before, noise)))
+    found, noise = search.pruned(*search.paired(found, noise))
     after = search.beside(found, noise)
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
     beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
@@ -156,16 +157,14 @@ class _Search:
     ) -> Found | None:
         """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
-        All are judged by what the first leaves: noise that holds its own effect would hide it. Where it is not likely,
-        one that explains less may be. What the data speak against is not tried.
+        All are judged by what the first leaves: noise that holds its own effect would hide it. Where that is hopeless,
+        what explains less may be likely. What the data speak against is not tried.
         """
-        for first in dict.fromkeys((posterior.first(least), posterior.likeliest())):
-            if first is None:
-                continue
+        for first, enough in zip(posterior.promising(least), (least, 0.0), strict=False):
             new = posterior.hypotheses[first], posterior.variant(first)
             judged = self.beside(found, self.left([*found, new], noise))
             place = judged.likeliest_at(new[0])
-            if judged.log_odds[place] > max(least, judged.log_prior[place]):
+            if judged.log_odds[place] > max(enough, judged.log_prior[place]):
                 return judged.hypotheses[place], judged.variant(place)
         return None
 
@@ -228,7 +227,7 @@ class _Search:
         self.projection(noise).prepare(_columns(firsts))
         for first, found in enumerate(firsts):
             beside = self._beside([*rest, found], noise, there)
-            second = beside.first(-np.inf)
+            second = next(beside.promising(-np.inf), None)
             if second is not None:
                 pairs.append([found, (beside.hypotheses[second], beside.variant(second))])
                 explained.append(alone.explained(first) + beside.explained(second))

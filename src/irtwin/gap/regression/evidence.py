@@ -2,7 +2,7 @@
 
 A variant's columns, less what the fit imitates of them, have the information `A` and the score `b` in units of the
 noise. Its coefficients `x` are those of least squares with the prior, within their bounds; they explain
-`2 x.b - x.A.x - x.x` squares. In each group the score that is left over, `x.(b_g - A_g x)`, is what the group says
+`2 x.b - x.A.x` squares. In each group the score that is left over, `x.(b_g - A_g x)`, is what the group says
 against them.
 """
 
@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.gap.regression.hypotheses import Variant, bounds
+from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 
@@ -28,7 +28,7 @@ class HypothesisEvidence:
     """V variants beside a fit, G parts of the equations (`System.parts`); squares in units of the noise.
 
     explained (V,); said, missed (V, G): what each adds to a part, and the score that this leaves there; values (V, k
-    each), in units of the prior; information (V, k, k each); rows (G,).
+    each), beyond what is expected, in units of the prior; information (V, k, k each); rows (G,).
     """
 
     variants: tuple[Variant, ...]
@@ -76,15 +76,17 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
     beside = projection.beside(chosen)
     for places, columns, found, parts in beside.batches(variants):
-        lowest = np.array([_lowest(system, variants[place], known) for place in places])
-        lowest /= system.scale[[variants[place].columns for place in places]]
+        own = [variants[place].columns for place in places]
+        scale = system.scale[own]
+        expected = np.array([[system.all_terms[k].expected for k in some] for some in own]) / scale
+        lowest = np.array([_lowest(system, variants[place], known) for place in places]) / scale
         products, right = found[..., :-1], found[..., -1]
-        solved = _bounded(products + np.eye(products.shape[1]), right, lowest)
-        explained[places] = 2 * (solved * right).sum(axis=1) - _squares(products, solved) - (solved**2).sum(axis=1)
-        squares, measured = beside.in_parts(columns, parts, solved)
+        fit = _bounded(products + np.eye(products.shape[1]), right + expected, lowest)
+        explained[places] = 2 * (fit * right).sum(axis=1) - _squares(products, fit)
+        squares, measured = beside.in_parts(columns, parts, fit)
         said[places], missed[places] = squares.T, (measured - squares).T
-        for place, own, value in zip(places, products, solved, strict=True):
-            information[place], values[place] = own, value
+        for place, known_of, value in zip(places, products, fit - expected, strict=True):
+            information[place], values[place] = known_of, value
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
     shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
     return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
@@ -94,7 +96,7 @@ def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:
     """Return (k,) the lowest values: what is not `known` was nothing before, so that a change cannot take from it."""
     if system.both and variant.columns[0] >= system.changed and variant.effect.id in known:
         return np.full(len(variant.columns), -np.inf)
-    return bounds(variant)
+    return np.array([term.lowest for term in variant.terms])
 
 
 def _squares(products: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -77,12 +77,9 @@ def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]], seed: int) -> t
 
 def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[float]:
     """Return the 95 % interval over groups of the RMSE pooled over equations."""
-    generator = np.random.default_rng(seed)
-    drawn = []
-    for _ in range(_RESAMPLED):
-        pick = generator.integers(len(rows), size=len(rows))
-        drawn.append(np.sqrt(squares[pick].sum() / max(rows[pick].sum(), 1)))
-    return [float(value) for value in np.quantile(drawn, [0.025, 0.975])]
+    pick = np.random.default_rng(seed).integers(len(rows), size=(_RESAMPLED, len(rows)))
+    drawn = np.sqrt(squares[pick].sum(axis=(1, 2)) / np.maximum(rows[pick].sum(axis=(1, 2)), 1))
+    return list(np.quantile(drawn, [0.025, 0.975]).tolist())
 
 
 def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from irtwin.effects.effect import Effect, Term
 from irtwin.robot.description import Robot
 
@@ -66,8 +64,8 @@ def hypotheses(
 ) -> list[Hypothesis]:
     """Group candidate columns (the first of index `first`) into hypotheses of one scope, joint by joint.
 
-    Effects on power that act joint by joint may also act in every joint at once; what is `inside` the twin, an effect
-    and its joint, cannot be missing; joint None: nowhere.
+    Effects on power, and those of which some size is expected in a joint, may also act in every joint at once; what is
+    `inside` the twin, an effect and its joint, cannot be missing; joint None: nowhere.
     """
     places: dict[tuple[str, str | None], dict[int, list[int]]] = {}
     for k, column in enumerate(columns):
@@ -75,7 +73,7 @@ def hypotheses(
         joint = place_of(column.term)
         if scope == MISSING and {(effect.id, joint), (effect.id, None)} & inside:
             continue
-        keys = [joint, None] if joint and effect.signal == "power" else [joint]
+        keys = [joint, None] if joint and (effect.signal == "power" or column.term.expected) else [joint]
         for key in keys:
             places.setdefault((effect.id, key), {}).setdefault(id(effect), []).append(k)
     return [
@@ -94,11 +92,6 @@ def hypotheses(
         )
         for (effect, joint), variants in places.items()
     ]
-
-
-def bounds(variant: Variant) -> np.ndarray:
-    """Return the lowest value of each coefficient of a variant, (k,)."""
-    return np.array([term.lowest for term in variant.terms])
 
 
 def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
