@@ -35,7 +35,7 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
-from irtwin.knowledge.store.updates import as_change, by_doing, check
+from irtwin.knowledge.store.updates import as_change, by_asking, by_doing, check
 from irtwin.knowledge.tariff import tariff_of
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
@@ -404,8 +404,13 @@ class KnowledgeGraph:
         check(text, base, isinstance(self._store, SparqlServer))
         if default_graphs or named_graphs:
             text = using(text, default_graphs, named_graphs, base)
+
+        def construct(asked: str) -> set[Triple]:
+            return set(cast(QueryTriples, self._store.query(asked, base_iri=base, prefixes=self.prefixes)))
+
         try:
             change = as_change(text, self._holding, base, self.prefixes)
+            change = change or by_asking(text, self._holding, construct, base)
             removed, added = change or by_doing(text, self.quads(), base, self.prefixes)
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
