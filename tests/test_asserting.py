@@ -14,10 +14,10 @@ from irtwin.asserting import follow, keep
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
+from irtwin.rewriting import conclude, map_rows, rewriting
 from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
-from irtwin.workflow import conclude, map_rows, rewriting
 from tests import small_fleet
 from tests.data_sets import irtwin
 

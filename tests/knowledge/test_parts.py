@@ -10,7 +10,7 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests import small_fleet
 from tests.individuals import individual
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.alarms.alarm import alarms
 from irtwin.knowledge import by_parts, parts, reasoning
 from irtwin.knowledge.owl_rl.beside import Beside
@@ -333,7 +333,7 @@ def test_two_robots_one_by_one(two_robots: list[Quad], ontology: list[Quad]) -> 
 def test_a_fleet_one_by_one(tmp_path: Path, ontology: list[Quad]) -> None:
     with Workspace(tmp_path) as place, KnowledgeGraph() as mapped:
         small_fleet.fill(place)
-        workflow.map_rows(place, mapped)
+        rewriting.map_rows(place, mapped)
         quads = [one for one in mapped.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))]
     graph = one_by_one(quads, ontology)
     assert conclusions(graph) == as_one_part(graph)

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain
 from typing import Any
 
@@ -129,7 +129,7 @@ def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Regio
         return
     _refuse_crossing(ontology, region.asserted)
     try:
-        concluded = _beside(ontology, region.asserted)
+        concluded = _beside(ontology, frozenset(region.asserted))
     except (Contradiction, Equality):
         if len(regions) > 1:
             for alone in regions:
@@ -149,11 +149,12 @@ def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
             raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
 
 
-def _beside(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
+@lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
+def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
     """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
     if any(it.predicate in EQUALITIES for it in asserted):
         raise Equality
-    closure = Beside(ontology.schema, asserted)
+    closure = Beside(ontology.schema, set(asserted))
     return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)
 
 

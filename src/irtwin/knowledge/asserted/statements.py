@@ -11,11 +11,12 @@ from typing import Any
 from urllib.parse import unquote
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
-from sqlalchemy import Column, select
+from sqlalchemy import Column, Engine, select
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.mapping import maps_of, says
+from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap, TriplesMap
 from irtwin.knowledge.mapping.identifiers import Identifier
 from irtwin.knowledge.mapping.terms import absolute
@@ -103,6 +104,13 @@ def quad_of(fact: AssertedFact) -> Quad:
     else:
         term = Literal(value, datatype=NamedNode(fact.kind))
     return Quad(NamedNode(fact.subject), NamedNode(fact.predicate), term, NamedNode(fact.graph))
+
+
+def individuals(graph: KnowledgeGraph, engine: Engine, facts: Iterable[AssertedFact]) -> set[Quad]:
+    """Return what is mapped of facts themselves: who said what, and when."""
+    mapper = RowMapper(engine, graph.resources.paths("mappings"), graph.base)
+    rows = (values(fact) | {"time": fact.time.replace(tzinfo=None)} for fact in facts)
+    return set(mapper.quads(AssertedFact.__tablename__, rows))
 
 
 def map_facts(graph: KnowledgeGraph, session: Session) -> None:

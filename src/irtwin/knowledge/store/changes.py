@@ -17,6 +17,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
+    GRAPH_MAPPED,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
     GRAPH_SOURCE,
@@ -28,7 +29,7 @@ from irtwin.knowledge.vocabulary import (
 
 DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
 TRIPLES = NamedNode(VOID + "triples")  # how many a named graph of conclusions holds
-NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
+NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED, GRAPH_MAPPED)
 
 _CHANGED = NamedNode(GRAPH_CHANGED)
 _REASONED = NamedNode(GRAPH_REASONED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
@@ -37,7 +38,7 @@ from irtwin.knowledge.store.union import quad_data, replacement, triple_data, wi
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, by_asking, by_doing, check
 from irtwin.knowledge.tariff import tariff_of
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, ONTOLOGY, OWL, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
@@ -158,11 +159,28 @@ class KnowledgeGraph:
     def _term(self, value: str | Literal) -> str | Literal:
         return self.iri(value) if isinstance(value, str) else value
 
+    @property
+    def has_ontology(self) -> bool:
+        """Whether the ontology's graph is made of the modules and of the tariff that hold for the workspace now."""
+        return self.holds(self._ontology_version())
+
     def load_ontology(self) -> None:
-        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says."""
-        triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
-        tariff = () if self._workspace is None else tariff_of(self._workspace)
-        self.replace(in_graph(chain(triples, tariff), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says.
+
+        With them goes a name of their content, by which a graph that is made of these already is left alone.
+        """
+        if not self.has_ontology:
+            triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
+            version = self._ontology_version()
+            self.replace(in_graph(chain(triples, self._tariff(), [version]), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+
+    def _ontology_version(self) -> Triple:
+        digest = hashlib.sha256(b"".join(path.read_bytes() for path in self.resources.paths("ontology")))
+        digest.update("".join(map(str, self._tariff())).encode())
+        return Triple(NamedNode(ONTOLOGY), NamedNode(f"{OWL}versionInfo"), Literal(f"sha-256:{digest.hexdigest()}"))
+
+    def _tariff(self) -> Iterable[Triple]:
+        return () if self._workspace is None else tariff_of(self._workspace)
 
     @property
     @telling
