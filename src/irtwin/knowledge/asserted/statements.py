@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Any
 from urllib.parse import unquote
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store, Triple
 from sqlalchemy import Column, Engine, select
 from sqlalchemy.orm import Session
 
@@ -115,8 +115,11 @@ def individuals(graph: KnowledgeGraph, engine: Engine, facts: Iterable[AssertedF
 
 def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     """Bring the statements that no row follows into the graph: those that are kept, and no other."""
-    quads = set(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
-    graph.replace(quads, GRAPH_ASSERTED, *{quad.graph_name.value for quad in quads})  # type: ignore[union-attr]
+    kept = Store()  # which gives literals back as the graph does
+    kept.extend(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
+    names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}  # type: ignore[union-attr]
+    there = {quad for name in names for quad in graph.quads_in(name)}
+    graph.change(there - set(kept), set(kept) - there)
 
 
 def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
