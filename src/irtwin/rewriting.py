@@ -17,7 +17,7 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import kept
 from irtwin.knowledge.vocabulary import shorten
-from irtwin.providers.planner import populate
+from irtwin.providers.planner import in_a_circle, populate
 from irtwin.report.extensions import check as check_extensions
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
@@ -103,12 +103,18 @@ def map_rows(place: Workspace, graph: KnowledgeGraph) -> None:
 
 
 def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> bool:
-    """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other."""
+    """Populate what robots of earlier data sets lack; one that cannot be is said, and hinders no other.
+
+    So are providers that wait for each other.
+    """
 
     def set_aside(robot_id: str, reason: InputError) -> None:
         announce(f"  {robot_id} is set aside: {reason}; remove it with `irtwin workspace drop {robot_id}`")
 
-    return populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
+    did = populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
+    if circle := in_a_circle(graph):
+        announce(f"  {circle}")
+    return did
 
 
 def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) -> None:

@@ -117,7 +117,7 @@ def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     """Bring the statements that no row follows into the graph: those that are kept, and no other."""
     kept = Store()  # which gives literals back as the graph does
     kept.extend(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
-    names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}  # type: ignore[union-attr]
+    names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}
     there = {quad for name in names for quad in graph.quads_in(name)}
     graph.change(there - set(kept), set(kept) - there)
 

@@ -120,12 +120,14 @@ class KnowledgeGraph:
 
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
-        if self.folder is not None and isinstance(self._store, Store) and not self._read_only:
-            with told(self.folder):
+        written = isinstance(self._store, Store) and not self._read_only
+        with told(self.folder):
+            if written:
                 self._store.flush()
+            self._store = Store()
+            self._answers = answers_of(self._store)
+            if written and self.folder is not None:
                 store_files.note_sums(self.folder)
-        self._store = Store()
-        self._answers = answers_of(self._store)
 
     @property
     def shown(self) -> str:
