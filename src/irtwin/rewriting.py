@@ -122,7 +122,7 @@ def conclude(graph: KnowledgeGraph, announce: Announce, engine: str = NATIVE) ->
     announce("Reasoning")
     inferred = reason(graph, engine)
     by = "OWL 2 RL" if engine == NATIVE else f"OWL by {engine}"
-    announce(f"  {inferred.owl_rl} triples from {by}, {inferred.by_rules} from rules")
+    announce(f"  {inferred.owl_rl} new triples from {by}, {inferred.by_rules} from rules")
     if inferred.joined_by:
         announce(f"  reasoned over all robots together, for this concerns all of them: {inferred.joined_by}")
     for contradiction, about in inferred.contradictions.items():

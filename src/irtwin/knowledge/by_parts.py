@@ -49,13 +49,13 @@ class PartChange:
 
 @dataclass
 class Changes:
-    """What changes in the graph: quads that wait to be written; the named graphs that differ; all notes on parts."""
+    """What changes in the graph: quads that wait to be written; how many are new, by named graph; notes on parts."""
 
     graph: KnowledgeGraph
     whole: bool
     removed: set[Quad] = field(default_factory=set)
     added: set[Quad] = field(default_factory=set)
-    names: set[str] = field(default_factory=set)
+    new: Counter[str] = field(default_factory=Counter)
     noted: set[Quad] = field(default_factory=set)
 
     def take(self, change: PartChange) -> None:
@@ -64,7 +64,7 @@ class Changes:
             raise Joined("a node without a name")
         self.removed |= change.removed
         self.added |= change.added
-        self.names.update(map(graph_of, change.removed | change.added))
+        self.new.update(map(graph_of, change.added))
         self.noted.update(change.noted, (quad for quad in change.added if graph_of(quad) == GRAPH_REASONED))
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
@@ -73,13 +73,6 @@ class Changes:
         """Write what waits, and more; a name of what conclusions are made of goes before they change."""
         self.graph.change(self.removed.union(removed), self.added.union(added))
         self.removed, self.added = set(), set()
-
-    @property
-    def grown(self) -> Counter[str]:
-        """By how many quads the named graphs will grow when what waits is written."""
-        grown = Counter(map(graph_of, self.added - self.removed))
-        grown.subtract(map(graph_of, self.removed - self.added))
-        return grown
 
 
 def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | None = None) -> Changes:

@@ -268,7 +268,6 @@ class KnowledgeGraph:
         taken -= given
         self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
         if isinstance(self._store, Store):
-            taken |= changes.outdated_sizes(self._store, taken | given) - given
             given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
@@ -483,11 +482,6 @@ class KnowledgeGraph:
         assert isinstance(self._store, Store)
         quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
         return {quad.subject for quad in quads}  # type: ignore[misc]
-
-    def size(self, name: str) -> int:
-        """Return how many triples a named graph holds."""
-        (row,) = self._store.query(f"SELECT (COUNT(*) AS ?n) {{ GRAPH <{name}> {{ ?s ?p ?o }} }}")  # type: ignore[misc]
-        return int(row["n"].value)
 
     def sizes(self) -> Iterator[tuple[str, int]]:
         """Yield the IRIs of the named graphs and how many triples each holds."""
