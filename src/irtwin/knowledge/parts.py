@@ -86,13 +86,9 @@ class Ontology:
         """Whether another says the same."""
         return isinstance(other, Ontology) and self._content == other._content
 
-    @cached_property
-    def _hash(self) -> int:
-        return hash(self._content)
-
     def __hash__(self) -> int:
         """Return the same number for those that are equal."""
-        return self._hash
+        return hash(self._content)
 
     @cached_property
     def schema(self) -> Schema:
