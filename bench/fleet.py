@@ -18,7 +18,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import METER, Base, relation_to
@@ -282,8 +282,8 @@ def make_graph(place: Path) -> int:
     """Map the database, reason and validate as `irtwin run` does; return the number of triples."""
     with Workspace.existing(place) as workspace, KnowledgeGraph(workspace.graph_folder, place) as graph:
         graph.load_ontology()
-        workflow.map_rows(workspace, graph)
-        workflow.conclude(graph, print)
+        rewriting.map_rows(workspace, graph)
+        rewriting.conclude(graph, print)
         return int(graph.query("SELECT (COUNT(*) AS ?count) { ?s ?p ?o }").rows[0]["count"])
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import fleet
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.knowledge import reasoning
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import reason
@@ -65,7 +65,7 @@ def step(place: Path, what: str) -> None:
         if what == "mapping":
             graph.load_ontology()
         if what in ("mapping", "five rows"):
-            timed(f"{what}, mapping", lambda: workflow.map_rows(workspace, graph))
+            timed(f"{what}, mapping", lambda: rewriting.map_rows(workspace, graph))
         if what in ("reasoning", "five rows"):
             found = timed(f"{what}, reasoning", lambda: reason(graph))
             print(f"  {found.owl_rl} triples from OWL 2 RL, {found.by_rules} from rules, joined by {found.joined_by}")

@@ -26,7 +26,7 @@ from pyoxigraph import CanonicalizationAlgorithm, Dataset, Quad
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests import data_sets, small_robots, synthetic
 
-from irtwin import asking, workflow
+from irtwin import asking, rewriting, workflow
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import to_csv
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -112,12 +112,12 @@ def prepared(folder: Path) -> dict[str, Command]:
 def watched(data_set: Path, place: Path) -> None:
     """Make a workspace of many robots that have no twin."""
     known = read_data_set(data_set)
-    with Workspace(place) as workspace, workflow.rewriting(workspace) as graph:
+    with Workspace(place) as workspace, rewriting.rewriting(workspace) as graph:
         for number in range(ROBOTS):
             ingest(workspace, replace(known, robot=replace(known.robot, name=f"R{number}")))
         graph.load_ontology()
-        workflow.map_rows(workspace, graph)
-        workflow.conclude(graph, lambda line: None)
+        rewriting.map_rows(workspace, graph)
+        rewriting.conclude(graph, lambda line: None)
 
 
 def killed_often(kind: str, command: Command, kills: int, moments: random.Random, place: Path) -> int:
@@ -186,7 +186,7 @@ def made_anew(workspace: Path) -> set[Quad]:
     ):
         graph.load_ontology()
         refresh(graph, place.engine, graph.resources.paths("mappings"), Path(folder) / "rows.db")
-        workflow.conclude(graph, lambda line: None)
+        rewriting.conclude(graph, lambda line: None)
         return compared(graph)
 
 

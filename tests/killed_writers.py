@@ -17,9 +17,9 @@ from sqlalchemy import Engine, event
 from irtwin.knowledge.mapping.remembered import RememberedRows
 from irtwin.knowledge.store import graph as store
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.rewriting import conclude, map_rows, rewriting
 from irtwin.storage import database, files, staging
 from irtwin.storage.database import Workspace
-from irtwin.workflow import conclude, map_rows, rewriting
 from tests import rows
 from tests.turn_takers import data_set
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.asking import ask, explain, export, questions
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -47,7 +47,7 @@ def test_a_question_is_answered_while_another_process_writes(workspace: Path, wr
 
 def test_a_run_shows_its_graph_when_it_has_ended(workspace: Path) -> None:
     with Workspace(workspace) as place:
-        with workflow.rewriting(place) as graph:
+        with rewriting.rewriting(place) as graph:
             graph.update("DELETE WHERE { ?robot a irt:Industrial_Robot }")
             assert len(ask(ROBOTS, workspace)) == 2
         assert len(ask(ROBOTS, workspace)) == 0

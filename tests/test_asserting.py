@@ -5,19 +5,24 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad
 from sqlalchemy import select
 
 from irtwin.asking import ask, explain, export
 from irtwin.asserting import follow, keep
 from irtwin.errors import InputError
-from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
+from irtwin.knowledge import by_parts
+from irtwin.knowledge.owl_rl.beside import Beside
+from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.snapshot import Snapshot
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY
+from irtwin.rewriting import conclude, fill, map_rows, rewriting
 from irtwin.storage.asserted_schema import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
-from irtwin.workflow import conclude, map_rows, rewriting
 from tests import small_fleet
 from tests.data_sets import irtwin
 
@@ -73,6 +78,59 @@ def test_a_payload_that_is_updated_is_a_row_and_a_fact_of_its_author(workspace: 
     (said,) = explain(f"<{RUN}> irt:Payload ?", workspace)
     assert said.by.startswith("asserted by anna, ") and ", in place of 3.0, id:asserted_fact/" in said.by
     assert ("payload", "5.5", "3.0", "anna") in [row[1:5] for row in rows(workspace, "asserted_facts")]
+
+
+def test_it_is_reasoned_over_once_and_the_graph_is_that_of_rows_read_anew(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closed: list[int] = []
+
+    class Counted(Beside):
+        def __init__(self, *given: Any) -> None:
+            closed.append(1)
+            super().__init__(*given)
+
+    monkeypatch.setattr(by_parts, "Beside", Counted)
+    told = f'<{RUN}> irt:Product "bolts" ; a <urn:plant/Night_Shift> . <urn:a> rdfs:label "elsewhere"'
+    update(workspace, f"INSERT DATA {{ {told} }}")
+    assert closed == [1]
+    update(
+        workspace, f"DELETE {{ ?r irt:Payload 3.0e0 }} INSERT {{ ?r irt:Payload 2 }} WHERE {{ BIND(<{RUN}> AS ?r) }}"
+    )
+    assert said(workspace) == made_anew(workspace)
+
+
+def test_a_graph_of_an_older_ontology_is_brought_up_to_date_before_it_is_updated(workspace: Path) -> None:
+    lacking = NamedNode(f"{IRT}Regenerating_Run")
+    with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
+        older = {it for it in graph.triples(GRAPH_ONTOLOGY) if lacking not in it and it.subject.value != ONTOLOGY}
+        graph.replace(in_graph(older, GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+        assert not graph.has_ontology
+    told: list[str] = []
+    with Workspace.existing(workspace) as place, rewriting(place, told.append) as graph:
+        assert told[0] == "Catching up: the graph is of another ontology or tariff than hold now"
+        assert graph.has_ontology and not graph.is_behind
+    assert rows(workspace, "SELECT ?label { irt:Regenerating_Run rdfs:label ?label }") == [("regenerating run",)]
+
+
+def said(workspace: Path) -> set[Quad]:
+    """Return what a graph says, but for the name that the state of rows is given by lot."""
+    with Snapshot(workspace / "graph") as snapshot:
+        return canonical(snapshot.graph)
+
+
+def made_anew(workspace: Path) -> set[Quad]:
+    """Return what a graph says that is made of the same database in one go."""
+    with Workspace.existing(workspace) as place, KnowledgeGraph(None, workspace, base=place.base) as graph:
+        place.mapped_rows.unlink()
+        fill(place, graph, lambda line: None)
+        return canonical(graph)
+
+
+def canonical(graph: KnowledgeGraph) -> set[Quad]:
+    found = Dataset(quad for quad in graph.quads() if quad.graph_name.value not in (GRAPH_CHANGED, GRAPH_MAPPED))  # type: ignore[union-attr]
+    found.canonicalize(CanonicalizationAlgorithm.UNSTABLE)  # blank nodes have no names of their own
+    return set(found)
 
 
 def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Path) -> None:

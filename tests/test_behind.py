@@ -15,12 +15,12 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_CHANGED, GRAPH_REASONED, GRAPH_SOURCE
 from irtwin.providers.names import find_robot
+from irtwin.rewriting import conclude, map_rows, rewriting
 from irtwin.status import status
 from irtwin.storage import turns
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
 from irtwin.storage.schema import LIVE
-from irtwin.workflow import conclude, map_rows, rewriting
 from tests import data_sets, sparql_servers
 from tests.forks import FORKS
 from tests.killed_writers import broken_off, killed, take_in

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.store import snapshot
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -163,8 +163,8 @@ def test_damaged_remembered_rows_are_made_anew(made: Path, workspace: Path, dama
 @pytest.fixture
 def unreasoned(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reasoning has tests of its own, and takes long."""
-    monkeypatch.setattr(workflow, "conclude", lambda graph, announce: None)
-    monkeypatch.setattr(workflow, "populate_others", lambda place, graph, announce: False)
+    monkeypatch.setattr(rewriting, "conclude", lambda graph, announce: None)
+    monkeypatch.setattr(rewriting, "populate_others", lambda place, graph, announce: False)
 
 
 @pytest.mark.parametrize("damage", ["none", "flipped", "folder"])

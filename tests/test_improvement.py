@@ -23,12 +23,12 @@ from irtwin.location import Location
 from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import record
 from irtwin.providers.improvement import _worst
+from irtwin.rewriting import rewriting
 from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import read_signals
 from irtwin.storage.database import Workspace
-from irtwin.workflow import rewriting
 from tests import data_sets
 from tests.data_sets import Said, irtwin
 from tests.providers.test_gap_provider import NOTHING, diagnosis

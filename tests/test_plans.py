@@ -19,13 +19,13 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.location import Location
 from irtwin.planning.plan import Task
 from irtwin.providers.records import ingest
+from irtwin.rewriting import rewriting
 from irtwin.signals.channels import from_columns
 from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-from irtwin.workflow import rewriting
 from tests import data_sets
 from tests.data_sets import Said, irtwin
 from tests.synthetic import arm, as_run, measure, swing, with_constants

@@ -6,9 +6,9 @@ import signal
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from irtwin.rewriting import map_rows, rewriting
 from irtwin.storage import engine
 from irtwin.storage.database import Workspace
-from irtwin.workflow import map_rows, rewriting
 from tests import rows
 
 NAMES = ("A", "B")

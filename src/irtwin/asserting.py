@@ -47,7 +47,7 @@ def take_edited(
     or would contradict.
     """
     from irtwin.knowledge.asserted.edited import edit_of
-    from irtwin.workflow import rewriting
+    from irtwin.rewriting import rewriting
 
     with Workspace.existing(location) as place, rewriting(place, announce) as graph:
         edit = edit_of(graph, owl)
@@ -62,13 +62,13 @@ def keep(
     place: Workspace, graph: KnowledgeGraph, removed: Iterable[Quad], added: Iterable[Quad], author: str
 ) -> Assertion:
     """Keep what a change of the graph asserts, if it holds with all else. Raises InputError where it does not."""
-    from irtwin.knowledge.asserted.statements import read
+    from irtwin.knowledge.asserted.statements import individuals, read
     from irtwin.knowledge.asserted.trial import check
 
     with place.reading() as session:
         assertion = read(graph, session, removed, added, author)
         session.expunge_all()
-    check(graph, assertion.removed, assertion.added)
+    check(graph, assertion.removed, assertion.added | individuals(graph, place.engine, assertion.facts))
     place.keep_facts(assertion.facts, assertion.withdrawn)
     return assertion
 
@@ -77,7 +77,7 @@ def follow(
     place: Workspace, graph: KnowledgeGraph, assertion: Assertion, announce: Announce = lambda line: None
 ) -> None:
     """Bring the graph up to date with what is kept now."""
-    from irtwin.workflow import conclude, map_rows
+    from irtwin.rewriting import conclude, map_rows
 
     if assertion.facts or assertion.withdrawn:
         map_rows(place, graph)
@@ -117,7 +117,7 @@ def main(memory: int) -> None:
 def _opened(location: Location) -> Iterator[tuple[Workspace | None, KnowledgeGraph]]:
     """Open the graph to write, with its workspace; of a graph that has no database it is all that is kept."""
     if Workspace.is_there(location):
-        from irtwin.workflow import rewriting
+        from irtwin.rewriting import rewriting
 
         with Workspace.existing(location) as place, rewriting(place) as graph:
             yield place, graph

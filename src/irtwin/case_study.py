@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from irtwin import plans, resources, workflow
+from irtwin import plans, resources, rewriting, workflow
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
@@ -105,7 +105,7 @@ def unpack(workspace: Path) -> Path:
 
 def identify(data_set: Path, location: Location, base: str | None = None) -> None:
     """Take a data set in, with the twin that is identified from it; nothing is concluded before the plan is there."""
-    with Workspace.at(location, base) as place, workflow.rewriting(place) as graph:
+    with Workspace.at(location, base) as place, rewriting.rewriting(place) as graph:
         workflow.take_in(place, read_data_set(data_set))
         graph.load_ontology()
 

@@ -13,10 +13,11 @@ from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
 from irtwin.providers.names import check_run_name, find_robot
 from irtwin.providers.records import keep_run, load_robot, load_twin
+from irtwin.rewriting import conclude, map_rows, populate_others, rewriting
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
-from irtwin.workflow import conclude, map_rows, populate_apart, populate_others, rewriting, write_report
+from irtwin.workflow import populate_apart, write_report
 
 
 @dataclass(frozen=True)

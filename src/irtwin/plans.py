@@ -20,6 +20,7 @@ from irtwin.planning.waiting import PauseProposal, proposals
 from irtwin.providers.energy import stored_price
 from irtwin.providers.names import check_run_name, find_robot, find_run
 from irtwin.providers.records import keep_run, load_run, load_twin
+from irtwin.rewriting import renew, rewriting
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
@@ -32,7 +33,7 @@ from irtwin.storage.staging import staged
 from irtwin.storage.tariff import read_tariff
 from irtwin.twin.price import Price
 from irtwin.twin.twin import Twin
-from irtwin.workflow import populate_apart, renew, rewriting, write_report
+from irtwin.workflow import populate_apart, write_report
 
 T = TypeVar("T")
 

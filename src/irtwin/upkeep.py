@@ -14,18 +14,20 @@ from irtwin.alarms.settings import NAME
 from irtwin.alarms.settings import asks as alarm_asks
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY
 from irtwin.location import Location
 from irtwin.modelling import Announce
 from irtwin.next_experiment import proposal_files
 from irtwin.providers.names import find_robot, find_run, run_iri
 from irtwin.resources import resources_of
+from irtwin.rewriting import check_before, fill, renew, rewriting
 from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
 from irtwin.storage.rows import named_files
 from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
 from irtwin.storage.series import is_whole
-from irtwin.workflow import check_before, fill, renew, rewriting, write_report
+from irtwin.workflow import write_report
 
 _DAMAGED = "graph.damaged"
 
@@ -143,6 +145,7 @@ def _rebuild(place: Workspace, announce: Announce) -> None:
 def _fill(place: Workspace, graph: KnowledgeGraph, announce: Announce) -> None:
     announce("Rebuilding the graph from the database")
     place.mapped_rows.unlink(missing_ok=True)
+    graph.replace([], GRAPH_ONTOLOGY)  # what it says of itself is not believed
     fill(place, graph, announce)
 
 

@@ -18,8 +18,8 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.templates import environment
 from irtwin.resources import shipped
+from irtwin.rewriting import map_rows
 from irtwin.storage.database import Workspace
-from irtwin.workflow import map_rows
 
 _SELDOM = ("pyarrow.dataset", "rosbags.highlevel", "sympy", "toppra")  # packages that few commands import
 

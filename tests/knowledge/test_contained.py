@@ -17,8 +17,8 @@ from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED, OWL, RDF, term
+from irtwin.rewriting import rewriting
 from irtwin.storage.database import Workspace
-from irtwin.workflow import rewriting
 
 
 def node(name: str) -> NamedNode:

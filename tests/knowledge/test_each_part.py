@@ -11,7 +11,7 @@ from tests import small_fleet
 from tests.individuals import individual
 from tests.trusting import trust_all
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.errors import InputError
 from irtwin.knowledge import each_part
 from irtwin.knowledge.part_worker import PartTask, PartWorker
@@ -44,7 +44,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with Workspace(place) as workspace, KnowledgeGraph.of_workspace(workspace) as graph:
         small_fleet.fill(workspace)
         graph.load_ontology()
-        workflow.map_rows(workspace, graph)
+        rewriting.map_rows(workspace, graph)
         run = NamedNode(individual("run", "Arm_C.press_1"))
         other = NamedNode(individual("robot", "Arm_D"))
         wrong = said("run", "Arm_C.press_1", OWL + "differentFrom", run)

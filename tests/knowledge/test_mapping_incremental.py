@@ -15,7 +15,7 @@ from sqlalchemy import Engine
 from tests import small_fleet
 from tests.knowledge.test_mapping import PREFIXES
 
-from irtwin import workflow
+from irtwin import rewriting
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping import map_database, refresh
 from irtwin.knowledge.mapping.remembered import RememberedRows
@@ -291,10 +291,10 @@ def fleet(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Workspace]
 def test_a_workspace_is_followed(fleet: Workspace) -> None:
     documents = [file.path for file in fleet.resources.of("mappings")]
     with KnowledgeGraph() as graph:
-        workflow.map_rows(fleet, graph)
+        rewriting.map_rows(fleet, graph)
 
         def follow() -> None:
-            workflow.map_rows(fleet, graph)
+            rewriting.map_rows(fleet, graph)
             made = KnowledgeGraph()
             made.replace(map_database(fleet.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
             for name in {*made.graphs(GRAPH_SOURCE, GRAPH_ACTIVITY), *graph.graphs(GRAPH_SOURCE, GRAPH_ACTIVITY)}:

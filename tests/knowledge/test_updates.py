@@ -1,5 +1,7 @@
 """SPARQL updates: what they do, that the default graph stays the union, and what is refused."""
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -7,7 +9,7 @@ from pyoxigraph import DefaultGraph, Literal, NamedNode, Quad, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.updates import by_doing
+from irtwin.knowledge.store.updates import by_asking, by_doing
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
 
 A, B = "http://e/a", "http://e/b"
@@ -87,6 +89,46 @@ def test_data_by_itself_leaves_what_the_whole_comparison_leaves(updates: list[tu
         looked_up.update(text)
         compared.change(*by_doing(text, compared.quads()))
         assert set(looked_up._store) == set(compared._store)
+
+
+def asking(graph: KnowledgeGraph) -> Callable[[str], set[Triple]]:
+    return lambda query: set(graph._store.query(query, base_iri="http://e/"))  # type: ignore[arg-type]
+
+
+TERMS = st.sampled_from(["<x>", "<y>", "?s", "?o", "1", "2", "3"])
+FORMS = st.lists(st.tuples(st.sampled_from(["<x>", "<y>", "?s"]), TERMS), max_size=2).map(
+    lambda pairs: " . ".join(f"{subject} <p> {value}" for subject, value in pairs)
+)
+
+
+@settings(max_examples=60)
+@given(
+    gone=FORMS, come=FORMS, where=st.sampled_from(["?s <p> ?o", "?s <p> ?o FILTER(?o > 1)", "GRAPH ?s { <x> ?s ?o }"])
+)
+def test_a_pattern_that_is_asked_leaves_what_the_whole_comparison_leaves(gone: str, come: str, where: str) -> None:
+    """Some end in } within a string, which is no end of a group."""
+    graph = KnowledgeGraph()
+    numbers = [Triple(NamedNode("http://e/x"), NamedNode("http://e/p"), Literal(n)) for n in (1, 2)]
+    graph.replace([Quad(*one, NamedNode(place)) for place in (A, B) for one in numbers], "http://e/")  # type: ignore[misc]
+    text = f'DELETE {{ {gone} }} INSERT {{ <y> <q> "}}" . {come} #}}\n }} WHERE {{ {where} }} ;'
+    asked = by_asking(text, graph._holding, asking(graph), "http://e/")
+    assert asked == by_doing(text, graph.quads(), "http://e/")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "INSERT { GRAPH <a> { ?s <p> 3 } } WHERE { ?s <p> 1 }",
+        "WITH <a> INSERT { ?s <p> 3 } WHERE { ?s <p> 1 }",
+        "INSERT { ?s <p> 3 } USING <a> WHERE { ?s <p> 1 }",
+        "INSERT { ?s <p> [] } WHERE { ?s <p> 1 }",
+        "DELETE WHERE { ?s <p> 1 } ; INSERT DATA { <x> <p> 3 }",
+        "DELETE { ?s <p> 1 } WHERE { ?s <p> 1 } ; INSERT { ?s <p> 3 } WHERE { ?s <p> 2 }",
+        "DROP ALL",
+    ],
+)
+def test_what_is_no_single_pattern_over_all_graphs_is_not_asked(graph: KnowledgeGraph, text: str) -> None:
+    assert by_asking(text, graph._holding, asking(graph), "http://e/") is None
 
 
 def test_data_with_blank_nodes_goes_the_long_way(graph: KnowledgeGraph) -> None:

@@ -16,10 +16,11 @@ from irtwin.knowledge.shacl.validation import validate
 from irtwin.providers.records import load_robot
 from irtwin.report.plant import curves, page, robot
 from irtwin.report.questions import ask
+from irtwin.rewriting import map_rows, rewriting
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import MeteredLoad, RunEnergy, SupplyState, Twin
-from irtwin.workflow import map_rows, rewriting, take_in
+from irtwin.workflow import take_in
 
 pytestmark = pytest.mark.slow
 

@@ -98,6 +98,31 @@ def test_each_runs_once_and_the_graph_is_refreshed_after_it(graph, monkeypatch):
     assert refreshed[-1] == len(ran)
 
 
+CIRCLE = """
+    irt:Heat a owl:DatatypeProperty . irt:Cooling a owl:DatatypeProperty . irt:Fan a owl:DatatypeProperty .
+    provider:heat a irt:Data_Provider ; irt:Entry_Point "heat" ; irt:applies_to irt:Industrial_Robot ;
+        irt:requires irt:Cooling, irt:has_Joint ; irt:populates irt:Heat .
+    provider:cooling a irt:Data_Provider ; irt:Entry_Point "cooling" ; irt:applies_to irt:IR_RunProcess ;
+        irt:requires irt:Fan ; irt:populates irt:Cooling .
+    provider:fan a irt:Data_Provider ; irt:Entry_Point "fan" ; irt:applies_to irt:Industrial_Robot ;
+        irt:requires irt:Heat ; irt:populates irt:Fan ."""
+
+
+def test_providers_in_a_circle_are_named_in_one_line_until_something_is_said_that_they_require(graph):
+    assert planner.in_a_circle(graph) is None
+    graph.update(f"INSERT DATA {{ GRAPH <{IRT}x> {{ {CIRCLE} }} }}")
+    line = planner.in_a_circle(graph)
+    assert line.startswith(
+        "providers in a circle are not run: cooling requires Fan, which fan populates; "
+        "fan requires Heat, which heat populates; heat requires Cooling, which cooling populates; have one of them"
+    )
+    assert {"energy", "identification"} <= ready(graph).keys()
+    graph.update(f"INSERT DATA {{ GRAPH <{IRT}x> {{ provider:meter irt:populates irt:Fan }} }}")
+    assert "cooling" not in planner.in_a_circle(graph).partition(",")[0]
+    graph.update(f"INSERT DATA {{ GRAPH <{IRT}x> {{ id:A.1 irt:Fan 1 . id:A.2 irt:Fan 1 . id:B.1 irt:Fan 1 }} }}")
+    assert set(ready(graph)) == {"cooling", "energy", "identification"}
+
+
 def test_a_robot_that_a_provider_refuses_is_set_aside_and_others_go_on(graph, monkeypatch):
     refused, kept = [], []
 

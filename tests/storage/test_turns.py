@@ -16,10 +16,10 @@ from tests.turn_takers import NAMES, hold, taken_in
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE
+from irtwin.rewriting import map_rows, rewriting
 from irtwin.storage import engine, turns
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
-from irtwin.workflow import map_rows, rewriting
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain
 from typing import Any
 
@@ -49,13 +49,13 @@ class PartChange:
 
 @dataclass
 class Changes:
-    """What changes in the graph: quads that wait to be written; the named graphs that differ; all notes on parts."""
+    """What changes in the graph: quads that wait to be written; how many are new, by named graph; notes on parts."""
 
     graph: KnowledgeGraph
     whole: bool
     removed: set[Quad] = field(default_factory=set)
     added: set[Quad] = field(default_factory=set)
-    names: set[str] = field(default_factory=set)
+    new: Counter[str] = field(default_factory=Counter)
     noted: set[Quad] = field(default_factory=set)
 
     def take(self, change: PartChange) -> None:
@@ -64,7 +64,7 @@ class Changes:
             raise Joined("a node without a name")
         self.removed |= change.removed
         self.added |= change.added
-        self.names.update(map(graph_of, change.removed | change.added))
+        self.new.update(map(graph_of, change.added))
         self.noted.update(change.noted, (quad for quad in change.added if graph_of(quad) == GRAPH_REASONED))
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
@@ -73,13 +73,6 @@ class Changes:
         """Write what waits, and more; a name of what conclusions are made of goes before they change."""
         self.graph.change(self.removed.union(removed), self.added.union(added))
         self.removed, self.added = set(), set()
-
-    @property
-    def grown(self) -> Counter[str]:
-        """By how many quads the named graphs will grow when what waits is written."""
-        grown = Counter(map(graph_of, self.added - self.removed))
-        grown.subtract(map(graph_of, self.removed - self.added))
-        return grown
 
 
 def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | None = None) -> Changes:
@@ -129,7 +122,7 @@ def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Regio
         return
     _refuse_crossing(ontology, region.asserted)
     try:
-        concluded = _beside(ontology, region.asserted)
+        concluded = _beside(ontology, frozenset(region.asserted))
     except (Contradiction, Equality):
         if len(regions) > 1:
             for alone in regions:
@@ -149,11 +142,12 @@ def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
             raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
 
 
-def _beside(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
+@lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
+def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
     """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
     if any(it.predicate in EQUALITIES for it in asserted):
         raise Equality
-    closure = Beside(ontology.schema, asserted)
+    closure = Beside(ontology.schema, set(asserted))
     return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)
 
 

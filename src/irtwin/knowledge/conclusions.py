@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections import Counter
 from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
@@ -20,9 +19,9 @@ from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.store.changes import DERIVED_FROM, TRIPLES
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_OWL_RL, GRAPH_REASONED
+from irtwin.knowledge.store.changes import DERIVED_FROM
+from irtwin.knowledge.store.graph import in_graph
+from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
 from irtwin.resources import Files, Resources, folder
 
 
@@ -97,20 +96,6 @@ def _rules(files: Files) -> bytes:
     """Return rules and shapes as they are written, and those of OWL 2 RL."""
     paths = [*sorted(folder("rules").glob("owl2_rl*")), *(file.path for file in files)]
     return b"".join(path.read_bytes() for path in paths)
-
-
-def sizes(graph: KnowledgeGraph) -> Counter[str]:
-    """Return how many quads each named graph of conclusions holds: as noted beside them, else counted."""
-    noted = {it.subject: it.object for it in graph.triples(GRAPH_REASONED) if it.predicate == TRIPLES}
-    if noted:
-        return Counter({name.value: int(count.value) for name, count in noted.items()})  # type: ignore[union-attr]
-    return Counter({name: graph.size(name) for name in graph.graphs(GRAPH_INFERRED)})
-
-
-def notes_of(sizes: Counter[str]) -> set[Quad]:
-    """Return the quads that note the sizes of named graphs."""
-    notes = (Triple(NamedNode(name), TRIPLES, Literal(count)) for name, count in sizes.items() if count)
-    return set(in_graph(notes, GRAPH_REASONED))
 
 
 def graph_of(quad: Quad) -> str:

@@ -30,6 +30,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
+    GRAPH_MAPPED,
     GRAPH_ONTOLOGY,
     GRAPH_REASONED,
     GRAPH_VALIDATION,
@@ -37,6 +38,7 @@ from irtwin.knowledge.vocabulary import (
     RDF,
     term,
 )
+from irtwin.resources import Resources
 
 Name = NamedNode | BlankNode
 Row = tuple[Any, Any, Any, NamedNode]  # subject, predicate, object, and the named graph
@@ -47,7 +49,7 @@ MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
 TYPE = NamedNode(RDF + "type")
 EQUALITIES = {NamedNode(OWL + name) for name in ("sameAs", "differentFrom")}
 _ROBOT = NamedNode(term("Industrial_Robot"))
-_NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED)
+_NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED, GRAPH_MAPPED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
 _NAMES = (NamedNode, BlankNode)
@@ -60,7 +62,7 @@ class Joined(Exception):
 
 
 class Ontology:
-    """What all parts have in common."""
+    """What all parts have in common. Two of the same triples, rules and shapes are equal."""
 
     def __init__(self, graph: KnowledgeGraph):
         self.resources = graph.resources
@@ -77,9 +79,21 @@ class Ontology:
         return kept
 
     @cached_property
+    def _content(self) -> tuple[frozenset[Triple], Resources]:
+        return frozenset(self.triples), self.resources
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another says the same."""
+        return isinstance(other, Ontology) and self._content == other._content
+
+    def __hash__(self) -> int:
+        """Return the same number for those that are equal."""
+        return hash(self._content)
+
+    @cached_property
     def schema(self) -> Schema:
         """The ontology, closed. Contradiction where it contradicts itself."""
-        return _schema(frozenset(self.triples))
+        return _schema(self._content[0])
 
     @cached_property
     def models(self) -> tuple[set[NamedNode], set[NamedNode]]:

@@ -16,7 +16,7 @@ from functools import partial
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, infer, notes_of, sizes
+from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.garbage import seldom_collected
@@ -55,7 +55,7 @@ WHERE {{
 
 @dataclass(frozen=True)
 class Inferences:
-    """How many triples OWL 2 RL and the rules concluded, and the IRIs of the named graphs that changed.
+    """How many triples OWL 2 RL and the rules concluded that were not there before.
 
     `joined_by` says what makes the graph one part, so that all of it was reasoned over; None where nothing does.
     `set_aside` are the IRIs of whom statements are about that contradict each other, and of their robots, and which
@@ -64,7 +64,6 @@ class Inferences:
 
     owl_rl: int
     by_rules: int
-    changed: tuple[str, ...]
     joined_by: str | None = None
     set_aside: tuple[tuple[str, str], ...] = ()
 
@@ -132,21 +131,12 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> 
         changes = by_parts.conclude(graph, ontology)
         base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
         changes.write(changed | notes - changes.noted - base, base - notes)
-        graph.change((), notes_of(sizes(graph)))
     elif changed:
         changes = by_parts.conclude(graph, ontology, nodes_of(changed))
-        before = sizes(graph)
-        changes.write(changed | notes_of(before), notes_of(_grown(before, changes.grown)))
+        changes.write(changed)
     else:
-        return _count(graph, ())
-    return _count(graph, changes.names)
-
-
-def _grown(before: Counter[str], by: Counter[str]) -> Counter[str]:
-    """Return the sizes of the inferred graphs after a change."""
-    after = before.copy()
-    after.update({name: count for name, count in by.items() if name.startswith(GRAPH_INFERRED)})
-    return after
+        return _count(graph, Counter())
+    return _count(graph, changes.new)
 
 
 def _reason_over_all(
@@ -159,7 +149,7 @@ def _reason_over_all(
     premises = asserted(graph)
     everything = content_name(premises, ontology.resources, engine)
     if made_of(graph) == everything:
-        return _count(graph, ())
+        return _count(graph, Counter())
     engines.check(engine, len(premises))
     old = {
         quad for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED) for quad in in_graph(graph.triples(name), name)
@@ -171,14 +161,12 @@ def _reason_over_all(
     inferred.made_of[_OWL_RL] = everything
     inferred.made_by.add(_made_by(engine))
     new = inferred.quads()
-    noted = notes_of(Counter(name for name in map(graph_of, new) if name.startswith(GRAPH_INFERRED)))
-    new |= noted
     if has_blank_node(new ^ old):
         graph.replace(new, GRAPH_INFERRED, GRAPH_REASONED)
         graph.change(changed or (), ())
     else:
-        graph.change((old - new) | (changed or set()), (new - old) | noted)
-    return _count(graph, map(graph_of, new ^ old), joined_by)
+        graph.change((old - new) | (changed or set()), new - old)
+    return _count(graph, Counter(map(graph_of, new - old)), joined_by)
 
 
 def _made_by(engine: str) -> Triple:
@@ -216,14 +204,7 @@ def engine_of(graph: KnowledgeGraph) -> str:
     return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
 
 
-def _count(graph: KnowledgeGraph, changed: Iterable[str], joined_by: str | None = None) -> Inferences:
-    names = set(changed) - {GRAPH_REASONED, GRAPH_CHANGED}
+def _count(graph: KnowledgeGraph, new: Counter[str], joined_by: str | None = None) -> Inferences:
     aside = [(str(row["robot"]), str(row["why"])) for row in graph.query(_SET_ASIDE)]
-    held = sizes(graph)
-    return Inferences(
-        held[GRAPH_OWL_RL],
-        sum(count for name, count in held.items() if name.startswith((GRAPH_SHACL, GRAPH_SWRL))),
-        tuple(sorted(names)),
-        joined_by,
-        tuple(aside),
-    )
+    by_rules = sum(count for name, count in new.items() if name.startswith((GRAPH_SHACL, GRAPH_SWRL)))
+    return Inferences(new[GRAPH_OWL_RL], by_rules, joined_by, tuple(aside))

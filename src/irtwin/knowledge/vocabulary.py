@@ -51,6 +51,7 @@ PREFIXES = {
 GRAPH = f"{ONTOLOGY}/graph/"
 GRAPH_ONTOLOGY = f"{GRAPH}ontology"
 GRAPH_SOURCE = f"{GRAPH}source/"  # one for each mapping file
+GRAPH_MAPPED = f"{GRAPH_SOURCE}version"  # of which rows those were made; nothing follows from it
 GRAPH_ACTIVITY = f"{GRAPH}activity/"  # one for each execution of a provider
 GRAPH_ASSERTED = f"{GRAPH}asserted"  # what users assert, but for what they put into a graph of their own
 GRAPH_INFERRED = f"{GRAPH}inferred/"

@@ -8,11 +8,25 @@ from datetime import UTC, datetime
 from irtwin.errors import InputError
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import shorten
 from irtwin.providers.provider import activity, load_provider, software_of
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import METER
 
 _READY_FOR = "https://w3id.org/irtwin/rules/ready_for"
+
+# Who waits for what another would populate, which waits in turn for the first, or for who waits so.
+_IN_A_CIRCLE = """
+SELECT DISTINCT ?one ?needed ?other {
+    ?one irt:applies_to ?class ; irt:requires ?needed .
+    ?other irt:populates ?needed ; (irt:requires/^irt:populates)* ?one .
+    ?kind rdfs:subClassOf* ?class . ?waiting a ?kind .
+    FILTER NOT EXISTS { ?one irt:populates ?made . ?waiting ?made ?there }
+    FILTER NOT EXISTS { ?waiting (irt:run_of|^irt:run_of)? ?holder . ?holder ?needed ?value }
+    FILTER NOT EXISTS {
+        ?free irt:populates ?needed FILTER NOT EXISTS { ?free (irt:requires/^irt:populates)* ?one }
+    }
+} ORDER BY ?one ?needed ?other"""
 
 SetAside = Callable[[str, InputError], None]
 
@@ -65,6 +79,18 @@ def ready(graph: KnowledgeGraph) -> dict[str, list[str]]:
     for triple in sorted(graph.construct(rule.construct), key=str):
         ready_by_provider.setdefault(triple.object.value.rpartition("/")[2], []).append(triple.subject.value)  # type: ignore[union-attr]
     return dict(sorted(ready_by_provider.items()))
+
+
+def in_a_circle(graph: KnowledgeGraph) -> str | None:
+    """Return, in one line, which providers wait for each other, so that none of them is ever run; None if none does."""
+    asked = ([shorten(str(iri)).rpartition(":")[2] for iri in row.values()] for row in graph.query(_IN_A_CIRCLE))
+    waits = [f"{one} requires {needed}, which {other} populates" for one, needed, other in asked]
+    if not waits:
+        return None
+    return (
+        f"providers in a circle are not run: {'; '.join(waits)}; have one of them require less, or a data set or "
+        "another provider say what it requires"
+    )
 
 
 def _provide(workspace: Workspace, graph: KnowledgeGraph, name: str, subject: str) -> None:

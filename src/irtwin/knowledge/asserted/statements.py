@@ -10,12 +10,13 @@ from datetime import UTC, datetime
 from typing import Any
 from urllib.parse import unquote
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Triple
-from sqlalchemy import Column, select
+from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store, Triple
+from sqlalchemy import Column, Engine, select
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.mapping import maps_of, says
+from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap, TriplesMap
 from irtwin.knowledge.mapping.identifiers import Identifier
 from irtwin.knowledge.mapping.terms import absolute
@@ -105,10 +106,20 @@ def quad_of(fact: AssertedFact) -> Quad:
     return Quad(NamedNode(fact.subject), NamedNode(fact.predicate), term, NamedNode(fact.graph))
 
 
+def individuals(graph: KnowledgeGraph, engine: Engine, facts: Iterable[AssertedFact]) -> set[Quad]:
+    """Return what is mapped of facts themselves: who said what, and when."""
+    mapper = RowMapper(engine, graph.resources.paths("mappings"), graph.base)
+    rows = (values(fact) | {"time": fact.time.replace(tzinfo=None)} for fact in facts)
+    return set(mapper.quads(AssertedFact.__tablename__, rows))
+
+
 def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     """Bring the statements that no row follows into the graph: those that are kept, and no other."""
-    quads = set(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
-    graph.replace(quads, GRAPH_ASSERTED, *{quad.graph_name.value for quad in quads})  # type: ignore[union-attr]
+    kept = Store()  # which gives literals back as the graph does
+    kept.extend(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
+    names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}
+    there = {quad for name in names for quad in graph.quads_in(name)}
+    graph.change(there - set(kept), set(kept) - there)
 
 
 def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:

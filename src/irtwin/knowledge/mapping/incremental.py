@@ -30,11 +30,10 @@ from irtwin.knowledge.mapping.source import read, schema_version
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import URI_SPACE, KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID, OWL
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_MAPPED, GRAPH_SOURCE, ID, OWL
 
 _MAPPED = (GRAPH_SOURCE, GRAPH_ACTIVITY)
-_VERSION_GRAPH = f"{GRAPH_SOURCE}version"
-_ASK_VERSION = f"SELECT ?version {{ GRAPH <{_VERSION_GRAPH}> {{ ?graphs owl:versionInfo ?version }} }}"
+_ASK_VERSION = f"SELECT ?version {{ GRAPH <{GRAPH_MAPPED}> {{ ?graphs owl:versionInfo ?version }} }}"
 
 
 @seldom_collected()
@@ -181,4 +180,4 @@ def _uri_space(base: str) -> list[Quad]:
 
 
 def _said(property: str, value: str) -> Quad:
-    return Quad(NamedNode(GRAPH_SOURCE), NamedNode(property), Literal(value), NamedNode(_VERSION_GRAPH))
+    return Quad(NamedNode(GRAPH_SOURCE), NamedNode(property), Literal(value), NamedNode(GRAPH_MAPPED))

@@ -79,7 +79,7 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
             changed_since = changed if graph.holds(validated) else None
             report = _by_parts(graph, ontology, changed_since)
     if report is None:
-        report = _report(asserted(graph), ontology, graph.resources.of("shapes"))
+        report = _report(ontology, frozenset(asserted(graph)))
     report = _empty() if report is None else report
     text = report.serialize(format="nt", encoding="utf-8")
     graph.replace(
@@ -125,7 +125,7 @@ def _results(ontology: Ontology, regions: list[Region]) -> Results:
         raise Joined("a node without a name")
     if region.nodes and not region.asserted:
         return
-    report = _report(ontology.triples | region.asserted, ontology, ontology.resources.of("shapes"))
+    report = _report(ontology, frozenset(region.asserted))
     if report is not None:
         yield from ((one, report.cbd(one)) for one in _about(report, region.nodes or ontology.terms))
 
@@ -160,14 +160,16 @@ class _Robots:
         return self._known[node]
 
 
-def _report(statements: set[Triple], ontology: Ontology, files: Files) -> rdflib.Graph | None:
-    """Return what pySHACL finds; None without asking it where nothing is suspected."""
-    shapes = _shapes(frozenset(ontology.triples), files)
-    store, asked = shapes.store_of(statements)
+@lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
+def _report(ontology: Ontology, statements: frozenset[Triple]) -> rdflib.Graph | None:
+    """Return what pySHACL finds beside the ontology; None without asking it where nothing is suspected."""
+    shapes = _shapes(frozenset(ontology.triples), ontology.resources.of("shapes"))
+    store, asked = shapes.store_of(ontology.triples | statements)
     if not any_suspect(store, asked):
         return None
     report: rdflib.Graph
-    _, report, _ = pyshacl.validate(_as_rdflib(shapes.unions | statements), shacl_graph=shapes.graph)
+    data = shapes.unions | ontology.triples | statements
+    _, report, _ = pyshacl.validate(_as_rdflib(data), shacl_graph=shapes.graph)
     return report
 
 

@@ -17,18 +17,17 @@ from irtwin.knowledge.vocabulary import (
     GRAPH,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
+    GRAPH_MAPPED,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
     GRAPH_SOURCE,
     GRAPH_VALIDATION,
     PROV,
     RDF,
-    VOID,
 )
 
 DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
-TRIPLES = NamedNode(VOID + "triples")  # how many a named graph of conclusions holds
-NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED)
+NOT_ASSERTED = (GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, GRAPH_CHANGED, GRAPH_MAPPED)
 
 _CHANGED = NamedNode(GRAPH_CHANGED)
 _REASONED = NamedNode(GRAPH_REASONED)
@@ -58,35 +57,18 @@ def nodes_of(noted: Iterable[Quad]) -> set[NamedNode | BlankNode]:
     return {note.object for note in noted if isinstance(note.object, NamedNode | BlankNode)}
 
 
-def outdated_sizes(store: Store, quads: Iterable[Quad]) -> set[Quad]:
-    """Return the notes of sizes that a change of quads makes wrong; none where it says what they are now."""
-    changed = list(quads)
-    if any(quad.predicate == TRIPLES and quad.graph_name == _REASONED for quad in changed):
-        return set()
-    return _sizes(store) if any(map(_is_inferred, changed)) else set()
-
-
 def made_of(store: Store) -> set[Quad]:
-    """Return the quads that say of what the inferred graphs and the report of validation were made, and how large."""
-    made = (
+    """Return the quads that say of what the inferred graphs and the report of validation were made."""
+    return {
         quad
         for name in (GRAPH_OWL_RL, GRAPH_VALIDATION)
         for quad in store.quads_for_pattern(NamedNode(name), DERIVED_FROM, None, _REASONED)
-    )
-    return {*made, *_sizes(store)}
-
-
-def _sizes(store: Store) -> set[Quad]:
-    return set(store.quads_for_pattern(None, TRIPLES, None, _REASONED))
+    }
 
 
 def is_asserted(quad: Quad) -> bool:
     """Whether a quad stands in a named graph that nobody inferred."""
     return isinstance(quad.graph_name, NamedNode) and not quad.graph_name.value.startswith(NOT_ASSERTED)
-
-
-def _is_inferred(quad: Quad) -> bool:
-    return isinstance(quad.graph_name, NamedNode) and quad.graph_name.value.startswith(GRAPH_INFERRED)
 
 
 def _note(reader: str, node: object) -> Quad:

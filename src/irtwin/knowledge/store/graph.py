@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
@@ -35,9 +36,9 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
-from irtwin.knowledge.store.updates import as_change, by_doing, check
+from irtwin.knowledge.store.updates import as_change, by_asking, by_doing, check
 from irtwin.knowledge.tariff import tariff_of
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, ONTOLOGY, OWL, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
@@ -119,12 +120,14 @@ class KnowledgeGraph:
 
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
-        if self.folder is not None and isinstance(self._store, Store) and not self._read_only:
-            with told(self.folder):
+        written = isinstance(self._store, Store) and not self._read_only
+        with told(self.folder):
+            if written:
                 self._store.flush()
+            self._store = Store()
+            self._answers = answers_of(self._store)
+            if written and self.folder is not None:
                 store_files.note_sums(self.folder)
-        self._store = Store()
-        self._answers = answers_of(self._store)
 
     @property
     def shown(self) -> str:
@@ -158,11 +161,28 @@ class KnowledgeGraph:
     def _term(self, value: str | Literal) -> str | Literal:
         return self.iri(value) if isinstance(value, str) else value
 
+    @property
+    def has_ontology(self) -> bool:
+        """Whether the ontology's graph is made of the modules and of the tariff that hold for the workspace now."""
+        return self.holds(self._ontology_version())
+
     def load_ontology(self) -> None:
-        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says."""
-        triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
-        tariff = () if self._workspace is None else tariff_of(self._workspace)
-        self.replace(in_graph(chain(triples, tariff), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says.
+
+        With them goes a name of their content, by which a graph that is made of these already is left alone.
+        """
+        if not self.has_ontology:
+            triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
+            version = self._ontology_version()
+            self.replace(in_graph(chain(triples, self._tariff(), [version]), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+
+    def _ontology_version(self) -> Triple:
+        digest = hashlib.sha256(b"".join(path.read_bytes() for path in self.resources.paths("ontology")))
+        digest.update("".join(map(str, self._tariff())).encode())
+        return Triple(NamedNode(ONTOLOGY), NamedNode(f"{OWL}versionInfo"), Literal(f"sha-256:{digest.hexdigest()}"))
+
+    def _tariff(self) -> Iterable[Triple]:
+        return () if self._workspace is None else tariff_of(self._workspace)
 
     @property
     @telling
@@ -248,7 +268,6 @@ class KnowledgeGraph:
         taken -= given
         self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
         if isinstance(self._store, Store):
-            taken |= changes.outdated_sizes(self._store, taken | given) - given
             given |= changes.notes(self._store, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
@@ -404,8 +423,13 @@ class KnowledgeGraph:
         check(text, base, isinstance(self._store, SparqlServer))
         if default_graphs or named_graphs:
             text = using(text, default_graphs, named_graphs, base)
+
+        def construct(asked: str) -> set[Triple]:
+            return set(cast(QueryTriples, self._store.query(asked, base_iri=base, prefixes=self.prefixes)))
+
         try:
             change = as_change(text, self._holding, base, self.prefixes)
+            change = change or by_asking(text, self._holding, construct, base)
             removed, added = change or by_doing(text, self.quads(), base, self.prefixes)
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
@@ -458,11 +482,6 @@ class KnowledgeGraph:
         assert isinstance(self._store, Store)
         quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
         return {quad.subject for quad in quads}  # type: ignore[misc]
-
-    def size(self, name: str) -> int:
-        """Return how many triples a named graph holds."""
-        (row,) = self._store.query(f"SELECT (COUNT(*) AS ?n) {{ GRAPH <{name}> {{ ?s ?p ?o }} }}")  # type: ignore[misc]
-        return int(row["n"].value)
 
     def sizes(self) -> Iterator[tuple[str, int]]:
         """Yield the IRIs of the named graphs and how many triples each holds."""

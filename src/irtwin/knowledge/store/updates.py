@@ -21,6 +21,8 @@ from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, PREFIXES
 
 _NO_GRAPH = re.compile(r"The graph <([^>]*)> does not exist")
 _DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
+_DELETE_WHERE = re.compile(rf"DELETE{SPACE}(?=WHERE)", re.IGNORECASE | re.ASCII)
+_TEMPLATE = re.compile(rf"{SPACE}(INSERT|DELETE){SPACE}\{{", re.IGNORECASE | re.ASCII)
 
 
 def check(text: str, base: str | None, on_server: bool = False) -> None:
@@ -58,6 +60,34 @@ def as_change(
         return named | set(holding(union)), set()
     new = union - {quad.triple for quad in (*named, *holding(union))}
     return set(), named | set(_in_graph(new))
+
+
+def by_asking(
+    text: str,
+    holding: Callable[[Iterable[Triple]], Iterable[Quad]],
+    construct: Callable[[str], set[Triple]],
+    base: str | None = None,
+) -> tuple[set[Quad], set[Quad]] | None:
+    """Return the same as `as_change` of an update that is one DELETE or INSERT with WHERE, by asking: or None.
+
+    `construct` answers a CONSTRUCT over the union of all named graphs. The text has passed `check`.
+    """
+    start = after_prologue(text)
+    prologue, rest = text[:start], text[start:]
+    if short := _DELETE_WHERE.match(rest):
+        forms, rest = {"delete": ""}, rest[short.end() :]
+    else:
+        forms, rest = _templates(prologue, rest, base)
+    pattern = rest.rstrip(" \t\r\n;")
+    try:  # a template of named graphs, USING, or another operation after this one is no CONSTRUCT
+        made = {word: construct(f"{prologue}CONSTRUCT {form}\n{pattern}") for word, form in forms.items()}
+    except SyntaxError:
+        return None
+    gone, come = made.get("delete", set()), made.get("insert", set())
+    if not forms or has_blank_node(gone | come):
+        return None
+    new = come - {quad.triple for quad in holding(come)}
+    return set(holding(gone - come)), set(_in_graph(new))
 
 
 def by_doing(
@@ -101,6 +131,19 @@ def by_doing(
 def _in_graph(triples: Iterable[Triple]) -> Iterator[Quad]:
     graph = NamedNode(GRAPH_ASSERTED)
     return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
+
+
+def _templates(prologue: str, rest: str, base: str | None) -> tuple[dict[str, str], str]:
+    """Return the groups of triples after DELETE and INSERT, and what follows these; a group ends where it is whole."""
+    forms: dict[str, str] = {}
+    while head := _TEMPLATE.match(rest):
+        ends = (brace.end() for brace in re.finditer("}", rest))
+        end = next((end for end in ends if is_update(f"{prologue}{rest[:end]}\nWHERE {{ }}", base)), None)
+        if end is None or head[1].lower() in forms:
+            return {}, rest
+        forms[head[1].lower()] = rest[head.end() - 1 : end]
+        rest = rest[end:]
+    return forms, rest
 
 
 def _in_place(text: str, base: str | None) -> SyntaxError | None:
