@@ -89,6 +89,14 @@ def test_rows_that_stand_apart_say_together_what_they_said() -> None:
     assert len(apart.moments(np.tile(noise, 2))) == 2 * system.groups
 
 
+def test_a_group_is_left_out_with_all_its_rows() -> None:
+    system = reduced(noise=0.0)
+    apart, noise, every = system.by_speed, np.array([0.05, 0.08]), np.arange(system.groups)
+    whole = left_out(system, noise, (), every)
+    parts = left_out(apart, np.tile(noise, 2), (), every)
+    np.testing.assert_allclose(parts[:, :2] + parts[:, 2:], whole, rtol=1e-6)
+
+
 def test_rows_are_never_less_noisy_where_friction_turns() -> None:
     apart = reduced(noise=0.0).by_speed
     fast, slow = np.split(apart.noise_before, 2)
@@ -109,7 +117,7 @@ def test_what_is_closed_where_friction_turns_counts_by_the_noise_there() -> None
     system = reduced(noise=3.0)
     apart = Apart.of(system, system, [[system.base, system.base + 1]])
     held_out = apart.held_out()
-    plain = left_out(system, system.moments(system.noise_before), (), np.arange(system.groups))
+    plain = left_out(system, system.noise_before, (), np.arange(system.groups))
     assert np.all(held_out.before.sum(axis=0) < plain.sum(axis=0))
     np.testing.assert_array_equal(held_out.rows, system.rows)
     closed = closed_squares(apart, seed=0)

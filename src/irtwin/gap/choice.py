@@ -118,7 +118,7 @@ def _worth(case: Case, finding: ChannelFinding, cause: FoundCause) -> Choice:
     rest = [k for k in finding.chosen if k not in cause.columns]
     system, noise = finding.system, finding.attribution.noise
     rows = np.maximum(finding.held_out.rows.sum(axis=0), 1)
-    left = left_out(system, system.moments(noise), rest, np.flatnonzero(system.group_observed))
+    left = left_out(system, noise, rest, np.flatnonzero(system.group_observed))
     without, beside = (np.sqrt(squares.sum(axis=0) / rows) for squares in (left, finding.held_out.after))
     most = int(np.argmax(without / np.maximum(beside, np.finfo(float).tiny)))
     errors: tuple[float | None, float | None] = (None, None)

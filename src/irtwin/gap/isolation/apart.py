@@ -117,7 +117,7 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     """
     system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
-    weighed = {True: system.moments(apart.noise), False: system.moments(system.noise_before)}
+    weighed = {True: system.group_moments(apart.noise), False: system.group_moments(system.noise_before)}
     totals = {some: Summed(moments) for some, moments in weighed.items()}
 
     @cache

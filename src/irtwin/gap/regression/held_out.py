@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from irtwin.gap.regression.moments import Moments, Summed
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.identification.progress import told
 
@@ -37,9 +37,9 @@ def held_out(
     before anything was added, if others.
     """
     judged = np.flatnonzero(system.group_observed)
-    before = left_out(plain or system, (plain or system).moments(noise), (), judged)
+    before = left_out(plain or system, noise, (), judged)
     anything = len(chosen) > 0 or plain is not None
-    after = left_out(system, system.moments(noise_after), chosen, judged) if anything else before
+    after = left_out(system, noise_after, chosen, judged) if anything else before
     return HeldOut(before, after, system.rows[judged])
 
 
@@ -82,8 +82,9 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
     return list(np.quantile(drawn, [0.025, 0.975]).tolist())
 
 
-def left_out(system: System, moments: Sequence[Moments], chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
-    """Return the squares that a fit with the chosen columns leaves of each judged group without it, (G, g)."""
+def left_out(system: System, noise: np.ndarray, chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
+    """Return the squares that a fit with the chosen columns, weighted by `noise`, leaves of each group without it."""
+    moments = system.group_moments(noise)
     total, every = Summed(moments), told(judged, "how far the gap closes, group left out")
     left = [system.squares(system.solution(chosen, total, moments[group]), int(group)) for group in every]
     return np.array(left)

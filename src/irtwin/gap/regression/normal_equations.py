@@ -282,6 +282,11 @@ class System:
             for half, group in self.parts
         ]
 
+    def group_moments(self, noise: np.ndarray) -> list[Moments]:
+        """Return each group's products of columns, both halves of it together, equations weighted as by `moments`."""
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        return [Moments(list(zip(own, weights.tolist(), strict=True))) for own in self._products]
+
     @property
     def parts(self) -> list[tuple[slice, int]]:
         """The halves of the groups, (P,): of which equations, and of which group."""
