@@ -23,8 +23,9 @@ def fitted(effects=BASELINE, held_out=7, noise=0.5, seconds=10.0):
     return identify(ROBOT, runs, effects), swing(ROBOT, held_out)
 
 
-def test_entries_sum_to_the_energy_and_hold_each_share_once():
-    twin, motion = fitted(HEAT)
+@pytest.mark.parametrize("effects", [HEAT, (*BASELINE, "no_regeneration", "meter_gain")])
+def test_entries_sum_to_the_energy_and_hold_each_share_once(effects):
+    twin, motion = fitted(effects)
     entries = account(twin, motion)
     shares = [(share.effect, share.joint) for entry in entries for share in entry.shares]
     assert sorted(shares, key=str) == sorted(((one.effect, one.joint) for one in twin.ledger(motion)), key=str)

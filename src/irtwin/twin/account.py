@@ -202,7 +202,8 @@ def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
     on_bus = np.where(stack.on_the_bus, about.values, 0.0)
     axes = about.flows @ on_bus
     for effect in stack.effects:
-        if effect.needs != "power" or effect.memory:
+        row = rows.get((effect.id, None))
+        if row is None or effect.needs != "power" or effect.memory:
             continue
         more, less = (
             effect.columns(robot, piece, Predicted(about.torque, axes + step, axes + step)) for step in (_STEP, -_STEP)
@@ -211,4 +212,4 @@ def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
         rise = about.weights * ((more - less) @ own) / (2 * _STEP)
         over_torque = rise[:, None] * power_slope(stack, piece, about.torque, on_bus)
         torque = np.einsum("tj,tjk->k", over_torque, about.columns) * stack.real
-        yield rows[effect.id, None], torque, rise @ about.flows * stack.on_the_bus
+        yield row, torque, rise @ about.flows * stack.on_the_bus
