@@ -109,6 +109,8 @@ def main(memory: int) -> None:
             return _answer(_of_server(error))
         except InputError as error:
             return _answer({"status": 400, "message": str(error), "headers": {}})
+        except MemoryError:  # no answer: who asked takes it for this, or for a process that was killed by it
+            return
         _answer({})
         follow(place, graph, assertion)
 

@@ -184,8 +184,9 @@ def test_one_run_without_power_is_cut_in_time():
     document = valid(diagnosis)
     assert document["gap"].get("power") is None
     assert {"effect": "copper_loss", "why": "no power was measured"} in document["not_testable"]
-    (cause,) = document["causes"]
-    assert cause["confidence"] > 0.5
+    cause, *others = document["causes"]
+    assert (cause["joints"], cause["confidence"] > 0.9) == (["joint_2"], True)
+    assert all(other["folded_away"] for other in others)
 
 
 @pytest.mark.nightly
