@@ -17,6 +17,7 @@ from tests.small_robots import data_set
 from tests.trusting import trust_all
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "irtwin-co2"
+pytestmark = pytest.mark.nightly
 LIMIT = "0.118"  # g; of the three runs one lies above it
 # All in one process: the package is to be there from its start, and starting takes longest.
 WORK = """
@@ -71,7 +72,6 @@ def done(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     return place / "workspace", json.loads(said.stdout)
 
 
-@pytest.mark.slow
 def test_its_provider_fills_its_table_and_its_question_is_answered(done) -> None:
     _, (run, emissions, energies, *_) = done
     assert run[0] == 0, run[2]
@@ -81,7 +81,6 @@ def test_its_provider_fills_its_table_and_its_question_is_answered(done) -> None
     assert grams == pytest.approx({name: 1000 * 0.4 * energy / 3.6e6 for name, energy in joules.items()})
 
 
-@pytest.mark.slow
 def test_its_rule_concludes_and_is_explained(done) -> None:
     _, (_, emissions, _, heavy, why, source, *_) = done
     expected = [row["run"] for row in json.loads(emissions[1]) if row["co2_g"] > float(LIMIT)]
@@ -91,7 +90,6 @@ def test_its_rule_concludes_and_is_explained(done) -> None:
     assert "provider:co2" in source[1]
 
 
-@pytest.mark.slow
 def test_report_and_export_hold_what_it_adds(done) -> None:
     place, (*_, export, status, _, _) = done
     assert export[0] == 0, export[2]
@@ -110,7 +108,6 @@ def test_report_and_export_hold_what_it_adds(done) -> None:
     assert "run_emission, of a package" in status[1]
 
 
-@pytest.mark.slow
 def test_a_diagnosis_names_the_effect_of_a_package(done) -> None:
     place, (*_, status, diagnosis, cause) = done
     assert "ontology/bump.ttl of bump-package 0.2" in status[1]
@@ -123,7 +120,6 @@ def test_a_diagnosis_names_the_effect_of_a_package(done) -> None:
     assert [row["label"] for row in json.loads(cause[1])] == ["bump"]
 
 
-@pytest.mark.slow
 def test_without_the_package_its_rows_are_in_nobodys_way(done) -> None:
     place, _ = done
     with Workspace.existing(place) as workspace:

@@ -80,6 +80,7 @@ def improved(flagged: tuple[Path, list[str], list[str]]) -> tuple[Path, Said]:
     )
 
 
+@pytest.mark.nightly
 def test_a_flagged_twin_says_what_to_log_next(flagged: tuple[Path, list[str], list[str]]) -> None:
     _, said, text = flagged
     *words, columns = text

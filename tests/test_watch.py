@@ -150,6 +150,7 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
     assert 96.0 < answer["watts"] < 144.0, asked.err
 
 
+@pytest.mark.nightly
 def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
     with Workspace(tmp_path / "w") as there:
         ingest(there, DataSet(tmp_path, arm(6), (), None, None, "dc_bus", False, {}))

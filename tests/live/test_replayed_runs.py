@@ -22,6 +22,7 @@ def totals(workspace: Path) -> dict[str, str]:
     return {name: irtwin("query", name, "--workspace", workspace, "--format", "csv").out for name in CONSUMPTION}
 
 
+@pytest.mark.nightly
 def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_path: Path) -> None:
     workspace = Path(shutil.copytree(small_run / "workspace", tmp_path / "workspace"))
     before = totals(workspace)

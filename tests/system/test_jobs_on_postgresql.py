@@ -87,6 +87,7 @@ def test_a_sample_that_was_stored_is_known_by_its_time(plant: Plant) -> None:
     assert times.run_in("arm_2", later, later) is None
 
 
+@pytest.mark.nightly
 def test_a_new_log_betters_the_twin_or_leaves_it(plant: Plant) -> None:
     again = as_run(measure(test_plans.ROBOT, swing(test_plans.ROBOT, 9, seconds=8.0), noise=0.02))
     log = plant.at.folder.parent / "again.parquet"
