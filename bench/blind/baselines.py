@@ -22,7 +22,7 @@ import scipy
 
 from blind.library import Explained, Library, power_library, swept, torque_library
 from irtwin.gap.data.case import Case, case_of
-from irtwin.gap.regression.hypotheses import Hypothesis, Variant, bounds
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.log import read_data_set
 
@@ -175,7 +175,7 @@ def _gains(left: np.ndarray, variants: Sequence[Variant], library: Library) -> t
     normal = left[columns[:, :, None], columns[:, None, :]] + np.eye(columns.shape[1])
     right = left[columns, -1]
     values = np.linalg.solve(normal, right[..., None])[..., 0]
-    lowest = np.array([bounds(variant) for variant in variants]) / library.system.scale[columns]
+    lowest = np.array([[term.lowest for term in variant.terms] for variant in variants]) / library.system.scale[columns]
     lowest[columns >= library.system.changed] = -np.inf
     gain = np.where((values < lowest).any(axis=1), 0.0, (values * right).sum(axis=1))
     best = int(np.argmax(gain))
