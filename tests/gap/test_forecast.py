@@ -16,7 +16,7 @@ from irtwin.signals.log import DataSet, Run
 RUNS = 12
 # of `bench/diagnosis_speed.py` 12x1000xJOINTS, with power, by joints
 SECONDS = {6: 13.3, 12: 48.2, 20: 96.9, 30: 146.7, 40: 278.7}  # of processor
-BYTES = {6: 480e6, 12: 738e6, 30: 2057e6}
+BYTES = {6: 473e6, 12: 954e6, 30: 2368e6}
 
 
 def chain(joints: int):

@@ -15,7 +15,7 @@ _PER_SAMPLE = 2.6e-5  # s, of each sample and joint
 _OF_TORQUE = (4.2e-2, 1.5)  # s, of each group and either role: times joints to a power
 _OF_POWER = 1.1  # as much together, where power was measured too
 _BEFORE = 0.2e9  # bytes that the program has without data
-_HELD = (1.35e6, 1.15)  # bytes, of each group and either role: times joints to a power
+_HELD = (1.6e6, 1.15)  # bytes, of each group and either role: times joints to a power
 _PER_VALUE = 400.0  # bytes, of each sample and joint
 
 
