@@ -81,8 +81,9 @@ def test_friction_that_moved_is_no_gap_and_fitted_again(twin):
 @pytest.mark.slow
 def test_only_what_is_new_is_named(twin):
     found = diagnose(logged(40, cable=15.0), twin=twin)
-    ((_, cause),) = found.causes
+    (_, cause), *_ = found.causes
     assert (cause.effect, cause.joints) == ("cable_drag", ("joint_1",))
+    assert all(one.get("folded_away") for one in found.to_json()["causes"][1:])
     assert {"stribeck_friction", "copper_loss", "cable_drag"} <= set(found.twin.effect_ids)
 
 
