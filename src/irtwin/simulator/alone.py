@@ -57,7 +57,7 @@ class Alone:
         begin = np.arange(steps) * self.step
         offset = NAMES.index("offset")
         known: dict[bytes, np.ndarray] = {}  # many sets have their commands as late, and led as far
-        told = np.empty((steps, len(numbers), len(self.stretches), numbers.shape[2]))
+        commanded = np.empty((steps, len(numbers), len(self.stretches), numbers.shape[2]))
         for place, own in enumerate(numbers):
             without = np.where(np.arange(len(NAMES))[:, None] == offset, 0.0, own)
             lead = self.servos.lead(own)
@@ -65,15 +65,15 @@ class Alone:
             if asked not in known:
                 every = [one.commands(begin, self.step, without, lead) for one in self.stretches]
                 known[asked] = np.stack(every, axis=1)
-            told[:, place] = known[asked] + own[offset]
-        moved = self._moved(numbers, told)
+            commanded[:, place] = known[asked] + own[offset]
+        moved = self._moved(numbers, commanded)
         at = [one.time / self.step for one in self.stretches]
         return [
             [_between(moved[:, :, one, place], at[place]) for place in range(len(self.stretches))]
             for one in range(len(numbers))
         ]
 
-    def _moved(self, numbers: np.ndarray, told: np.ndarray) -> np.ndarray:
+    def _moved(self, numbers: np.ndarray, commanded: np.ndarray) -> np.ndarray:
         """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n)."""
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at, dof = servos.actuators, servos.model.speeds
@@ -99,12 +99,12 @@ class Alone:
         gives = step * inverse / (1 + step * damping * inverse)
         held_force, held_speed = inverse / (inverse + soft), back / (inverse + soft)
         lower, upper = self._stops()
-        q, v = (np.broadcast_to(one, told.shape[1:]).copy() for one in self.begun)
+        q, v = (np.broadcast_to(one, commanded.shape[1:]).copy() for one in self.begun)
         followed, below, lets_move, lags = q, -band, -friction, bool((share < 1).any())
-        moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
+        moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
         moved[0, 0] = q
-        for row in range(len(told)):
-            followed = followed + share * (told[row] - followed) if lags else told[row]
+        for row in range(len(commanded)):
+            followed = followed + share * (commanded[row] - followed) if lags else commanded[row]
             off = followed - q
             off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
