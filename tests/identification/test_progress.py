@@ -5,7 +5,7 @@ from tests.synthetic import arm, swing
 
 from irtwin.identification import progress
 from irtwin.identification.accumulate import Rows, accumulate
-from irtwin.identification.progress import tell, tell_step, telling, told
+from irtwin.identification.progress import tell, tell_step, telling, track
 
 MOTIONS = [swing(arm(2), seed, seconds=4.0) for seed in (1, 2)]
 
@@ -30,8 +30,8 @@ def test_what_is_done_and_what_is_left_is_told_where_both_are_known(monkeypatch)
     monkeypatch.setattr(progress, "_EVERY", 0.0)
     lines = []
     with telling(lines.append):
-        assert list(told("ab", "a letter")) == ["a", "b"]
-        assert list(told(range(1), lambda number: f"number {number}")) == [0]
+        assert list(track("ab", "a letter")) == ["a", "b"]
+        assert list(track(range(1), lambda number: f"number {number}")) == [0]
     assert lines == ["  a letter, 1 of 2", "  a letter, 2 of 2", "  number 0, 1 of 1"]
 
 

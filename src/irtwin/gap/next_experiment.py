@@ -18,7 +18,7 @@ from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.gap.rehearsal import Equations, Rehearsal
 from irtwin.gap.thresholds import Criterion, Thresholds
 from irtwin.identification.programmes import LONGEST, ExperimentProgramme, programmes
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -111,7 +111,7 @@ def next_experiment(
     names = tuple(dict.fromkeys(name for one in asked for name in (one.effect, *one.rivals)))
     joints = tuple(joint for joint in robot.joint_names if any(joint in one.joints for one in asked))
     effects = [catalogue()[name] for name in names]
-    every = told(programmes(robot, joints, seen, effects), lambda one: f"weighing {one.kind.replace('_', ' ')}")
+    every = track(programmes(robot, joints, seen, effects), lambda one: f"weighing {one.kind.replace('_', ' ')}")
     weighed = [(one, [question for each in asked for question in each.answered(one)]) for one in every]
     note = _note([told for _, told in weighed], enough)
     weighed = _answerable(weighed, enough)

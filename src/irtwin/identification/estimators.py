@@ -10,7 +10,7 @@ import scipy
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
-from irtwin.identification.progress import tell_step, told
+from irtwin.identification.progress import tell_step, track
 from irtwin.identification.uncertainty import covariance
 
 _REWEIGHTINGS = 4
@@ -69,7 +69,7 @@ def estimate(
     dead = np.maximum(_LEAST_SHOWN * shown, np.finfo(float).tiny)
     least = np.maximum(_LEAST_NOISE * size, dead)
     noise = np.maximum(size, dead)
-    for _ in told(range(_REWEIGHTINGS), f"{len(terms)} coefficients, weighed anew"):
+    for _ in track(range(_REWEIGHTINGS), f"{len(terms)} coefficients, weighed anew"):
         values, _ = _solve(factors, noise, expected, spread, lowest, prior)
         residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
         noise = np.maximum(residual / np.sqrt(count), least)

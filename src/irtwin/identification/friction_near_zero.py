@@ -16,7 +16,7 @@ from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -71,7 +71,7 @@ def _found(
 ) -> list[Dry]:
     """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none."""
     blocks, pattern = _reduced(stack, open_shapes, motions, tried)
-    every = told(enumerate(tried), "friction near zero speed, joint")
+    every = track(enumerate(tried), "friction near zero speed of each joint")
     return [_best(blocks, pattern, joint, turns) for joint, turns in every]
 
 

@@ -54,7 +54,7 @@ def tell_step(line: str) -> None:
         tell(line)
 
 
-def told(items: Iterable[Item], line: str | Callable[[Item], str]) -> Iterator[Item]:
+def track(items: Iterable[Item], line: str | Callable[[Item], str]) -> Iterator[Item]:
     """Yield items; tell of each, as `tell_step` does, the line, which it is, and of how many."""
     every = list(items)
     for number, one in enumerate(every, start=1):

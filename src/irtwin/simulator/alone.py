@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
@@ -143,7 +143,7 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
     for angles in _ASIDE * np.eye(2):
         models.append(copy.copy(own))
         models[-1].opt.gravity = tilted(own, angles)
-    for place, one in told(enumerate(stretches), "load of the bodies, stretch"):
+    for place, one in track(enumerate(stretches), "load of the bodies in each stretch"):
         found = np.array([_bodies(servos, compiled, one) for compiled in models])
         found[2:5] = (found[2:5] - found[1]) / _ASIDE
         found[5:] = (found[5:] - found[0]) / _ASIDE

@@ -9,7 +9,7 @@ from math import factorial
 
 import numpy as np
 
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
@@ -102,7 +102,7 @@ def held_out(chosen: DifferingNumbers, runs: Sequence[Run]) -> OfRun:
 def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[Tracked]:
     """Play runs as a whole, each with its numbers."""
     found = []
-    for run in told(runs, lambda one: f"playing {one.name}"):
+    for run in track(runs, lambda one: f"playing {one.name}"):
         every = whole(run)
         left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
         some = slice(None, None, max(1, len(left) // _POSES))
@@ -117,7 +117,7 @@ def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[fl
     """Return horizons, s, with the tracking error from the one before: of the model, and with the numbers of runs."""
     left: list[list[np.ndarray]] = [[], []]
     times = []
-    for run in told(runs, lambda one: f"{one.name} played again and again from where the robot is"):
+    for run in track(runs, lambda one: f"{one.name} played again and again from where the robot is"):
         stretches = each(run, _BEGUN_ANEW, _MOST)
         times += [one.time for one in stretches]
         for way, played in enumerate(play(own, [own.numbers, numbers[run.name]], stretches)):
@@ -145,7 +145,7 @@ def parts(chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[
     }
     wanted, rows = sorted(sets, key=sorted), []
     stretches = chosen.fit.stretches
-    for same in told(_alike(stretches, numbers), "what each number closes, runs"):
+    for same in track(_alike(stretches, numbers), "what each number closes in runs"):
         some = [stretches[place] for place in same]
         own = chosen.fit.servos.numbers
         each_set = [np.where(_rows(one), numbers[some[0].run.name], own) for one in wanted]

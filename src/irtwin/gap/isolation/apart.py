@@ -18,7 +18,7 @@ from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 
 _DRAWN = 32  # partitions into halves; of five groups there are ten
 _EXACT = 8  # causes: 256 subsets
@@ -130,7 +130,7 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     count = len(players)
     values = np.zeros((count, len(judged), len(system.pattern)))
     sets = _exact(count) if count <= _EXACT else _drawn(count, seed)
-    for player, before, weight in told(sets, "what causes leave, each set of them"):
+    for player, before, weight in track(sets, "what causes leave, each set of them"):
         values[player] += weight * (left(before) - left(before | {player}))
     return apart.counted(values)
 

@@ -14,7 +14,7 @@ from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
@@ -49,7 +49,7 @@ def attribute(
     candidates = in_scope(candidates, both=system.both)
     search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
     noise = np.ones(len(system.pattern))
-    for _ in told(range(2), "what the twin leaves, look"):
+    for _ in track(range(2), "looks at what the twin leaves"):
         noise = system.residual_rms((), noise)
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
@@ -144,7 +144,7 @@ class _Search:
         Two effects of one joint hide each other: neither is likely until both are there.
         """
         found: list[Found] = []
-        for _ in told(range(_MOST), f"{len(self.candidates)} hypotheses tried for the next cause"):
+        for _ in track(range(_MOST), f"{len(self.candidates)} hypotheses tried for the next cause"):
             if (new := self.likely(posterior, found, noise, _HOPELESS)) is None:
                 break
             found.append(new)
@@ -171,7 +171,7 @@ class _Search:
     def pruned(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
         """Drop what is less likely than nothing beside the others, the least likely first."""
         while found:
-            odds = [self.odds(one, found, noise) for one in told(found, "whether each cause is needed")]
+            odds = [self.odds(one, found, noise) for one in track(found, "whether each cause is needed")]
             worst = int(np.argmin(odds))
             if odds[worst] > 0:
                 break
@@ -188,7 +188,7 @@ class _Search:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
         for _ in range(_SWEEPS):
             before = list(found)
-            for one in told(before, "each cause taken out and looked for anew"):
+            for one in track(before, "each cause taken out and looked for anew"):
                 rest = [each for each in found if each is not one]
                 new = self.likely(self.beside(rest, noise), rest, noise)
                 found = rest if new is None else [*rest, new]
@@ -203,7 +203,7 @@ class _Search:
         """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
         for _ in range(_SWEEPS):
             pairs = [(a, b) for a, b in combinations(found, 2) if a[0].joint and _where(a[0]) == _where(b[0])]
-            for one, other in told(pairs, "two causes of one joint looked for anew"):
+            for one, other in track(pairs, "two causes of one joint looked for anew"):
                 rest = [each for each in found if each is not one and each is not other]
                 pair = self.likeliest_pair(rest, noise, one[0])
                 if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
@@ -253,7 +253,7 @@ class _Search:
     def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[FoundCause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
         parts: dict[tuple[str, str], list[FoundCause]] = {}
-        for one in told(found, "what could be in each cause's place"):
+        for one in track(found, "what could be in each cause's place"):
             parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.instead(one, found, noise)))
         return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
 

@@ -21,7 +21,7 @@ from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import twin_values
 from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_traces, torque_traces
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.signals.motion import Motion
 
 _UNNAMED = 3  # places that no cause explains, drawn
@@ -63,7 +63,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
 
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
         found = []
-        for run in told(runs, lambda one: f"{finding.name} that is left of {one.run}"):
+        for run in track(runs, lambda one: f"{finding.name} that is left of {one.run}"):
             found += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
         return found
 
@@ -163,7 +163,7 @@ def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[GapLo
     names = left.finding.places
     best = []
     about = f"what {left.finding.name} follows"
-    for k, joint in told(enumerate(names), lambda one: f"{about} at {one[1]}" if one[1] else about):
+    for k, joint in track(enumerate(names), lambda one: f"{about} at {one[1]}" if one[1] else about):
         best.append(followed(left.before, k, joint))
     located = locate(
         left.finding.name,

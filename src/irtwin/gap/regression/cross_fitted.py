@@ -13,7 +13,7 @@ from irtwin.gap.regression.channel_equations import Torque, power_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.signals.motion import Motion
 
 _PIECE = 32768  # samples whose columns are held at once
@@ -31,7 +31,7 @@ class LeftOut:
         self._stack = stack
         self._all = twin_values(system, system.solution((), total))
         self._without: dict[str, np.ndarray] = {}
-        for run in told({block.run for block in system.blocks}, lambda one: f"the twin without {one}"):
+        for run in track({block.run for block in system.blocks}, lambda one: f"the twin without {one}"):
             groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
             own = moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else None
             self._without[run] = twin_values(system, system.solution((), total, own))

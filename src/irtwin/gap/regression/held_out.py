@@ -10,7 +10,7 @@ import scipy
 
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 
 _RESAMPLED = 1000
 
@@ -85,6 +85,6 @@ def pooled_interval(squares: np.ndarray, rows: np.ndarray, seed: int) -> list[fl
 def left_out(system: System, noise: np.ndarray, chosen: Sequence[int], judged: np.ndarray) -> np.ndarray:
     """Return the squares that a fit with the chosen columns, weighted by `noise`, leaves of each group without it."""
     moments = system.group_moments(noise)
-    total, every = Summed(moments), told(judged, "how far the gap closes, group left out")
+    total, every = Summed(moments), track(judged, "how far the gap closes without a group")
     left = [system.squares(system.solution(chosen, total, moments[group]), int(group)) for group in every]
     return np.array(left)

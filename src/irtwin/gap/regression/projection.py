@@ -15,7 +15,7 @@ import numpy as np
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.gap.regression.normal_equations import MOST_HELD, System
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 
 
 class Projection:
@@ -29,7 +29,7 @@ class Projection:
         self.system, self._noise = system, noise
         self._moments = system.moments(noise)
         self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
-        base, every = np.arange(system.base), told(self._moments, "what the twin imitates, part")
+        base, every = np.arange(system.base), track(self._moments, "parts of what the twin imitates")
         self._all, inner = np.zeros((len(self._asked), system.base)), []
         keeps = len(self._moments) * self._all.size <= MOST_HELD
         self._kept: list[np.ndarray] = []  # of each part, what is asked for beside the twin's terms (A, K)

@@ -15,7 +15,7 @@ import numpy as np
 from irtwin.effects.friction import SLOW
 from irtwin.effects.load import ExternalContact
 from irtwin.gap.screening.remainder import RunResidual
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 
 _FEWEST_JOINTS = 3  # of fewer, hardly any agree on a force
@@ -37,7 +37,7 @@ def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> Ext
     """
     if len(robot.joints) < _FEWEST_JOINTS:
         return None
-    observed = told([one for one in left if one.observed], lambda one: f"contacts in {one.motion.run}")
+    observed = track([one for one in left if one.observed], lambda one: f"contacts in {one.motion.run}")
     runs = [_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in observed]
     found = _leader(runs)
     if found is None:
@@ -51,7 +51,7 @@ def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> Ext
 def _leader(runs: Sequence[_Run]) -> tuple[_Run, Clock] | None:
     """Return the run with the largest sudden gain, and its window."""
     best, found = 0.0, None
-    for run in told(runs, lambda one: f"windows of {one.name}"):
+    for run in track(runs, lambda one: f"windows of {one.name}"):
         gain = np.where(run.gain > run.throughout, run.gain, 0.0)
         if len(gain) and gain.max() > best:
             best, found = float(gain.max()), (run, run.clock(int(np.argmax(gain))))

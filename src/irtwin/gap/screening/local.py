@@ -14,7 +14,7 @@ import numpy as np
 from irtwin.effects.friction import sharp_sign
 from irtwin.effects.local import LocalEffect
 from irtwin.gap.screening.remainder import RunResidual
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 
 _CELLS = 160  # of angle over a joint's way, in either direction: four for the width of the narrowest bump
@@ -24,7 +24,7 @@ _SLOW = (0.03, 0.15)  # of the joint's largest speed: over so much, friction tha
 def local_effects(robot: Robot, effects: Sequence[LocalEffect], left: Sequence[RunResidual]) -> Iterator[LocalEffect]:
     """Yield each effect at each joint that moves, in the places that explain most of what is left in observed runs."""
     observed = [one for one in left if one.observed]
-    for k, joint in told(enumerate(robot.joints), lambda one: f"places of {one[1].name}"):
+    for k, joint in track(enumerate(robot.joints), lambda one: f"places of {one[1].name}"):
         passed = _Passed.of(observed, k) if observed else None
         if passed is None:
             continue

@@ -14,7 +14,7 @@ from irtwin.effects.load import Payload
 from irtwin.effects.rigid_body import flange_frame, to_body
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 
 _SWEEPS = 10  # over the runs, each moved to the other part
@@ -70,7 +70,7 @@ class _Parts:
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
         products = []
         every = zip(runs, of_runs.moments(noise), strict=True)
-        for _, moments in told(every, lambda one: f"payloads in {one[0]}"):
+        for _, moments in track(every, lambda one: f"payloads in {one[0]}"):
             kept = np.append(np.arange(base), moments.size - 1)
             products.append(full.T @ moments.among(kept, kept) @ full)
         return cls(runs, np.array(products), of_runs.group_observed, base, system.prior())

@@ -10,7 +10,7 @@ from irtwin.effects.load import Payload
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.residuals import as_filtered, torque_residual
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.signals.filter import decimation
 from irtwin.signals.motion import Motion
 
@@ -29,7 +29,7 @@ def remainders(
 ) -> list[RunResidual]:
     """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any."""
     left = []
-    for motion in told(case.with_torque, lambda one: f"what is left of {one.run}"):
+    for motion in track(case.with_torque, lambda one: f"what is left of {one.run}"):
         step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
         residual = torque_residual(stack, motion, values)
         if load is not None and load[0].acts_in(motion):

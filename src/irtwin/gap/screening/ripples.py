@@ -9,7 +9,7 @@ import numpy as np
 from irtwin.effects.effect import Effect
 from irtwin.effects.transmission import SLOW_ORDERS, TorqueRipple
 from irtwin.gap.screening.remainder import RunResidual
-from irtwin.identification.progress import told
+from irtwin.identification.progress import track
 from irtwin.robot.description import Robot
 
 _TURN = 4096  # parts of a turn by which angles are told apart: ten a period at the fastest
@@ -39,7 +39,7 @@ def fast_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[TorqueRipple
     as finely as the joint turns far.
     """
     found = []
-    for joint, name in told(enumerate(robot.joint_names), lambda one: f"ripples of {one[1]}"):
+    for joint, name in track(enumerate(robot.joint_names), lambda one: f"ripples of {one[1]}"):
         parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)
