@@ -88,16 +88,16 @@ def diagnose(
 
         data_set = as_asserted(location, data_set)
     with telling(announce):
-        found: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model)
-        if found is None:
+        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model)
+        if diagnosis is None:
             data_set = data_set if model is None else with_simulated_runs(data_set, model)
-            found = gap.diagnose(data_set, twin=given, simulator=model, withhold=withhold, seed=seed)
+            diagnosis = gap.diagnose(data_set, twin=given, simulator=model, withhold=withhold, seed=seed)
     if location is not None:  # first, as a damaged workspace is to leave no file beside its error
         from irtwin.workflow import keep_diagnosis
 
-        keep_diagnosis(location, data_set, found, announce)
-    files.write(data_set, found, model, location, seed, announce)
-    return found
+        keep_diagnosis(location, data_set, diagnosis, announce)
+    files.write(data_set, diagnosis, model, location, seed, announce)
+    return diagnosis
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class _Files:
     def write(
         self,
         data_set: DataSet,
-        found: Diagnosis | Playing,
+        diagnosis: Diagnosis | Playing,
         model: Model | None,
         location: Location | None,
         seed: int,
@@ -133,41 +133,45 @@ class _Files:
     ) -> None:
         """Write the files that are asked for."""
         if model and self.simulator:
-            for file, content in zip((self.simulator, *self.draws), _models(found, model, seed), strict=False):
+            for file, content in zip((self.simulator, *self.draws), _models(diagnosis, model, seed), strict=False):
                 write(file, content)
-            if isinstance(found, Playing) and (lacking := found.unwritten):
+            if isinstance(diagnosis, Playing) and (lacking := diagnosis.unwritten):
                 announce(f"  {self.simulator} has no place for {', '.join(lacking)}: these stay as they are")
         if self.sysid is not None:
-            _write_script(data_set, found, self.sysid, announce)
+            _write_script(data_set, diagnosis, self.sysid, announce)
         if self.json is not None:
-            write(self.json, (json.dumps(found.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
-        if self.twin is not None and found.twin is not None:
-            for doubt in doubts(found.twin):
+            write(self.json, (json.dumps(diagnosis.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
+        if self.twin is not None and diagnosis.twin is not None:
+            for doubt in doubts(diagnosis.twin):
                 announce(f"  {doubt}")
-            write(self.twin, to_json(found.twin).encode())
-        if self.motion is not None and isinstance(found, Diagnosis):
-            announce(f"  {save_motion(found, self.motion)}")
+            write(self.twin, to_json(diagnosis.twin).encode())
+        if self.motion is not None and isinstance(diagnosis, Diagnosis):
+            announce(f"  {save_motion(diagnosis, self.motion)}")
         if self.report is not None:
             from irtwin.report.gap.page import render_alone
 
             announce("Writing the report")
             resources = resources_of(None if location is None else location.folder)
-            render_alone(data_set, found.document, found.curves, self.report, resources)
+            render_alone(data_set, diagnosis.document, diagnosis.curves, self.report, resources)
 
 
-def _write_script(data_set: DataSet, found: Diagnosis | Playing, file: Path, announce: Announce) -> None:
-    if isinstance(found, Playing) and found.chosen.differs.any():
-        write(file, script(found.chosen, found.document, data_set.folder, file))
+def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
+    if isinstance(diagnosis, Playing) and diagnosis.chosen.differs.any():
+        write(file, script(diagnosis.chosen, diagnosis.document, data_set.folder, file))
     else:
         announce(f"  no number of the servos differs: there is nothing for {file} to fit")
 
 
-def _models(found: Diagnosis | Playing, model: Model, seed: int) -> Iterator[bytes]:
+def _models(diagnosis: Diagnosis | Playing, model: Model, seed: int) -> Iterator[bytes]:
     """Yield the model's file with the robot's numbers, then, without end, with these as they could be."""
     rng = np.random.default_rng(seed)
-    yield found.written() if isinstance(found, Playing) else written(model, found.document)
+    yield diagnosis.written() if isinstance(diagnosis, Playing) else written(model, diagnosis.document)
     while True:
-        yield found.drawn(rng) if isinstance(found, Playing) else drawn(model, found.document, found.twin, rng)
+        yield (
+            diagnosis.drawn(rng)
+            if isinstance(diagnosis, Playing)
+            else drawn(model, diagnosis.document, diagnosis.twin, rng)
+        )
 
 
 def _with_cutoff(data_set: DataSet, cutoff: float | None) -> DataSet:

@@ -184,10 +184,10 @@ def optimise(
         hours = read_tariff(location.folder).hours
         return Timings(twin.robot, programme, best, times.curve(), waiting, off is not None, hours), made
 
-    found, kept = _keep(robot, name, make, location, announce)
+    timings, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(found.best.motion, found.robot, out)
-    return found, kept
+        modelling.write_motion(timings.best.motion, timings.robot, out)
+    return timings, kept
 
 
 def _off_power(place: Workspace, robot_id: str) -> float | None:

@@ -161,14 +161,14 @@ def _installed() -> Resources:
             raise InputError(
                 f"{origin}: its entry point {point.name} of {GROUP} names {point.value}, which is no package"
             )
-        found = _found(Path(next(iter(spec.submodule_search_locations))), origin)
-        for file in found:
+        own = _found(Path(next(iter(spec.submodule_search_locations))), origin)
+        for file in own:
             other = brought.setdefault((file.kind, file.name), origin)
             if other != origin:
                 raise InputError(
                     f"{file.path}: {other} brings {file.kind}/{file.name} too; take one of the packages out"
                 )
-        known = _joined(known, found)
+        known = _joined(known, own)
     return known
 
 

@@ -46,10 +46,10 @@ def meanings(recording: Recording, robot: Robot, told: UserSaid) -> list[Meaning
     return [chosen[name] for name in recording.names]
 
 
-def _per_joint(recording: Recording, field: str, found: Sequence[Meaning], robot: Robot) -> list[Meaning]:
+def _per_joint(recording: Recording, field: str, meanings: Sequence[Meaning], robot: Robot) -> list[Meaning]:
     """Return the columns of a channel, each with its joint, and those that are not used."""
-    given: dict[str, Meaning] = {each.joint: each for each in found if each.given and each.joint is not None}
-    rest = [each for each in found if each not in given.values()]
+    given: dict[str, Meaning] = {each.joint: each for each in meanings if each.given and each.joint is not None}
+    rest = [each for each in meanings if each not in given.values()]
     if len(given) == len(robot.joints):
         return [*given.values(), *(each.unused("others were given by --map") for each in rest)]
     strong = [each for each in rest if not each.weak]
@@ -73,11 +73,11 @@ def _per_joint(recording: Recording, field: str, found: Sequence[Meaning], robot
     return [*taken.values(), *others, *weak]
 
 
-def _sets(recording: Recording, found: Sequence[Meaning], robot: Robot, known: int) -> list[dict[str, Meaning]]:
+def _sets(recording: Recording, meanings: Sequence[Meaning], robot: Robot, known: int) -> list[dict[str, Meaning]]:
     """Return the sets of columns, one for each joint, whose names differ in the joint alone."""
     names = robot.joint_names
     groups: dict[tuple[str, ...], list[Meaning]] = defaultdict(list)
-    for each in found:
+    for each in meanings:
         of_joint = set(words_of(each.joint)) if each.joint else set()
         groups[tuple(word for word in each.words if word not in of_joint)].append(each)
     complete = []
@@ -89,8 +89,8 @@ def _sets(recording: Recording, found: Sequence[Meaning], robot: Robot, known: i
             complete.append(indexed)
         elif len(group) == len(names) == 1:
             complete.append({names[0]: group[0]})
-    if not complete and found and len(found) == len(names):
-        indexed = _by_number(recording, found, names)  # names that differ in more than the number
+    if not complete and meanings and len(meanings) == len(names):
+        indexed = _by_number(recording, meanings, names)  # names that differ in more than the number
         complete = [indexed] if indexed else []
     return complete
 
@@ -146,11 +146,11 @@ def _in_any_order(recording: Recording, group: Sequence[Meaning], names: Sequenc
     )
 
 
-def _of_robot(recording: Recording, field: str, found: Sequence[Meaning], robot: Robot) -> list[Meaning]:
+def _of_robot(recording: Recording, field: str, meanings: Sequence[Meaning], robot: Robot) -> list[Meaning]:
     """Return the one column of a channel of the whole robot, and those that are not used."""
     label = CHANNELS[field].label
-    given = [each for each in found if each.given]
-    rest = [each for each in found if not each.given]
+    given = [each for each in meanings if each.given]
+    rest = [each for each in meanings if not each.given]
     of_joints = [each for each in rest if each.joint is not None or (each.numbers and field != "time")]
     unused = [each.unused(f"{label} of a part; the log format has the whole robot's") for each in of_joints]
     rest = [each for each in rest if each not in of_joints]
@@ -179,8 +179,8 @@ def _of_robot(recording: Recording, field: str, found: Sequence[Meaning], robot:
     return [*(replace(each, field=field) for each in rest), *unused]
 
 
-def _torque_or_temperature(recording: Recording, found: Sequence[Meaning]) -> DoubtError:
-    columns = [each.column for each in found]
+def _torque_or_temperature(recording: Recording, meanings: Sequence[Meaning]) -> DoubtError:
+    columns = [each.column for each in meanings]
     pattern = _pattern(columns[0])
     ways = [pattern] if [name for name in recording.columns if fits(pattern, name)] == columns else columns
     answers = [

@@ -70,8 +70,8 @@ def said_by(name: str, unit_text: str | None = None) -> Said:
     if words == ("p",) and not numbers:
         field = "power"  # p1 could be a position, or a pressure
     unit = _unit(field, unit_text or text) if field is not None else None
-    if unit is None and field is not None and (found := _unit_within(bare, field)) is not None:
-        rest, unit = found
+    if unit is None and field is not None and (within := _unit_within(bare, field)) is not None:
+        rest, unit = within
         return replace(said_by(rest), unit=unit)
     measured, motor = bool(_MEASURED & set(words)), bool(_MOTOR & set(words))
     kept = tuple(word for word in words if word not in _MEASURED)
@@ -99,10 +99,10 @@ def _unused(words: tuple[str, ...], field: str | None) -> str:
 
 def _split(name: str) -> tuple[str, str | None]:
     """Return a name without the unit in brackets at its end, and that text; a number there is an index."""
-    found = _BRACKETS.search(name)
-    if found is None or found[1].isdigit():
+    bracket = _BRACKETS.search(name)
+    if bracket is None or bracket[1].isdigit():
         return name, None
-    return name[: found.start()], found[1]
+    return name[: bracket.start()], bracket[1]
 
 
 def _unit(field: str, text: str | None) -> Unit | None:

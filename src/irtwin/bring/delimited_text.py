@@ -80,18 +80,18 @@ def _check_lines(path: Path, lines: Sequence[str]) -> None:
 
 def _form(path: Path, lines: Sequence[str]) -> TextForm:
     """Return how the beginning of a text is written. Raises InputError where that cannot be told."""
-    found = []
+    forms = []
     for delimiter in _DELIMITERS:
         rows = [_split(line, delimiter) for line in lines]
         head = head_of(rows)
         if head is not None:
-            found.append(TextForm(delimiter, _decimal(rows[head.first :], delimiter), head, rows))
-    if not found:
+            forms.append(TextForm(delimiter, _decimal(rows[head.first :], delimiter), head, rows))
+    if not forms:
         raise InputError(
             f"{path}: no delimiter (comma, semicolon, tab, blank) makes even columns of numbers of it; export it as "
             "CSV, one line of names and one line a sample, in semicolons where decimals have commas"
         )
-    return max(found, key=_fit)
+    return max(forms, key=_fit)
 
 
 def _check_names(path: Path, form: TextForm) -> None:

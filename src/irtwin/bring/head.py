@@ -25,8 +25,8 @@ class Head:
     def names_in(self, rows: Sequence[Sequence[str]]) -> list[str]:
         """Return the columns' names, column_1, column_2, ... where there are none."""
         cells = rows[self.first] if self.names is None else rows[self.names]
-        found = [cell.strip().lstrip("#").strip() if self.names is not None else "" for cell in cells]
-        return [name or f"column_{number}" for number, name in enumerate(found, start=1)]
+        named = [cell.strip().lstrip("#").strip() if self.names is not None else "" for cell in cells]
+        return [name or f"column_{number}" for number, name in enumerate(named, start=1)]
 
     def units_in(self, rows: Sequence[Sequence[str]]) -> list[str]:
         """Return what the row of units says of each column, "" where it says nothing."""

@@ -58,10 +58,10 @@ def _joules(name: str, unit: str | None) -> float | None:
     """Return how many J one of a column's unit is; None where it says no energy."""
     if unit is not None and unit.lower() in _JOULES:
         return _JOULES[unit.lower()]
-    found = _ENERGY.match(name.strip())
-    if found is None or (len(found["unit"]) < 3 and not _NAMED & set(said_by(found["name"]).words)):
+    energy = _ENERGY.match(name.strip())
+    if energy is None or (len(energy["unit"]) < 3 and not _NAMED & set(said_by(energy["name"]).words)):
         return None
-    return _JOULES[found["unit"].lower()]
+    return _JOULES[energy["unit"].lower()]
 
 
 def _seconds(time: np.ndarray) -> np.ndarray:

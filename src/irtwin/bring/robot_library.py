@@ -31,9 +31,9 @@ def robot_of(said: str) -> tuple[Robot, str]:
     if path.exists():
         return read_robot(path), str(path)
     known = {_plain(name): (name, file) for name, file in robots().items()}
-    found = known.get(_plain(said))
-    if found is not None:
-        return read_urdf(found[1]), f"{found[0]} of {_home(found[1])}"
+    robot = known.get(_plain(said))
+    if robot is not None:
+        return read_urdf(robot[1]), f"{robot[0]} of {_home(robot[1])}"
     near = difflib.get_close_matches(_plain(said), known, 5, 0.5)
     names = ", ".join(known[name][0] for name in near or sorted(known))
     more = "" if _installed() else '; pip install "irtwin[robots]" brings others, as ur10 and panda'

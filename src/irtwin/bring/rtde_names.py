@@ -34,8 +34,8 @@ def is_rtde(columns: Collection[str]) -> bool:
 
 def variable(column: str) -> tuple[str, str, int | None] | None:
     """Return field, unit and joint (None of the whole robot) of a column; None where it is not used."""
-    found = _INDEXED.fullmatch(column)
-    name, joint = (found[1], int(found[2])) if found else (column, None)
+    indexed = _INDEXED.fullmatch(column)
+    name, joint = (indexed[1], int(indexed[2])) if indexed else (column, None)
     said = _VARIABLES.get(name)
     return None if said is None else (*said, joint)
 

@@ -62,14 +62,14 @@ def _joints(folder: Path, robot: Robot) -> Sequence[str]:
     path = folder / _JOINTS
     if not path.exists():
         return robot.joint_names
-    found = as_text(path, read_input(path, _LARGEST)).split()
-    lacking = [name for name in robot.joint_names if name not in found]
+    listed = as_text(path, read_input(path, _LARGEST)).split()
+    lacking = [name for name in robot.joint_names if name not in listed]
     if lacking:
         raise InputError(
-            f"{path}: has no joint {', '.join(lacking)}; its joints are {', '.join(found)[:400]}: give them the names "
+            f"{path}: has no joint {', '.join(lacking)}; its joints are {', '.join(listed)[:400]}: give them the names "
             "of the robot's"
         )
-    return found
+    return listed
 
 
 def _read(
@@ -82,30 +82,30 @@ def _read(
         if name not in header:
             raise InputError(f"{path}, line 1: has no column {name}; its columns are {', '.join(header)[:400]}")
     times: list[float] = []
-    found: dict[str, list[list[float]]] = {name: [] for name in names if name in header}
+    columns: dict[str, list[list[float]]] = {name: [] for name in names if name in header}
     for row in rows:
         times += _numbers(path, rows.line_num, "timestamp", row["timestamp"], 1)
-        for name, lists in found.items():
+        for name, lists in columns.items():
             lists.append(_numbers(path, rows.line_num, name, row[name], len(joints)))
     if not times:
         raise InputError(f"{path}: has no sample; an empty run cannot be used")
     wrong = ~(np.diff(times, prepend=times[0]) >= 0)
     if wrong.any():
         raise InputError(f"{path}, sample {np.argmax(wrong) + 1}: time falls, or is blank; sort the file by timestamp")
-    arrays = {name: np.array(lists) for name, lists in found.items()}
+    arrays = {name: np.array(lists) for name, lists in columns.items()}
     return np.array(times), {name: values for name, values in arrays.items() if not np.isnan(values).all()}
 
 
 def _numbers(path: Path, line: int, name: str, cell: str | None, count: int) -> list[float]:
     """Return the numbers of a cell, as "[0.1, 0.2]"; NaN for each where it is blank."""
     try:
-        found = [float(text) for text in (cell or "").strip(" []").replace(",", " ").split()]
+        numbers = [float(text) for text in (cell or "").strip(" []").replace(",", " ").split()]
     except ValueError:
         raise InputError(
             f"{path}, line {line}, column {name}: {str(cell)[:40]!r} is no list of numbers; correct it"
         ) from None
-    if found and len(found) != count:
+    if numbers and len(numbers) != count:
         raise InputError(
-            f"{path}, line {line}, column {name}: {len(found)} values, not {count}, one a joint; correct it"
+            f"{path}, line {line}, column {name}: {len(numbers)} values, not {count}, one a joint; correct it"
         )
-    return found or [float("nan")] * count
+    return numbers or [float("nan")] * count

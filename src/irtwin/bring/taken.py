@@ -111,9 +111,9 @@ class _Taking:
 
     def _of(self, field: str) -> list[Meaning]:
         """Return the columns of a channel, base to flange."""
-        found = [each for each in self.meanings if each.field == field]
+        of_field = [each for each in self.meanings if each.field == field]
         names = self.robot.joint_names
-        return sorted(found, key=lambda each: names.index(each.joint) if each.joint in names else 0)
+        return sorted(of_field, key=lambda each: names.index(each.joint) if each.joint in names else 0)
 
     def _values(self, log: Aligned, each: Meaning) -> np.ndarray:
         """Return a column on the joint's side of the gear, in its own unit."""
@@ -213,18 +213,18 @@ class _Taking:
         pairs = [(log.time.astype(float), q) for log, q in zip(self.logs, positions, strict=True)]
         self._share([column], "s", lambda: evidence.time(self.robot, pairs))
         unit = self.units[column.column][0]
-        found: list[tuple[np.ndarray, datetime | None]] = []
+        clocks: list[tuple[np.ndarray, datetime | None]] = []
         for log in self.logs:
             first = float(log.time[0]) * unit.factor
             if not _EPOCH[0] <= first < _EPOCH[1]:
-                found.append((unit.to_si(log.time.astype(float)), None))
+                clocks.append((unit.to_si(log.time.astype(float)), None))
                 continue
             whole = int(log.time[0]) if log.time.dtype.kind in "iu" else None
             nanoseconds = round(first * 1e9) if whole is None else whole * round(unit.factor * 1e9)
-            found.append((unit.to_si((log.time - log.time[0]).astype(float)), _moment(nanoseconds)))
-        if found[0][1] is not None:
+            clocks.append((unit.to_si((log.time - log.time[0]).astype(float)), _moment(nanoseconds)))
+        if clocks[0][1] is not None:
             self.units[column.column] = unit, f"{self.units[column.column][1]}; since 1970, s from the first"
-        return [time for time, _ in found], [started for _, started in found]
+        return [time for time, _ in clocks], [started for _, started in clocks]
 
     def _power_at(self) -> tuple[str | None, str]:
         columns = [each for field in _OF_POWER for each in self._of(field)]
@@ -287,10 +287,10 @@ def _or(choices: Sequence[Unit]) -> str:
     return " or ".join(unit.name for unit in choices)
 
 
-def _warm(found: UnitEvidence) -> UnitEvidence:
+def _warm(evidence: UnitEvidence) -> UnitEvidence:
     """Temperatures that could be degC are: degF is taken by name alone."""
-    celsius = next((unit for unit in found.allowed if unit.name == "degC"), None)
-    return UnitEvidence(celsius or found.choice, found.allowed, found.why)
+    celsius = next((unit for unit in evidence.allowed if unit.name == "degC"), None)
+    return UnitEvidence(celsius or evidence.choice, evidence.allowed, evidence.why)
 
 
 def _check_size(log: Aligned, column: str, values: np.ndarray, channel: Channel) -> None:

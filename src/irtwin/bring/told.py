@@ -38,8 +38,8 @@ class UserSaid:
         if column in self.columns:
             return self.columns[column]
         patterns = (pattern for pattern in self.columns if "*" in pattern and fits(pattern, column))
-        found = max(patterns, key=len, default=None)
-        return None if found is None else self.columns[found]
+        closest = max(patterns, key=len, default=None)
+        return None if closest is None else self.columns[closest]
 
     def check(self, columns: Iterable[str]) -> None:
         """Raise InputError where something was said of a column that no file has."""

@@ -124,14 +124,14 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[LogFinding]:
     scales = {joint: _scale(fitted, joint) for joint in joints}
     names = CHANNELS["torque"].columns(robot.joint_names)
     telling = {joint for joint, (_, deviation) in scales.items() if deviation < _TELLS}
-    found = [
+    differing = [
         (_rescaled(fitted, joint, np.exp(log)).left, joint)
         for joint, (log, deviation) in scales.items()
         if len(telling - {joint}) >= _MAJORITY and _beyond(abs(log), deviation, np.log(_SCALED))
     ]
-    _, joint = min(found, default=(0.0, -1))  # of one that differs, others seem to differ as well
-    alike = _rescaled(fitted, joint, np.exp(scales[joint][0])) if found else fitted
-    if not found or not _agree(alike, telling - {joint}) or _gained(fitted, alike) < _SURE:
+    _, joint = min(differing, default=(0.0, -1))  # of one that differs, others seem to differ as well
+    alike = _rescaled(fitted, joint, np.exp(scales[joint][0])) if differing else fitted
+    if not differing or not _agree(alike, telling - {joint}) or _gained(fitted, alike) < _SURE:
         open_to_it = {names[joint] for joint in telling if abs(scales[joint][0]) > np.log(_SCALED) + scales[joint][1]}
         return [finding for finding in scale_findings(robot, moving) if finding.channel in open_to_it]
     log, deviation = scales[joint]

@@ -58,20 +58,20 @@ def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[
     return decorate
 
 
-def show(found: FleetStatus) -> None:
+def show(status: FleetStatus) -> None:
     """Print how many data sets are in each state, and say which were set aside."""
-    for state, number in sorted(found.counts.items()):
+    for state, number in sorted(status.counts.items()):
         click.echo(f"{state:8} {number}")
-    for record in found.set_aside[:_SHOWN]:
+    for record in status.set_aside[:_SHOWN]:
         say(f"{record.state}: {record.data_set}: {record.said}")
-    if len(found.set_aside) > _SHOWN:
-        say(f"... and {len(found.set_aside) - _SHOWN} more; their records say why")
+    if len(status.set_aside) > _SHOWN:
+        say(f"... and {len(status.set_aside) - _SHOWN} more; their records say why")
 
 
 def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
     from irtwin.fleet.fleet import work
 
-    found = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
-    show(found)
-    if found.set_aside:
+    status = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)
+    show(status)
+    if status.set_aside:
         sys.exit(3)

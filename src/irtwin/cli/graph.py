@@ -82,14 +82,14 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
     from irtwin.knowledge.explain.verify import WHOLE
     from irtwin.knowledge.explain.verify import verify as verified
 
-    found = asking.explain(" ".join(triple), location)
-    files = verified(found, location.folder) if verify else []
+    explanations = asking.explain(" ".join(triple), location)
+    files = verified(explanations, location.folder) if verify else []
     if as_json:
-        said = [to_json(each) for each in found]
+        said = [to_json(each) for each in explanations]
         told = {"explanations": said, "files": [asdict(each) for each in files]} if verify else said
         click.echo(json.dumps(told, indent=2, ensure_ascii=False))
     else:
-        click.echo("\n\n".join(map(to_text, found)))
+        click.echo("\n\n".join(map(to_text, explanations)))
         for line in ["", *map(str, files)] if verify else ():
             click.echo(line)
     if any(each.is_wrong for each in files):
@@ -236,10 +236,10 @@ def export(
 
 def _asked(every: dict[str, Path | None]) -> tuple[str, Path]:
     """Return the one form that is asked for, and the place to write it to."""
-    found = [(form, place) for form, place in every.items() if place is not None]
-    if len(found) != 1:
+    asked = [(form, place) for form, place in every.items() if place is not None]
+    if len(asked) != 1:
         raise click.UsageError(f"Give one of {', '.join(f'--{form}' for form in every)}.")
-    return found[0]
+    return asked[0]
 
 
 def _export_model(form: str, out: Path, location: Location, robot: str | None, twin: Path | None) -> None:

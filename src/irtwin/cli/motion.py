@@ -205,36 +205,38 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     """
     from irtwin import plans
 
-    found, kept = plans.optimise(robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked)
-    for line in _curve_lines(found):
+    timings, kept = plans.optimise(
+        robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked
+    )
+    for line in _curve_lines(timings):
         click.echo(line)
-    saved = _cycle_text(found.best) + f" than {run}{_year(found, found.best.saved)}"
+    saved = _cycle_text(timings.best) + f" than {run}{_year(timings, timings.best.saved)}"
     click.echo(f"{_where(out, kept)}: {saved} (95 % interval)")
 
 
-def _curve_lines(found: Timings) -> Iterator[str]:
+def _curve_lines(timings: Timings) -> Iterator[str]:
     """Yield the energy of each cycle time, what is new in the one that was chosen, and what its pauses could save."""
-    for one in found.curve:
+    for one in timings.curve:
         yield _cycle_text(one)
-    programme = found.programme
+    programme = timings.programme
     time = programme.motion.time
-    for section, factor in zip(programme.sections, found.best.factors, strict=True):
+    for section, factor in zip(programme.sections, timings.best.factors, strict=True):
         if section.kind == "move":
             yield f"move from {time[section.first]:.2f} to {time[section.last]:.2f} s: {factor:.2f} times as long"
-    for proposal in found.proposals:
+    for proposal in timings.proposals:
         end = proposal.begin + proposal.seconds
         back = "how long coming back takes is in no log" if proposal.takes is None else f"it takes {proposal.takes:g} s"
-        year = _year(found, proposal.saved)
+        year = _year(timings, proposal.saved)
         yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
-    if not found.shows_off:
+    if not timings.shows_off:
         yield "no log shows the robot off: what switching it off saves is not known"
 
 
-def _year(found: Timings, saved: Figure) -> str:
+def _year(timings: Timings, saved: Figure) -> str:
     """Say what a saving of each cycle, J, comes to in a year, where `plant.toml` says how many hours that has."""
-    if found.hours is None or saved.value <= 0:
+    if timings.hours is None or saved.value <= 0:
         return ""
-    return f" ({saved.times(found.hours / found.best.seconds / 1000)} kWh in {found.hours:g} h a year)"
+    return f" ({saved.times(timings.hours / timings.best.seconds / 1000)} kWh in {timings.hours:g} h a year)"
 
 
 def _tour_text(tour: Tour) -> str:

@@ -154,10 +154,10 @@ def tell_contradictions(location: Location) -> None:
     """Say which statements of a workspace contradict each other; where there are any, end with status 3."""
     from irtwin.asking import contradictions
 
-    found = contradictions(location)
-    for line in found:
+    lines = contradictions(location)
+    for line in lines:
         say(f"irtwin: {location.folder}: {line}")
-    if found:
+    if lines:
         sys.exit(3)
 
 

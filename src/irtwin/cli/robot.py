@@ -287,18 +287,18 @@ def ik(source: Path, pose: tuple[float, ...], start: str | None, link: str | Non
         raise InputError("--pose: give six finite numbers")
     place = pin.SE3(pin.rpy.rpyToMatrix(np.array(pose[3:])), np.array(pose[:3])).homogeneous
     near = None if start is None else np.array(_checked(described, _split(start)))
-    found = solve(described, place, start=near, link=link)
-    if not len(found.solutions):
-        raise InputError(f"{described.name}: {_missed(found.distance, found.angle)}")
+    solved = solve(described, place, start=near, link=link)
+    if not len(solved.solutions):
+        raise InputError(f"{described.name}: {_missed(solved.distance, solved.angle)}")
     if as_json:
-        rows = [dict(zip(described.joint_names, row, strict=True)) for row in found.solutions.tolist()]
+        rows = [dict(zip(described.joint_names, row, strict=True)) for row in solved.solutions.tolist()]
         click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
         return
     head = [f"{printable(joint.name)}, {joint.unit}" for joint in described.joints]
-    body = [[_number(value) for value in row] for row in found.solutions[:_SHOWN]]
+    body = [[_number(value) for value in row] for row in solved.solutions[:_SHOWN]]
     click.echo("\n".join(_columns([head, *body])))
-    if found.redundant or len(found.solutions) > _SHOWN:
-        click.echo(f"There are more without end; these are the {len(body)} nearest of {len(found.solutions)} found.")
+    if solved.redundant or len(solved.solutions) > _SHOWN:
+        click.echo(f"There are more without end; these are the {len(body)} nearest of {len(solved.solutions)} found.")
 
 
 def _split(text: str) -> list[float]:
@@ -337,15 +337,15 @@ def equations(source: Path, joint: str | None, latex: bool) -> None:
     described = read_robot(source)
     if joint is not None and joint not in described.joint_names:
         raise InputError(f'{described.name} has no moving joint "{joint}" (it has {", ".join(described.joint_names)})')
-    found = derive(described)
+    derived = derive(described)
     for place, each in enumerate(described.joints):
         if joint in (None, each.name):
             unit = "N" if each.unit == "m" else "N m"
             title = (
                 f"{'%' if latex else '#'} tau{place + 1}: {printable(each.name)}, {unit}; q{place + 1} in {each.unit}"
             )
-            click.echo(f"{title}\n{found.latex(place) if latex else found.text(place)}\n")
-    click.echo(f"These equations and Pinocchio differ by {found.deviation:.1e} N m (N) at most.", err=True)
+            click.echo(f"{title}\n{derived.latex(place) if latex else derived.text(place)}\n")
+    click.echo(f"These equations and Pinocchio differ by {derived.deviation:.1e} N m (N) at most.", err=True)
 
 
 def _columns(rows: list[list[str]]) -> Iterator[str]:

@@ -85,8 +85,8 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
         say(line)
     if not result.sound:
         sys.exit(2)
-    found = result.findings or result.data_set.repairs
-    say("nothing that must be cured first" if found else "no fault found")
+    faults = result.findings or result.data_set.repairs
+    say("nothing that must be cured first" if faults else "no fault found")
 
 
 @click.command()
@@ -218,24 +218,24 @@ def diagnose(
         raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     if asked["draws"] and not simulator_file:
         raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
-    found = judge(
+    diagnosis = judge(
         dataset, simulator=simulator, simulator_file=simulator_file, workspace=location, announce=announce, **asked
     )
-    click.echo(line(found.document, found.against))
-    for said in (*refused(found.document), *summary.filtered(found.document)):
+    click.echo(line(diagnosis.document, diagnosis.against))
+    for said in (*refused(diagnosis.document), *summary.filtered(diagnosis.document)):
         click.echo(said)
     for table in (
-        summary.gap(found.document),
-        summary.runs(found.curves),
-        summary.horizons(found.document),
-        summary.causes(found.document),
+        summary.gap(diagnosis.document),
+        summary.runs(diagnosis.curves),
+        summary.horizons(diagnosis.document),
+        summary.causes(diagnosis.document),
     ):
         if table:
             click.echo()
             show(table, counted=False)
-    for said in summary.not_held(not_held(found.document), found.document) if simulator else ():
+    for said in summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else ():
         click.echo(f"\n{said}")
-    for said in summary.next_steps(found.document):
+    for said in summary.next_steps(diagnosis.document):
         click.echo(f"\n{said}")
 
 
@@ -269,14 +269,14 @@ def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) 
         return
     from irtwin import improvement
 
-    found = improvement.improve(robot, new_log, location, announce=announce, **asked)
-    for number, one in enumerate(found.rounds, start=1):
+    improved = improvement.improve(robot, new_log, location, announce=announce, **asked)
+    for number, one in enumerate(improved.rounds, start=1):
         click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")
-    if found.within:
-        click.echo(f"The twin is within the limit of {found.limit:g} % on every run.")
+    if improved.within:
+        click.echo(f"The twin is within the limit of {improved.limit:g} % on every run.")
     else:
-        click.echo(f"Nothing helps yet: the twin is beyond the limit of {found.limit:g} %. What to log next:")
-        for line in found.next.words if found.next else ():
+        click.echo(f"Nothing helps yet: the twin is beyond the limit of {improved.limit:g} %. What to log next:")
+        for line in improved.next.words if improved.next else ():
             click.echo(line)
 
 

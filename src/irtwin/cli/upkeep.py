@@ -100,10 +100,10 @@ def status(location: Location) -> None:
         return show(status_of(batches))
     from irtwin import status as of_workspace
 
-    found = of_workspace.status(location)
-    for line in found.lines():
+    standing = of_workspace.status(location)
+    for line in standing.lines():
         click.echo(line)
-    if found.faults:
+    if standing.faults:
         sys.exit(2)
 
 

@@ -377,12 +377,12 @@ class Shrink:
     @tells()
     def changes(self) -> tuple[ChangeBy, ...]:
         """What all causes change together; and each alone, and all without it."""
-        found = [
+        of_channels = [
             ChangeBy(measure=measure, part="together", cause=None, place="all", **vars(change))
             for measure in ("torque_rmse", "power_rmse", "position_rmse", "energy_error_percent")
             if (change := getattr(self, measure)) is not None
         ]
-        return (*found, *(change for one in self.by_cause for change in one.changes))
+        return (*of_channels, *(change for one in self.by_cause for change in one.changes))
 
 
 @part("Gap_Horizon", of="change_of", ranked=True, unit_of="measure", constants=(("Change_Part", "horizon"),))
@@ -437,8 +437,8 @@ class Document:
             raise InputError("diagnosis.causes: two have one id; give each an id of its own")
         if unknown := {one.cause for one in self.shrink.by_cause} - ids:
             raise InputError(f"diagnosis.shrink.by_cause: no cause has the id {min(unknown)}; use those of the causes")
-        found = [cause for finding in self.findings for cause in finding.causes]
-        if wrong := ids.symmetric_difference(found):
+        listed = [cause for finding in self.findings for cause in finding.causes]
+        if wrong := ids.symmetric_difference(listed):
             raise InputError(f"diagnosis.findings: {min(wrong)} has to be a cause, and one of a finding's members")
         if len({finding.id for finding in self.findings}) < len(self.findings):
             raise InputError("diagnosis.findings: two have one id; give each an id of its own")
@@ -466,15 +466,15 @@ def cause_ids(causes: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str]
     "coulomb_friction@joint_2", "backlash@joint_1+joint_3", "payload" of the whole robot, "copper_loss@all" of every
     joint of several. The second of the same gets "#2".
     """
-    found: list[str] = []
+    ids: list[str] = []
     for effect, on in causes:
         name = effect + (f"@{_named(on, joints)}" if on else "")
         one, count = name, 1
-        while one in found:
+        while one in ids:
             count += 1
             one = f"{name}#{count}"
-        found.append(one)
-    return found
+        ids.append(one)
+    return ids
 
 
 def _named(on: Sequence[str], joints: Sequence[str]) -> str:

@@ -186,12 +186,12 @@ def _parts(kind: Any, whole: Table) -> tuple[Table, ...]:
 def _members(kind: Any, steps: Steps = (), *, missing: bool = False) -> Iterator[_Member]:
     """Yield what is told of a kind of part, and of the parts in it that are no individuals."""
     for name, hint, said in all_told(kind):
-        found, here = _Type.of(hint), (*steps, name)
-        own = missing or found.missing
-        if is_dataclass(found.kind) and individual_of(found.kind) is None:
-            yield from _members(found.kind, here, missing=own)
+        held, here = _Type.of(hint), (*steps, name)
+        own = missing or held.missing
+        if is_dataclass(held.kind) and individual_of(held.kind) is None:
+            yield from _members(held.kind, here, missing=own)
         else:
-            yield _Member(name, found, own, said, here)
+            yield _Member(name, held, own, said, here)
 
 
 def _names(kind: Any) -> Names | None:
@@ -200,8 +200,8 @@ def _names(kind: Any) -> Names | None:
 
 
 def _plain(kind: Any) -> type:
-    found: type = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-    return found
+    plain: type = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+    return plain
 
 
 DOCUMENT = Table("gap_diagnosis", Document)

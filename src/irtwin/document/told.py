@@ -98,8 +98,8 @@ def part(
     """Make a class a frozen dataclass; with an individual, one whose parts are that in the graph: see `Individual`."""
 
     def made(kind: Class) -> Class:
-        found = Individual(individual, table or individual.lower(), of, ranked, unit_of, constants)
-        setattr(kind, _INDIVIDUAL, found if individual else None)
+        own = Individual(individual, table or individual.lower(), of, ranked, unit_of, constants)
+        setattr(kind, _INDIVIDUAL, own if individual else None)
         return cast(Class, dataclass(frozen=True, kw_only=True)(kind))
 
     return made
@@ -107,8 +107,8 @@ def part(
 
 def individual_of(kind: Any) -> Individual | None:
     """Return what parts of a kind are in the graph."""
-    found: Individual | None = getattr(kind, _INDIVIDUAL, None)
-    return found
+    own: Individual | None = getattr(kind, _INDIVIDUAL, None)
+    return own
 
 
 def all_told(kind: Any) -> Iterator[tuple[str, Any, Told]]:

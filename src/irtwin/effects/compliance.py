@@ -226,9 +226,9 @@ class _Compliance(JointEffect):
 
 def _at(acting: list[int], motion: Motion, samples: np.ndarray) -> np.ndarray:
     """Return (N, n) with the samples (N, m) of the acting joints; zero at the others, which are not worked out."""
-    found = np.zeros_like(motion.dq)
-    found[:, acting] = samples
-    return found
+    everywhere = np.zeros_like(motion.dq)
+    everywhere[:, acting] = samples
+    return everywhere
 
 
 @dataclass(frozen=True)
@@ -332,7 +332,7 @@ class JointElasticity(_Compliance):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return K; nothing where the rotor's inertia is needed and not known."""
-        found = []
+        quantities = []
         stiffness = (2 * np.pi * self.antiresonance) ** 2 * _mean_inertia(robot)
         for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
             rotor = given.known.get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
@@ -341,8 +341,8 @@ class JointElasticity(_Compliance):
                 sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
-                found.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))
-        return tuple(found)
+                quantities.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))
+        return tuple(quantities)
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how soft the acting joint that moves least can be."""

@@ -35,13 +35,13 @@ class PeriodicDisturbance(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return frequency and amplitude."""
-        found = []
+        quantities = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(2 * place, 2 * place + 2)
             amplitude, deviation = given.size(own)
-            found.append(quantity("f", joint.name, self.f, "Hz"))
-            found.append(quantity("A", joint.name, amplitude, force_unit(joint), deviation))
-        return tuple(found)
+            quantities.append(quantity("f", joint.name, self.f, "Hz"))
+            quantities.append(quantity("A", joint.name, amplitude, force_unit(joint), deviation))
+        return tuple(quantities)
 
 
 @dataclass(frozen=True)

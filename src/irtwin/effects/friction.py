@@ -48,11 +48,11 @@ def turn(dq: np.ndarray, width: float, exponent: float) -> np.ndarray:
 
 def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:
     """Return (N, n), by speeds, the sign that dry friction has in each joint: as sharp as the joint's is."""
-    found = sharp_sign(dq)
+    directions = sharp_sign(dq)
     for place, joint in enumerate(robot.joints):
         if joint.friction_width is not None and joint.friction_exponent is not None:
-            found[:, place] = turn(dq[:, place], joint.friction_width, joint.friction_exponent)
-    return found
+            directions[:, place] = turn(dq[:, place], joint.friction_width, joint.friction_exponent)
+    return directions
 
 
 def turning(robot: Robot, dq: np.ndarray) -> np.ndarray:
@@ -133,7 +133,7 @@ class StribeckFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fs, vs and d."""
-        found = super().parameters(robot, given)
+        quantities = super().parameters(robot, given)
         shapes = [
             shape
             for joint in self.acting(robot)
@@ -142,7 +142,7 @@ class StribeckFriction(JointEffect):
                 Quantity("d", joint.name, self.d, "1"),
             )
         ]
-        return (*found, *shapes)
+        return (*quantities, *shapes)
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ class NonlinearViscousFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k and d."""
-        found = super().parameters(robot, given)
-        return (*found, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
+        quantities = super().parameters(robot, given)
+        return (*quantities, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
 
 
 @dataclass(frozen=True)
@@ -260,12 +260,12 @@ class TemperatureDependentFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, relative to the joint's Fv; the shape's k where Fv is not known."""
-        found = []
+        quantities = []
         for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
             viscous = given.known.get(("viscous_friction", joint.name, "Fv"))
             part = (ratio(value, viscous), ratio(deviation, viscous)) if viscous else (self.k, None)
-            found.append(quantity("k", joint.name, part[0], "1/K", part[1]))
-        return tuple(found)
+            quantities.append(quantity("k", joint.name, part[0], "1/K", part[1]))
+        return tuple(quantities)
 
 
 @dataclass(frozen=True)
@@ -372,10 +372,12 @@ class PositionDependentFriction(JointEffect):
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return a and b, relative to the joint's Fc; nothing where that is not known."""
         deviations = given.deviations
-        found = []
+        quantities = []
         for place, joint in enumerate(self.acting(robot)):
             dry = given.known.get(("coulomb_friction", joint.name, "Fc"))
             for number, name in enumerate(("a", "b")) if dry else ():
                 at = 2 * place + number
-                found.append(quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry)))
-        return tuple(found)
+                quantities.append(
+                    quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry))
+                )
+        return tuple(quantities)

@@ -88,14 +88,14 @@ class GravityCompensation(JointEffect):
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the largest torque over a turn."""
         waves = np.column_stack([np.cos(_TURN), np.sin(_TURN), np.cos(2 * _TURN), np.sin(2 * _TURN)])
-        found = []
+        quantities = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(4 * place, 4 * place + 4)
             torque = waves @ given.values[own]
             wave = waves[int(np.argmax(np.abs(torque)))]
             deviation = float(np.sqrt(wave @ given.covariance[own, own] @ wave))
-            found.append(quantity("torque", joint.name, np.abs(torque).max(), force_unit(joint), deviation))
-        return tuple(found)
+            quantities.append(quantity("torque", joint.name, np.abs(torque).max(), force_unit(joint), deviation))
+        return tuple(quantities)
 
 
 @dataclass(frozen=True)
@@ -137,14 +137,14 @@ class Payload(Effect):
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return m, and c where the mass is one."""
         mass = float(given.values[0])
-        found = [quantity("m", None, mass, "kg", float(given.deviations[0]))]
+        quantities = [quantity("m", None, mass, "kg", float(given.deviations[0]))]
         for number, axis in enumerate("xyz", start=1):
             place = ratio(given.values[number], mass)
             if np.isfinite(place):
                 slope = np.array([-place, 1.0]) / mass
                 spread = given.covariance[np.ix_([0, number], [0, number])]
-                found.append(quantity(f"c_{axis}", None, place, "m", float(np.sqrt(slope @ spread @ slope))))
-        return tuple(found)
+                quantities.append(quantity(f"c_{axis}", None, place, "m", float(np.sqrt(slope @ spread @ slope))))
+        return tuple(quantities)
 
 
 @dataclass(frozen=True)

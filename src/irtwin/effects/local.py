@@ -76,9 +76,9 @@ class LocalEffect(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the coefficient, the place, and what else is the shape's."""
-        found = super().parameters(robot, given)
+        quantities = super().parameters(robot, given)
         shapes = [Quantity("q0", joint.name, self.q0, joint.unit) for joint in self.acting(robot)]
-        return (*found, *shapes)
+        return (*quantities, *shapes)
 
 
 @dataclass(frozen=True)
@@ -101,12 +101,12 @@ class LocalWear(LocalEffect):
 
     def over(self, lower: float, upper: float) -> tuple[tuple[LocalEffect, ...], ...]:
         """Return bumps of which both flanks are passed, in one group."""
-        found: list[LocalEffect] = []
+        shapes: list[LocalEffect] = []
         for width in (share * (upper - lower) for share in _WIDTHS):
             first, last = lower + _FLANKS * width, upper - _FLANKS * width
             places = np.linspace(first, last, 1 + round(2 * (last - first) / width))
-            found += [replace(self, q0=float(place), w=float(width)) for place in places]
-        return (tuple(found),)
+            shapes += [replace(self, q0=float(place), w=float(width)) for place in places]
+        return (tuple(shapes),)
 
     def _coarse(self, lower: float, upper: float) -> tuple[Effect, ...]:
         places = np.linspace(lower, upper, 22)
@@ -118,8 +118,8 @@ class LocalWear(LocalEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fw, q0 and w."""
-        found = super().parameters(robot, given)
-        return (*found, *(Quantity("w", joint.name, self.w, joint.unit) for joint in self.acting(robot)))
+        quantities = super().parameters(robot, given)
+        return (*quantities, *(Quantity("w", joint.name, self.w, joint.unit) for joint in self.acting(robot)))
 
 
 @dataclass(frozen=True)
@@ -159,8 +159,8 @@ class JointLimitSpring(LocalEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, q0 and the side."""
-        found = super().parameters(robot, given)
-        return (*found, *(Quantity("side", joint.name, self.side, "1") for joint in self.acting(robot)))
+        quantities = super().parameters(robot, given)
+        return (*quantities, *(Quantity("side", joint.name, self.side, "1") for joint in self.acting(robot)))
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return that it pulls back."""

@@ -41,11 +41,11 @@ class Prior:
         """
         places = [self._place(effect, term) for effect, term in pairs]
         known = [k for k, place in enumerate(places) if place is not None]
-        found = [place for place in places if place is not None]
+        own = [place for place in places if place is not None]
         rows = np.eye(len(pairs))
         if known:
             spread = np.array([pairs[k][1].spread for k in known])
-            scaled = self.covariance[np.ix_(found, found)] / np.outer(spread, spread)
+            scaled = self.covariance[np.ix_(own, own)] / np.outer(spread, spread)
             variances, axes = np.linalg.eigh(scaled)
             rows[np.ix_(known, known)] = (axes / np.sqrt(np.maximum(variances, _SUREST))).T
         return rows

@@ -175,9 +175,8 @@ _last = _Last()
 
 def _regressor(robot: Robot, motion: Motion) -> np.ndarray:
     """Return the (N, n, 10 n) torque regressor of all bodies, not to be written to."""
-    found = _last.of(robot, motion)
-    if found is not None:
-        return found
+    if (last := _last.of(robot, motion)) is not None:
+        return last
     regressor = body_regressor(robot.model, motion.q, motion.dq, motion.ddq)
     regressor.flags.writeable = False
     _last.keep(robot, motion, regressor)

@@ -134,13 +134,13 @@ class Stack:
         warm = np.full(shape, 50.0)
         probe = Motion(np.arange(16.0), q, dq, ddq, run="probe", temperature=warm)
         predicted = Predicted(rng.uniform(-50, 50, shape))
-        found = [
+        patterns = [
             np.array([[term.joint == name for term in effect.terms(self.robot)] for name in self.robot.joint_names])
             if isinstance(effect, JointEffect)
             else np.any(effect.columns(self.robot, probe, predicted) != 0, axis=0)
             for effect in self._torque
         ]
-        return np.concatenate([np.zeros((shape[1], 0), dtype=bool), *found], axis=1)
+        return np.concatenate([np.zeros((shape[1], 0), dtype=bool), *patterns], axis=1)
 
     def torque_columns(self, motion: Motion, values: np.ndarray | None = None) -> np.ndarray:
         """Return the (N, n, K) torque regressor.
@@ -157,7 +157,7 @@ class Stack:
         It is `torque_columns` without the zeros, which are most of it; `values` as there.
         """
         below = self._torques(motion, values).below if self.coupled else {}
-        found: list[list[np.ndarray]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
+        by_joint: list[list[np.ndarray]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
         for effect, own in self._torque_places:
             if isinstance(effect, JointEffect) and effect.acts_in(motion) and not effect.memory:
                 before = below.get(effect.stage)
@@ -165,12 +165,12 @@ class Stack:
                 samples = effect.samples(self.robot, motion, before and before.part(motion.start, stop))
                 for joint in effect.acting(self.robot):
                     place = self.robot.index(joint.name)
-                    found[place] += [sample[:, place : place + 1] for sample in samples]
+                    by_joint[place] += [sample[:, place : place + 1] for sample in samples]
             else:
                 columns = self.columns(effect, motion, below.get(effect.stage))
                 for place, used in enumerate(self.pattern[:, own]):
-                    found[place].append(columns[:, place, used])
-        return [side_by_side(columns) for columns in found]
+                    by_joint[place].append(columns[:, place, used])
+        return [side_by_side(columns) for columns in by_joint]
 
     def shift_torque(self, motion: Motion, columns: Sequence[np.ndarray]) -> np.ndarray:
         """Return the torque (N, n), N m, of what is known to be added, by the columns of each joint."""

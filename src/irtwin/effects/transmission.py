@@ -57,13 +57,13 @@ class TorqueRipple(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return A and N."""
-        found = []
+        quantities = []
         for place, joint in enumerate(self.acting(robot)):
             own = slice(2 * place, 2 * place + 2)
             length, deviation = given.size(own)
-            found.append(quantity("A", joint.name, length, force_unit(joint), deviation))
-            found.append(Quantity("N", joint.name, self.N, "1/rev"))
-        return tuple(found)
+            quantities.append(quantity("A", joint.name, length, force_unit(joint), deviation))
+            quantities.append(Quantity("N", joint.name, self.N, "1/rev"))
+        return tuple(quantities)
 
 
 @dataclass(frozen=True)

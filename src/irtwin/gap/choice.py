@@ -58,10 +58,10 @@ def identified(data_set: DataSet, motions: Sequence[Motion]) -> Twin:
 @one_blas_thread()
 def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ...]]:
     case = case_of(data_set, (), DEFAULT, None)
-    found = list(_findings(case))
-    shown = added(case, [cause for finding in found for cause in finding.causes])
-    left_open = {effect: places for finding in found for effect, places in _open(case, finding).items()}
-    choices = tuple(one for finding in found for one in _choices(case, finding))
+    findings = list(_findings(case))
+    shown = added(case, [cause for finding in findings for cause in finding.causes])
+    left_open = {effect: places for finding in findings for effect, places in _open(case, finding).items()}
+    choices = tuple(one for finding in findings for one in _choices(case, finding))
     return (*case.effects, *shown, *elsewhere(shown, left_open)), choices
 
 
@@ -105,12 +105,12 @@ def _choices(case: Case, finding: ChannelFinding) -> Iterator[Choice]:
 
 def _open(case: Case, finding: ChannelFinding) -> dict[str, Places]:
     """Return the joints, None for the whole robot, where a channel leaves effects open, and how likely each is."""
-    found: dict[str, Places] = {}
+    left_open: dict[str, Places] = {}
     for one, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
         chance = float(scipy.special.expit(odds))
         if one.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
-            found.setdefault(one.effect, []).append((one.joint, chance))
-    return found
+            left_open.setdefault(one.effect, []).append((one.joint, chance))
+    return left_open
 
 
 def _worth(case: Case, finding: ChannelFinding, cause: FoundCause) -> Choice:

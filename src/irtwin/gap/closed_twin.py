@@ -27,7 +27,7 @@ def added(case: Case, causes: Sequence[FoundCause]) -> list[Effect]:
 
     A changed effect that the twin has needs no second one; a load at the flange is one with the last body.
     """
-    found: list[Effect] = []
+    effects: list[Effect] = []
     for cause in causes:
         if cause.scope == CHANGED and cause.variants[0].effect.within_bodies:
             continue
@@ -37,15 +37,15 @@ def added(case: Case, causes: Sequence[FoundCause]) -> list[Effect]:
             named = [joint for joint in lacking if joint is not None]
             whole = not cause.joints and len(lacking) == len(joints)
             effect = variant.effect.standing() if whole else variant.effect.standing().on(*named)
-            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in found):
-                found.append(effect)
-    return found
+            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in effects):
+                effects.append(effect)
+    return effects
 
 
 def friction(case: Case, causes: Sequence[FoundCause], closed: Twin) -> tuple[FrictionCurve, ...]:
     """Return the friction of each joint by the closed twin; before it, where it changed, as the other runs show it."""
     robot, motions = case.given
-    found = friction_curves(closed, [motions[run] for run in closed.fitted], "observed")
+    curves = friction_curves(closed, [motions[run] for run in closed.fitted], "observed")
     changed = {
         joint
         for cause in causes
@@ -53,9 +53,9 @@ def friction(case: Case, causes: Sequence[FoundCause], closed: Twin) -> tuple[Fr
         for joint in cause.touched(robot)
     }
     if not changed:
-        return found
+        return curves
     assert case.against is not None
     others = {run: motion for run, motion in motions.items() if run not in case.observed}
     former = identify(robot, list(others.values()), case.effects, case.prior)
     before = friction_curves(former, [others[run] for run in former.fitted], case.against)
-    return (*(one for one in before if one.joint in changed), *found)
+    return (*(one for one in before if one.joint in changed), *curves)

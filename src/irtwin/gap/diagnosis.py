@@ -103,10 +103,10 @@ class Diagnosis:
         if self.simulator is not None:
             written = tuple(writing.beside(self.simulator, one) for one in written)
         causes = apart.causes(written)
-        found = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
-        found = apart.findings(found, causes, self.thresholds.matters)
-        causes = writing.folded(causes, found)
-        judged = verdict_of(found)
+        findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
+        findings = apart.findings(findings, causes, self.thresholds.matters)
+        causes = writing.folded(causes, findings)
+        judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, self.seed)
         return Document(
@@ -115,7 +115,7 @@ class Diagnosis:
             robot=robot.name,
             gap=apart.gap(writing.gap(robot.joint_names, self.channels, self.energies)),
             locations=() if verdict == NO_GAP else self.locations,
-            findings=found,
+            findings=findings,
             causes=causes,
             not_testable=self.untestable,
             shrink=apart.shrink(shrink, self.seed),
@@ -259,10 +259,10 @@ def diagnose(
 def _tried(search: Search, plain: System) -> tuple[Sequence[Effect], Sequence[Effect]]:
     """Return the effects on torque and on power that are tried, those that a screening proposes among them."""
     case = search.case
-    found = screen(case, search.stack, plain)
+    screened = screen(case, search.stack, plain)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             search.below(motion)
         if case.shows("power"):
             _ = search.before
-    return found.shapes(variants(case, "torque")), variants(case, "power")
+    return screened.shapes(variants(case, "torque")), variants(case, "power")

@@ -59,12 +59,12 @@ class _Asked:
 
     def answered(self, programme: ExperimentProgramme) -> list[Question]:
         """Return what a programme would tell: of each rival by itself."""
-        found = _of(self.rehearsal.causes(programme), self.effect, self.scope)
+        shown = _of(self.rehearsal.causes(programme), self.effect, self.scope)
         return [
             Question(
                 effects=(self.effect, *filter(None, [rival])),
                 separation_now=_rounded(now),
-                expected_separation=_rounded(max(now, separation(found, rival))),
+                expected_separation=_rounded(max(now, separation(shown, rival))),
             )
             for rival, now in self.now.items()
         ]
@@ -169,11 +169,11 @@ def _unseen(
     As large as expected, at the place where it shows most.
     """
     true, sizes = _known(finding)
-    found = finding.attribution
+    before = finding.attribution
     for effect in lacking:
-        places = [k for k, one in enumerate(found.hypotheses) if one.effect == effect]
+        places = [k for k, one in enumerate(before.hypotheses) if one.effect == effect]
         if places:
-            best = found.hypotheses[max(places, key=lambda k: found.visible[k, 0])]
+            best = before.hypotheses[max(places, key=lambda k: before.visible[k, 0])]
             shape = best.variants[len(best.variants) // 2]
             expected = {k: term.spread for k, term in zip(shape.columns, shape.terms, strict=True)}
             own = replace(best, variants=(shape,))

@@ -48,9 +48,9 @@ def _level(finding: ChannelFinding) -> np.ndarray:
 def _squares(finding: ChannelFinding, one: Removed) -> np.ndarray:
     """Return (G, g) the squares of what was taken out in each group left out and equation of its channel."""
     rows, place = finding.held_out.rows, finding.places.index(one.disturbance.joint)
-    found = np.zeros(rows.shape)
-    found[:, place] = rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
-    return found
+    squares = np.zeros(rows.shape)
+    squares[:, place] = rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
+    return squares
 
 
 @dataclass(frozen=True)

@@ -93,12 +93,12 @@ class Search:
         """
         case = self.case
         if case.shows("power"):
-            found = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
+            possible = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
         else:
             about = case.with_torque, case.grouping, tried[0], self.below, case.shaken
             system = torque_system(self.stack, *about)
-            found = find_possible(case, lambda without: self._of_torque(system, without), self.unknown)
-        finding, floor, refusals = found
+            possible = find_possible(case, lambda without: self._of_torque(system, without), self.unknown)
+        finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
     def _beside_power(
@@ -128,10 +128,10 @@ class Search:
         plain = self.before.system if explained else None
 
         def search(without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-            found = find("power", case, system, level, self.seed, without, plain)
-            of_power = explained_power(self.power_stack, found, torque, power_of)
-            left = floor_left(case, floor, of_power) if found.causes else floor
-            return replace(found, floor=None if left.power is None else np.array([left.power])), left
+            finding = find("power", case, system, level, self.seed, without, plain)
+            of_power = explained_power(self.power_stack, finding, torque, power_of)
+            left = floor_left(case, floor, of_power) if finding.causes else floor
+            return replace(finding, floor=None if left.power is None else np.array([left.power])), left
 
         finding, _, refusals = find_possible(case, search, self.unknown)
         return explained_power(self.power_stack, finding, torque, power_of), refusals

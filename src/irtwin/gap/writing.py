@@ -100,14 +100,14 @@ def findings(
     of_all.sort(key=lambda pair: -pair[1].closing.size)
     written = {cause.id: cause for cause in causes}
     own_of_all = [[written[ids_of[id(each)]] for each in branch.causes] for _, branch in of_all]
-    joints = [_joints(robot, own) for own in own_of_all]
+    joints = [_joints(robot, of_branch) for of_branch in own_of_all]
     ids = cause_ids([(branch.family, on) for (_, branch), on in zip(of_all, joints, strict=True)], robot.joint_names)
-    found = []
-    for (channel, branch), own, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
-        members = [_members(cause) for cause in own]
+    findings = []
+    for (channel, branch), of_branch, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
+        members = [_members(cause) for cause in of_branch]
         classes = [sum(one.confidence for one in some) for some in members]
         of_family = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
-        found.append(
+        findings.append(
             document.Finding(
                 id=name,
                 family=branch.family,
@@ -122,7 +122,7 @@ def findings(
                 members=tuple(one for some in members for one in some),
             )
         )
-    return tuple(found)
+    return tuple(findings)
 
 
 def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding]) -> tuple[document.Cause, ...]:
@@ -226,8 +226,8 @@ def fraction_closed(
     with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.name in changed]
     if not with_floor or any(one.floor is None for one in findings if one.causes):
         return None
-    found = closed_fraction(with_floor, seed)
-    return found and document.ClosedFraction(value=found[0], interval95=(found[1][0], found[1][1]))
+    closed = closed_fraction(with_floor, seed)
+    return closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1]))
 
 
 def _change(finding: ChannelFinding, seed: int) -> document.Change:

@@ -92,10 +92,10 @@ def cheapest(
     points = search.spline.nearest
     for stiffness in _STIFFNESS:
         points = search.improve(points, stiffness * least)
-        found = search.motion(points)
-        cost = energy(found, power)
-        if cost < least and search.goes_forward(points) and keeps(found, limits, torque, collisions):
-            best, least = found, cost
+        motion = search.motion(points)
+        cost = energy(motion, power)
+        if cost < least and search.goes_forward(points) and keeps(motion, limits, torque, collisions):
+            best, least = motion, cost
     return best
 
 
@@ -197,14 +197,14 @@ class _Search:
 
     def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
         """Return points of less cost, with walls of a stiffness, J."""
-        found = scipy.optimize.minimize(
+        optimum = scipy.optimize.minimize(
             lambda x: self._cost(x.reshape(points.shape), stiffness),
             points.ravel(),
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": _ITERATIONS},
         )
-        return np.asarray(found.x.reshape(points.shape))
+        return np.asarray(optimum.x.reshape(points.shape))
 
     def _cost(self, points: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
         states = self.spline.states(points)

@@ -55,8 +55,8 @@ def _improved(cost: np.ndarray, order: list[int]) -> list[int]:
         for size in (1, 2, 3):
             for start in range(1, len(order) - size):
                 moved, rest = order[start : start + size], order[:start] + order[start + size :]
-                found = [rest[:at] + moved + rest[at:] for at in range(1, len(rest))]
-                best = min(found, key=lambda one: length(cost, one))
+                orders = [rest[:at] + moved + rest[at:] for at in range(1, len(rest))]
+                best = min(orders, key=lambda one: length(cost, one))
                 if length(cost, best) < length(cost, order) * (1 - 1e-12):
                     order, better = best, True
     return order

@@ -65,12 +65,12 @@ def joints_for(
     which pair touches.
     """
     limits = JointLimits.of(robot)
-    found = [target] if isinstance(target, np.ndarray) else _solutions(robot, target, limits, near, what)
-    _check_limits(robot, found[0], what)
-    for q in found:
+    solutions = [target] if isinstance(target, np.ndarray) else _solutions(robot, target, limits, near, what)
+    _check_limits(robot, solutions[0], what)
+    for q in solutions:
         if not collisions.touches(q):
             return q
-    pair = collisions.meeting(found[0])
+    pair = collisions.meeting(solutions[0])
     assert pair is not None
     raise InputError(f"{what} is in collision: {pair[0]} touches {pair[1]}; choose another one")
 
@@ -91,15 +91,15 @@ def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray |
     start = limits.centre if near is None else near
     random = np.random.default_rng(0).uniform(limits.lower, limits.upper, (_STARTS, len(start)))
     tries = [follow(robot, pose.placement, q, limits) for q in (start, *random)]
-    found = [q for q, away, turned in tries if max(away, turned) < 1e-6]
-    if not found:
+    solutions = [q for q, away, turned in tries if max(away, turned) < 1e-6]
+    if not solutions:
         _, away, turned = min(tries, key=lambda each: each[1] + _ANGLE * each[2])
         shown = " ".join(f"{value:g}" for value in (*pose.place, *pose.angles))
         raise InputError(
             f"{what} {shown} is out of reach: the flange stays {1000 * away:.0f} mm and {np.degrees(turned):.1f} deg "
             "off it; choose a nearer pose"
         )
-    return sorted(found, key=lambda q: float(np.linalg.norm(q - start)))
+    return sorted(solutions, key=lambda q: float(np.linalg.norm(q - start)))
 
 
 def _check_limits(robot: Robot, q: np.ndarray, what: str) -> None:

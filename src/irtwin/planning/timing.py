@@ -124,10 +124,10 @@ def fastest(path: BSpline, limits: MotionLimits, torque: Torque) -> Timed:
     """
     time, place, speed = _topp_ra(path, limits, torque)
     tried = [_within(_smoothed(path, time, place, speed, window), limits, torque) for window in _WINDOWS]
-    found = [each for each in tried if each is not None]
-    if not found:
+    feasible = [each for each in tried if each is not None]
+    if not feasible:
         raise InputError(_too_heavy(path, limits, torque))
-    return min(found, key=lambda each: each.seconds)
+    return min(feasible, key=lambda each: each.seconds)
 
 
 def shares(
@@ -242,8 +242,8 @@ def _smoothed(path: BSpline, time: np.ndarray, place: np.ndarray, speed: np.ndar
 
 def _within(timed: Timed, limits: MotionLimits, torque: Torque) -> Timed | None:
     """Return the motion as much slower as a limit asks; None where torque is short at any speed."""
-    found = shares(timed.motion(np.linspace(0, timed.seconds, _DENSE)), limits, torque)
-    most = [float(found[name].max()) / _RESERVE for name in ("speed", "acceleration", "jerk")]
+    used = shares(timed.motion(np.linspace(0, timed.seconds, _DENSE)), limits, torque)
+    most = [float(used[name].max()) / _RESERVE for name in ("speed", "acceleration", "jerk")]
     timed = timed.slower(timed.seconds * max(most[0], most[1] ** 0.5, most[2] ** (1 / 3)))
     while timed.stretch < _SLOWEST:
         motion = timed.motion(np.linspace(0, timed.seconds, _DENSE))

@@ -44,15 +44,15 @@ def proposals(twin: Twin, programme: SectionedMotion, off: float | None) -> Iter
             continue
         weights = np.zeros(len(motion.time))
         weights[section.first : section.last + 1] = trapezoid(motion.time[section.first : section.last + 1])
-        found: list[tuple[str, Figure, float | None]] = [_elsewhere(twin, programme, int(number))]
+        savings: list[tuple[str, Figure, float | None]] = [_elsewhere(twin, programme, int(number))]
         if twin.stack.drives_on(motion) is not None:
             held = _held(motion, section.first, seconds)
             closed = balance(twin, (motion, weights), (held, -trapezoid(held.time)))
-            found.append(("close the brakes at once", closed, None))
+            savings.append(("close the brakes at once", closed, None))
         if off is not None:
             taken = balance(twin, (motion, weights))
-            found.append(("switch off", Figure(taken.value - off * seconds, taken.half_width), None))
-        for what, saved, takes in found:
+            savings.append(("switch off", Figure(taken.value - off * seconds, taken.half_width), None))
+        for what, saved, takes in savings:
             if saved.value > (saved.half_width or 0.0):
                 yield PauseProposal(begin, seconds, what, saved, takes)
 

@@ -76,8 +76,8 @@ def equations(robot: Robot) -> EquationsOfMotion:
     q, dq, _ = _symbols(len(robot.joints))
     gravity = sympy.Matrix([sympy.diff(height, position) for position in q])
     speed = sympy.Matrix([_speed_terms(mass, q, dq, joint) for joint in range(len(q))])
-    found = EquationsOfMotion(robot.joint_names, mass, speed, gravity, 0.0)
-    return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, found))
+    derived = EquationsOfMotion(robot.joint_names, mass, speed, gravity, 0.0)
+    return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, derived))
 
 
 def _library() -> Any:
@@ -244,11 +244,11 @@ def _shifted(
     return result
 
 
-def _deviation(robot: Robot, found: EquationsOfMotion) -> float:
+def _deviation(robot: Robot, derived: EquationsOfMotion) -> float:
     sympy = _library()
     count = len(robot.joints)
     q, dq, ddq = _symbols(count)
-    said = sympy.lambdify([*q, *dq, *ddq], [found.torque(joint) for joint in range(count)], "numpy")
+    said = sympy.lambdify([*q, *dq, *ddq], [derived.torque(joint) for joint in range(count)], "numpy")
     data, worst = robot.model.createData(), 0.0
     for state in np.random.default_rng(0).uniform(-2.0, 2.0, (_STATES, 3, count)):
         expected = pin.rnea(robot.model, data, *state)

@@ -46,8 +46,8 @@ def find_mesh(name: str, folder: Path, beside: Path) -> Path:
     path = PurePosixPath(rest)
     paths = [path, PurePosixPath(*path.parts[1:])] if scheme == "package" else [path]
     inside, outside = folder.resolve(), False
-    for found in (base / one for base in (beside, folder) for one in paths):
-        real = real_path(found)
+    for mesh in (base / one for base in (beside, folder) for one in paths):
+        real = real_path(mesh)
         if real is not None and real.is_relative_to(inside) and real.is_file():
             return real
         outside |= real is not None and not real.is_relative_to(inside)

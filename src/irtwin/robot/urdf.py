@@ -102,8 +102,8 @@ def _check_inertia(link: Element, where: str) -> None:
 
 def _shapes(link: Element, kind: str, materials: dict[str | None, Element], source: str) -> tuple[Shape, ...]:
     where = f'{source}: {kind} of link "{link.get("name")}"'
-    found = (_shape(element, materials, where) for element in link.findall(kind))
-    return tuple(shape for shape in found if shape is not None)
+    shapes = (_shape(element, materials, where) for element in link.findall(kind))
+    return tuple(shape for shape in shapes if shape is not None)
 
 
 def _shape(visual: Element, materials: dict[str | None, Element], where: str) -> Shape | None:

@@ -47,9 +47,9 @@ def _root(content: bytes) -> _Element:
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         start = parser.CurrentByteIndex
-        found = _TAG.match(content, start)
-        assert found is not None  # the parser has seen it whole
-        element = _Element(tag, attributes, start, found.end())
+        tag_text = _TAG.match(content, start)
+        assert tag_text is not None  # the parser has seen it whole
+        element = _Element(tag, attributes, start, tag_text.end())
         open_ones[-1].children.append(element)
         open_ones.append(element)
 

@@ -31,7 +31,7 @@ def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Descri
     Raises InputError where a shape of it cannot be read.
     """
     structure = structure_of(robot)
-    found = packaged or {}
+    meshes = packaged or {}
     moving = ros_joints(robot)
     joints = _fixed(structure, moving) | moving
     links = ros_names((body.name for body in structure.bodies), "link")
@@ -40,7 +40,7 @@ def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Descri
     renamed = Structure(
         tuple(_body(body, links) for body in structure.bodies),
         tuple(_connection(one, joints, links, limits.get(one.name)) for one in structure.connections),
-        tuple(_solid(solid, links, found) for solid in structure.solids),
+        tuple(_solid(solid, links, meshes) for solid in structure.solids),
     )
     moved = [_limited(replace(joint, name=joints[joint.name])) for joint in robot.joints]
     text = urdf_text(name, renamed, moved)
@@ -53,7 +53,7 @@ def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Descri
     )
     changed = [("robot", {robot.name: name}), ("joint", joints), ("link", links)]
     said = [f'{what} "{old}" is {new} in ROS' for what, names in changed for old, new in names.items() if old != new]
-    return Described(again, renamed, text, (*said, *_changes(robot), *_meshes(structure, found)))
+    return Described(again, renamed, text, (*said, *_changes(robot), *_meshes(structure, meshes)))
 
 
 def _fixed(structure: Structure, moving: dict[str, str]) -> dict[str, str]:

@@ -37,10 +37,10 @@ def export_package(out: Path, location: Location, robot: str | None) -> list[str
     """
     with open_graph(location) as graph:
         iri = robot_named(graph, robot)
-        found = robot_of_graph(graph, iri)
+        described = robot_of_graph(graph, iri)
         copies = mesh_copies_of_graph(graph, iri, partial(read_document, location.folder))
-    found = _as_identified(found, location)
-    return write_package(found, out, {name: copy.content for name, copy in copies.items()})
+    described = _as_identified(described, location)
+    return write_package(described, out, {name: copy.content for name, copy in copies.items()})
 
 
 def export_bag(out: Path, location: Location, run: str, robot: str | None) -> None:
@@ -69,12 +69,12 @@ def _run(place: Workspace, name: str, robot_id: str | None) -> schema.Run:
     with place.reading() as session:
         runs = list(session.scalars(select(schema.Run).order_by(schema.Run.run_id)))
     of_robot = [run for run in runs if robot_id in (None, run.robot_id)]
-    found = [run for run in of_robot if run.name == name]
-    if not found:
+    named = [run for run in of_robot if run.name == name]
+    if not named:
         near = get_close_matches(name, {run.name for run in of_robot}, 1, 0.0)
         hint = f'the nearest is "{near[0]}"' if near else "it has none; run a data set first"
         raise InputError(f'{place.folder}: no run "{name}" here; {hint}')
-    if len(found) > 1:
-        owners = ", ".join(run.robot_id for run in found[:10])
+    if len(named) > 1:
+        owners = ", ".join(run.robot_id for run in named[:10])
         raise InputError(f'{place.folder}: several robots have a run "{name}": {owners}; say which by --robot')
-    return found[0]
+    return named[0]

@@ -102,11 +102,11 @@ def _chain(robot: Robot) -> list[str]:
     """Return the moving joints from the base to the flange."""
     model = robot.model
     at = flange_frame(robot).parentJoint
-    found: list[str] = []
+    links: list[str] = []
     while at > 0:
-        found.append(model.names[at])
+        links.append(model.names[at])
         at = model.parents[at]
-    return found[::-1]
+    return links[::-1]
 
 
 def _unchecked(model: CollisionModel, robot: Robot) -> list[str]:

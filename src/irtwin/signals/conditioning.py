@@ -115,15 +115,15 @@ def _standing(q: np.ndarray, logged: np.ndarray, rate: float) -> np.ndarray:
     They are watched for as long as a joint at `STANDSTILL` takes for a step of its encoder, by the positions (M, n) as
     `logged`: between two steps, slow motion looks like rest.
     """
-    found = np.zeros(q.shape, dtype=bool)
+    standing = np.zeros(q.shape, dtype=bool)
     for joint, positions in enumerate(q.T):
         half = round(_step(logged[:, joint]) / STANDSTILL * rate / 2) + 1
         lowest, highest = (
             extreme(positions, 2 * half + 1, mode="nearest")
             for extreme in (scipy.ndimage.minimum_filter1d, scipy.ndimage.maximum_filter1d)
         )
-        found[:, joint] = highest - lowest < STANDSTILL * 2 * half / rate
-    return found
+        standing[:, joint] = highest - lowest < STANDSTILL * 2 * half / rate
+    return standing
 
 
 def _step(positions: np.ndarray) -> float:

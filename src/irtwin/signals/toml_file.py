@@ -55,8 +55,8 @@ class TomlTable:
     def near_misses(self, known: Sequence[str], share: float = _VERY_NEAR) -> list[tuple[str, str]]:
         """Return the keys that are nearly one of these, and not said otherwise, each with that one."""
         others = [key for key in known if key not in self.values]
-        found = ((key, difflib.get_close_matches(key, others, 1, share)) for key in self.values if key not in known)
-        return [(key, near[0]) for key, near in found if near]
+        matches = ((key, difflib.get_close_matches(key, others, 1, share)) for key in self.values if key not in known)
+        return [(key, near[0]) for key, near in matches if near]
 
     def _misspelt(self, key: str, known: Sequence[str]) -> InputError:
         hint = f"did you mean {known[0]}?" if len(known) == 1 else f"it may have {', '.join(known)}"

@@ -76,10 +76,10 @@ def unit_of(text: str, quantities: tuple[str, ...]) -> Unit | None:
 
 @cache
 def _spellings(si: str) -> dict[str, Unit]:
-    found: dict[str, Unit] = {}
+    spellings: dict[str, Unit] = {}
     for unit, (name, _, others) in zip(units(si), _TABLE[si], strict=True):
-        found |= {_spelt(spelling): unit for spelling in (name, *others.split())}
-    return found
+        spellings |= {_spelt(spelling): unit for spelling in (name, *others.split())}
+    return spellings
 
 
 def _spelt(text: str) -> str:

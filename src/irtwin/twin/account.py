@@ -76,12 +76,12 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
 def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.ndarray:
     """Return the (E, E) covariance of the ledger's E energies, J^2, of a twin that has one of its parameters."""
     slopes = _slopes(twin, motion, ledger)
-    found = np.asarray(slopes @ twin.covariance @ slopes.T)
+    covariance = np.asarray(slopes @ twin.covariance @ slopes.T)
     if twin.remainder:  # what lasts of it looks like what is drawn at rest
         at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
         lasting = twin.remainder.energy(float(motion.time[-1] - motion.time[0]))
-        found += np.diag([lasting**2 if entry.effect in at_rest else 0.0 for entry in ledger])
-    return found
+        covariance += np.diag([lasting**2 if entry.effect in at_rest else 0.0 for entry in ledger])
+    return covariance
 
 
 def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[list[int]]:

@@ -64,12 +64,12 @@ def _place(effect: Effect, form: str) -> str | None:
 def _numbers(twin: Twin) -> dict[str, dict[str, float]]:
     """Return what MJCF calls a joint's numbers, by joint."""
     standing = {effect.id: effect.in_mjcf for effect in twin.standing}
-    found: dict[str, dict[str, float]] = {}
+    numbers: dict[str, dict[str, float]] = {}
     for one in twin.parameters:
         name = standing.get(one.effect, {}).get(one.name)
         if name is not None and one.joint is not None:
-            found.setdefault(one.joint, {})[name] = one.value
-    return found
+            numbers.setdefault(one.joint, {})[name] = one.value
+    return numbers
 
 
 def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Inertia]:
@@ -77,7 +77,7 @@ def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Ine
 
     A body stands at the link that its joint moves, less what is fixed to that; all where the rest is not consistent.
     """
-    found: dict[str, pin.Inertia] = {}
+    bodies: dict[str, pin.Inertia] = {}
     ids = {effect.id for effect in twin.standing if effect.bodies}
     own = [parameter.value for parameter in twin.parameters if parameter.effect in ids]
     moved = {one.name: one.child for one in structure.connections}
@@ -94,18 +94,18 @@ def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Ine
         rest = values - sum((one.toDynamicParameters() for one in fixed.values()), np.zeros(10))
         if not consistent(rest[None])[0]:
             rest = values
-            found |= dict.fromkeys(fixed, pin.Inertia.Zero())
-        found[moved[joint]] = pin.Inertia.FromDynamicParameters(rest)
-    return found
+            bodies |= dict.fromkeys(fixed, pin.Inertia.Zero())
+        bodies[moved[joint]] = pin.Inertia.FromDynamicParameters(rest)
+    return bodies
 
 
 def _fixed(robot: Robot, structure: Structure, joint: int, moved: str) -> dict[str, pin.Inertia]:
     """Return the bodies of links that are fixed to the one that a joint moves, in that one's frame."""
-    found = {}
+    inertias = {}
     for link in structure.bodies:
         frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
         if frame.parentJoint == joint and link.name != moved and link.mass:
             xx, yy, zz, xy, xz, yz = link.inertia or (0.0,) * 6
             moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            found[link.name] = frame.placement.act(pin.Inertia(link.mass, np.array(link.com), moments))
-    return found
+            inertias[link.name] = frame.placement.act(pin.Inertia(link.mass, np.array(link.com), moments))
+    return inertias

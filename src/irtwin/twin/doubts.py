@@ -47,9 +47,9 @@ def _of_description(twin: Twin) -> Iterator[str]:
 
 def _of_data_sheet(twin: Twin) -> Iterator[str]:
     """Yield numbers of drives that the runs deny."""
-    found = {(one.effect, one.joint, one.name): one for one in twin.parameters if not one.link}
+    parameters = {(one.effect, one.joint, one.name): one for one in twin.parameters if not one.link}
     for effect, term in (*twin.stack.torque_terms, *twin.stack.power_terms):
-        one = found.get((effect.id, term.joint, term.name))
+        one = parameters.get((effect.id, term.joint, term.name))
         if one is None or one.joint is None or one.lower is None or one.upper is None or term.expected <= 0:
             continue
         if one.upper * _OTHER_UNITS < term.expected or one.lower > _OTHER_UNITS * term.expected:

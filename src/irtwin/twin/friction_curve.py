@@ -43,7 +43,7 @@ def friction_curves(twin: Twin, motions: Sequence[Motion], role: str) -> tuple[F
     torque = columns @ np.array([twin.parameters[k].value for k in own])
     width = NORMAL * np.sqrt(np.einsum("gjk,kl,gjl->gj", columns, twin.covariance[np.ix_(own, own)], columns).clip(0))
     residual = np.concatenate([_residual(twin, motion) for motion in motions])
-    found = []
+    curves = []
     for k, joint in enumerate(twin.robot.joints):
         numbers = _numbers(twin, {effect.id for effect in laws}, joint.name)
         if not numbers or fastest[k] - slowest[k] < _MOVED:
@@ -61,8 +61,8 @@ def friction_curves(twin: Twin, motions: Sequence[Motion], role: str) -> tuple[F
             numbers=numbers,
             measured=_binned(speeds[:, k], shown, _signed(_BINS, 2, slowest[k], fastest[k])),
         )
-        found.append(curve)
-    return tuple(found)
+        curves.append(curve)
+    return tuple(curves)
 
 
 def _signed(steps: int, power: int, slowest: np.ndarray, fastest: np.ndarray) -> np.ndarray:
@@ -88,13 +88,13 @@ def _columns(twin: Twin, laws: Sequence[Effect], motions: Sequence[Motion], grid
         temperature=np.tile(np.concatenate(known), (every, 1)) if len(known) == len(states) else None,
     )
     load = np.tile(_load(twin, states), (every, 1)) if any(effect.needs for effect in laws) else np.zeros_like(probe.q)
-    found = []
+    parts = []
     for effect in laws:
         columns = effect.columns(twin.robot, probe, Predicted(load))
         if effect.stage == 0:
             load = load + columns @ [twin.value(effect.id, term) for term in effect.terms(twin.robot)]
-        found.append(columns.reshape(every, shape[0], shape[1], -1).mean(axis=1))
-    return np.concatenate(found, axis=2)
+        parts.append(columns.reshape(every, shape[0], shape[1], -1).mean(axis=1))
+    return np.concatenate(parts, axis=2)
 
 
 def _load(twin: Twin, states: Sequence[Motion]) -> np.ndarray:

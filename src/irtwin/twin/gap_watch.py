@@ -141,6 +141,6 @@ def residuals(stretch: WatchedStretch) -> tuple[np.ndarray, np.ndarray]:
 def band(windows: np.ndarray) -> np.ndarray:
     """Return the band of each column of root mean squares (M, k); NaN where there are none."""
     known = ~np.isnan(windows).all(axis=0)
-    found = np.full(windows.shape[1], np.nan)
-    found[known] = np.nanquantile(windows[:, known], _SELDOM, axis=0)
-    return found
+    widest = np.full(windows.shape[1], np.nan)
+    widest[known] = np.nanquantile(windows[:, known], _SELDOM, axis=0)
+    return widest

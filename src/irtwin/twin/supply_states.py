@@ -42,14 +42,14 @@ def supply_states(twin: Twin, motion: Motion) -> tuple[SupplyState, ...]:
         off = motion.power < _OFF * _at_rest(twin)
     on = twin.stack.drives_on(motion)
     closed = still & (np.zeros_like(still) if on is None else on == 0)
-    found = {"off": off, "moving": ~still, "brakes closed": closed, "drives on at rest": still}
-    return tuple(_states(twin, motion, found))
+    states = {"off": off, "moving": ~still, "brakes closed": closed, "drives on at rest": still}
+    return tuple(_states(twin, motion, states))
 
 
-def _states(twin: Twin, motion: Motion, found: dict[str, np.ndarray]) -> Iterator[SupplyState]:
+def _states(twin: Twin, motion: Motion, states: dict[str, np.ndarray]) -> Iterator[SupplyState]:
     """Yield each state where none before it holds."""
     weights, left = trapezoid(motion.time), np.ones(len(motion.time), dtype=bool)
-    for name, where in found.items():
+    for name, where in states.items():
         own = np.where(where & left, weights, 0.0)
         left &= ~where
         if seconds := float(own.sum()):

@@ -64,8 +64,8 @@ class FittedTorqueScale:
 
     def widened(self, one: Quantity) -> Quantity:
         """Return a quantity with the scale in its interval; one that does not go with torque as it is."""
-        found = self.interval(one.value, one.unit, one.lower, one.upper)
-        return one if found is None else replace(one, lower=found[0], upper=found[1])
+        ends = self.interval(one.value, one.unit, one.lower, one.upper)
+        return one if ends is None else replace(one, lower=ends[0], upper=ends[1])
 
 
 def torque_degree(unit: str) -> int:
@@ -160,6 +160,6 @@ def _slope(
         blocks = accumulate(motions, equations, pattern)
     except InputError:  # nothing is left of runs that only brake
         return None
-    found = estimate(blocks, pattern, terms)
-    half = float(half_widths(found.covariance, np.array([term.spread for term in terms]), found.blocks)[0])
-    return (float(found.values[0]), half) if np.isfinite(half) else None
+    fitted = estimate(blocks, pattern, terms)
+    half = float(half_widths(fitted.covariance, np.array([term.spread for term in terms]), fitted.blocks)[0])
+    return (float(fitted.values[0]), half) if np.isfinite(half) else None

@@ -58,12 +58,12 @@ class Case:
     @cached_property
     def modelled(self) -> frozenset[tuple[str, str | None]]:
         """Each effect that the twin has, with each joint at which it has it; None: of the whole robot, or known."""
-        found = set()
+        modelled = set()
         for one in self.stack.effects:
             terms = one.terms(self.robot)
             known = all(term.fixed for term in terms)  # as a candidate, it has one coefficient for all
-            found |= {(one.id, None if known else place_of(term)) for term in terms}
-        return frozenset(found)
+            modelled |= {(one.id, None if known else place_of(term)) for term in terms}
+        return frozenset(modelled)
 
     @property
     def observed(self) -> frozenset[str]:
@@ -137,13 +137,13 @@ class Case:
         It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
         Where it turns over another speed in these, both turns are nobody's.
         """
-        found = self.robot
+        robot = self.robot
         for motions in (self.seen, self.others):
             if motions:
                 turned = with_friction_near_zero(self.robot, motions, self.effects)
-                both = zip(found.joints, turned.joints, strict=True)
-                found = replace(found, joints=tuple(_turned(own, one) for own, one in both))
-        return replace(self, robot=found)
+                both = zip(robot.joints, turned.joints, strict=True)
+                robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
+        return replace(self, robot=robot)
 
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""

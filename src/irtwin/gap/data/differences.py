@@ -54,12 +54,12 @@ def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data) -
     `motions`: each run's, by name, filtered alike.
     """
     role = {run.name: run.role for run in runs if run.role != "simulated"}
-    found = [
+    pairs = [
         _laid(motions[run.repeat_of], motions[run.name], limits)
         for run in runs
         if run.repeat_of and run.name in role and role.get(run.repeat_of) == run.role
     ]
-    return [pair for pair in found if pair is not None]
+    return [pair for pair in pairs if pair is not None]
 
 
 def _laid(first: Motion, second: Motion, limits: Data) -> Pair | None:

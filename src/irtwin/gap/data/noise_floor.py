@@ -163,17 +163,17 @@ def shaken(
     tell none. So many runs as make `_ENOUGH` samples, if there are; the middle of one that has more.
     """
     random = np.random.default_rng(0)
-    found: list[tuple[Motion, Motion]] = []
+    pairs: list[tuple[Motion, Motion]] = []
     missing = _ENOUGH
     for run in (run for run in runs if run.role == "observed"):
         motion = motions[run.name]
         again = _shaken(run, motion, robot, limits, random)
         if again is not None:
-            found.append((_middle(motion, missing), _middle(again, missing)))
+            pairs.append((_middle(motion, missing), _middle(again, missing)))
             missing -= len(motion.time)
         if missing <= 0:
             break
-    return tuple(found)
+    return tuple(pairs)
 
 
 def _middle(motion: Motion, samples: int) -> Motion:

@@ -82,6 +82,6 @@ def _refitted(system: System, total: Moments, start: np.ndarray) -> np.ndarray:
     free = np.setdiff1d(np.arange(system.base), bodies[:-_OF_BODY])
     products = total.of(free)
     right = products[:, -1] - products[:, : len(start)] @ start
-    found = start.copy()
-    found[free] += solved(factored(products[:, free], system.prior()[np.ix_(free, free)]), right)
-    return found
+    coefficients = start.copy()
+    coefficients[free] += solved(factored(products[:, free], system.prior()[np.ix_(free, free)]), right)
+    return coefficients

@@ -73,9 +73,9 @@ class Apart:
 
     def held_out(self) -> HeldOut:
         """Return the squares of each observed group left out, counted so."""
-        found = held_out(self.system, self.plain.noise_before, self.noise, self.chosen, self.plain)
-        rows = np.asarray(sum(found.rows[:, half] for half in self.system.halves))
-        return HeldOut(self.counted(found.before), self.counted(found.after), rows)
+        apart = held_out(self.system, self.plain.noise_before, self.noise, self.chosen, self.plain)
+        rows = np.asarray(sum(apart.rows[:, half] for half in self.system.halves))
+        return HeldOut(self.counted(apart.before), self.counted(apart.after), rows)
 
 
 def spread(system: System, floor: np.ndarray) -> float | None:

@@ -83,8 +83,8 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     return finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
 
 
-def _causes_of_torque(found: Attribution) -> list[FoundCause]:
-    return [cause for cause in found.causes if cause.variants[0].effect.signal == "torque"]
+def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:
+    return [cause for cause in attribution.causes if cause.variants[0].effect.signal == "torque"]
 
 
 def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:

@@ -27,11 +27,11 @@ def untestable(
     """Return the effects that the data cannot show: nothing measures them, or the twin imitates them."""
     motions = tuple(motions)
     visible: dict[str, tuple[float, float]] = {}
-    least = {name: limits.visible(len(found.hypotheses)) for name, found in channels}
-    for _, found in channels:
-        for k, hypothesis in enumerate(found.hypotheses):
+    least = {name: limits.visible(len(attribution.hypotheses)) for name, attribution in channels}
+    for _, attribution in channels:
+        for k, hypothesis in enumerate(attribution.hypotheses):
             name = hypothesis.effect
-            visible[name] = max(visible.get(name, (0.0, 0.0)), tuple(found.visible[k].tolist()))
+            visible[name] = max(visible.get(name, (0.0, 0.0)), tuple(attribution.visible[k].tolist()))
     whys = {}
     for effect in known:
         if effect.id in inside:

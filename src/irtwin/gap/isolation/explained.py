@@ -118,8 +118,8 @@ def floor_left(case: Case, floor: Floor, explained: Explained, power_of: PowerOf
     motions = {run: explained.off(motion, power_of) for run, motion in case.motions.items()}
     left = noise_floor(case.runs, motions, case.thresholds.data)
     before = _together(floor)
-    found = replace(floor, torque=_least(floor.torque, left.torque), power=_least(floor.power, left.power))
-    return found if (_together(found) < _LOWER * before).any() else floor
+    lower = replace(floor, torque=_least(floor.torque, left.torque), power=_least(floor.power, left.power))
+    return lower if (_together(lower) < _LOWER * before).any() else floor
 
 
 def _least(before: Any, after: Any) -> Any:

@@ -149,8 +149,8 @@ def find(
     `plain` as a finding's.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    found = attributed(case, system, floor, without)
-    return finding_of(name, places, case.observed, system, found, floor, seed, plain)
+    attribution = attributed(case, system, floor, without)
+    return finding_of(name, places, case.observed, system, attribution, floor, seed, plain)
 
 
 def finding_of(
@@ -158,24 +158,24 @@ def finding_of(
     places: tuple[str | None, ...],
     observed: frozenset[str],
     system: System,
-    found: Attribution,
+    attribution: Attribution,
     floor: np.ndarray | None,
     seed: int,
     plain: System | None = None,
     beside: BesidePower | None = None,
 ) -> ChannelFinding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
-    chosen = [k for cause in found.causes for k in cause.columns]
+    chosen = [k for cause in attribution.causes for k in cause.columns]
     alone, inside = system.with_columns(chosen)
-    judged = held_out(alone, (plain or alone).noise_before, found.noise, inside, plain)
-    apart = Apart.of(plain or system, system, [cause.columns for cause in found.causes])
+    judged = held_out(alone, (plain or alone).noise_before, attribution.noise, inside, plain)
+    apart = Apart.of(plain or system, system, [cause.columns for cause in attribution.causes])
     fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
     return ChannelFinding(
         name,
         places,
         observed,
         system,
-        found,
+        attribution,
         apart,
         judged,
         apart.held_out(),
@@ -194,11 +194,11 @@ def attributed(
     candidates = _hypotheses(case, system, without)
     apart = system.by_speed
     level = floor if floor is None or apart is system else np.tile(floor, 2)
-    found = attribute(apart, candidates, case.thresholds.criterion, level)
+    attribution = attribute(apart, candidates, case.thresholds.criterion, level)
     if apart is system:
-        return found
-    alone, chosen = system.with_columns([k for cause in found.causes for k in cause.columns])
-    return replace(found, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before)))
+        return attribution
+    alone, chosen = system.with_columns([k for cause in attribution.causes for k in cause.columns])
+    return replace(attribution, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before)))
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
@@ -214,12 +214,12 @@ def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypot
 
     What a simulator and the robot both have, and the twin lacks, is no difference between them.
     """
-    found = []
+    candidates = []
     if not (system.both and case.against == "simulated"):
-        found += hypotheses(system.columns, system.base, MISSING, inside=_inside(case, system))
+        candidates += hypotheses(system.columns, system.base, MISSING, inside=_inside(case, system))
     if system.both:
-        found += hypotheses(system.columns, system.changed, CHANGED)
-    return [one for one in found if not {one.effect, (one.effect, one.joint)} & without]
+        candidates += hypotheses(system.columns, system.changed, CHANGED)
+    return [one for one in candidates if not {one.effect, (one.effect, one.joint)} & without]
 
 
 def quantities(robot: Robot, finding: ChannelFinding, one: FoundCause) -> list[Quantity]:
@@ -229,9 +229,9 @@ def quantities(robot: Robot, finding: ChannelFinding, one: FoundCause) -> list[Q
 
 def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: int) -> list[Quantity]:
     """Return the parameters of one of a cause's variants, by its number."""
-    found, used, variant = finding.estimate, finding.used, one.variants[number]
+    estimate, used, variant = finding.estimate, finding.used, one.variants[number]
     known = {
-        (effect.id, term.joint, term.name): float(found.values[k])
+        (effect.id, term.joint, term.name): float(estimate.values[k])
         for k, (effect, term) in enumerate(finding.system.terms)
         if term.link is None
     }
@@ -239,15 +239,15 @@ def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: i
     joint = place_of(variant.terms[0])
     effect = variant.effect.on(joint) if joint is not None and len(one.joints) > 0 else variant.effect
     if len(effect.terms(robot)) != len(places):
-        return [_coefficient(term, found, place) for term, place in zip(variant.terms, places, strict=True)]
-    given = Coefficients(found.values[places], found.covariance[np.ix_(places, places)], known)
+        return [_coefficient(term, estimate, place) for term, place in zip(variant.terms, places, strict=True)]
+    given = Coefficients(estimate.values[places], estimate.covariance[np.ix_(places, places)], known)
     stated = effect.parameters(robot, given)
     return [each for each in stated if np.isfinite(each.value)]
 
 
-def _coefficient(term: Term, found: Estimate, place: int) -> Quantity:
-    deviation = float(np.sqrt(max(found.covariance[place, place], 0.0)))
-    return quantity(term.name, term.joint, float(found.values[place]), term.unit, deviation)
+def _coefficient(term: Term, estimate: Estimate, place: int) -> Quantity:
+    deviation = float(np.sqrt(max(estimate.covariance[place, place], 0.0)))
+    return quantity(term.name, term.joint, float(estimate.values[place]), term.unit, deviation)
 
 
 @dataclass(frozen=True)
@@ -262,21 +262,21 @@ class Branch:
 
 def branches(finding: ChannelFinding) -> tuple[Branch, ...]:
     """Return the branches of a channel, that which closes most first; its causes are in that order too."""
-    found = [
+    of_channel = [
         Branch(_family(causes[0]), causes[0].scope, _by_size(finding, causes), finding.closing(causes))
         for causes in joined(finding.causes)
     ]
-    return tuple(sorted(found, key=lambda one: -one.closing.size))
+    return tuple(sorted(of_channel, key=lambda one: -one.closing.size))
 
 
 def joined(causes: Sequence[FoundCause]) -> list[list[FoundCause]]:
     """Return causes by family and scope, those with a joint in common together; of the whole robot, all."""
-    found: list[list[FoundCause]] = []
+    together: list[list[FoundCause]] = []
     for cause in causes:
-        near = [one for one in found if any(_near(cause, other) for other in one)]
-        found = [one for one in found if one not in near]
-        found.append([*(other for one in near for other in one), cause])
-    return found
+        near = [one for one in together if any(_near(cause, other) for other in one)]
+        together = [one for one in together if one not in near]
+        together.append([*(other for one in near for other in one), cause])
+    return together
 
 
 def _near(one: FoundCause, other: FoundCause) -> bool:

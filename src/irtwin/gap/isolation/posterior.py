@@ -44,9 +44,9 @@ class HypothesisPrior:
         joints = {one.joint for one in candidates if one.joint}
         return cls(len({(one.effect, one.scope) for one in candidates}), max(len(joints), 1))
 
-    def log_odds(self, one: Hypothesis, found: Sequence[Hypothesis]) -> float:
+    def log_odds(self, one: Hypothesis, structure: Sequence[Hypothesis]) -> float:
         """Return the log odds of a hypothesis beside those that were found."""
-        count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in found) if one.joint else 0
+        count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in structure) if one.joint else 0
         if count:  # sets of so many joints are as likely as one another
             return float(np.log((count + 1) / (2 * max(self.joints - count, 1))))
         return -float(np.log(self.effects * (self.joints if one.joint else 1)))
@@ -70,7 +70,7 @@ class Posterior:
     def beside(
         cls,
         projection: Projection,
-        found: Sequence[tuple[Hypothesis, Variant]],
+        structure: Sequence[tuple[Hypothesis, Variant]],
         candidates: Sequence[Hypothesis],
         prior: HypothesisPrior,
         limits: Criterion,
@@ -79,8 +79,8 @@ class Posterior:
         """Try candidates beside what was found, everything refitted; `misfit` (g,) is as of `_Search`."""
         variants = [variant for one in candidates for variant in one.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
-        chosen = [k for _, variant in found for k in variant.columns]
-        known = [one for one, _ in found]
+        chosen = [k for _, variant in structure for k in variant.columns]
+        known = [one for one, _ in structure]
         odds = [prior.log_odds(one, known) - np.log(len(one.variants)) for one in candidates]
         screened = [one.effect.screened for one in variants]
         log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)
@@ -179,7 +179,7 @@ class Posterior:
 
         They are off what is expected by one of `_SIZES`, each as likely. Variants of one count are solved at once.
         """
-        seen, found = self.evidence, np.zeros(len(places))
+        seen, paid = self.evidence, np.zeros(len(places))
         counts = np.array([len(seen.values[place]) for place in places], dtype=int)
         sizes = np.array(_SIZES)[:, None]
         for count in np.unique(counts):
@@ -192,8 +192,8 @@ class Posterior:
             room = 1 + sizes[..., None] ** 2 * known
             missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
             each = 0.5 * np.log(room).sum(axis=-1) + self._explaining(missed, 1.0, count)
-            found[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
-        return found
+            paid[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
+        return paid
 
     @cached_property
     def _shapes(self) -> list[np.ndarray]:

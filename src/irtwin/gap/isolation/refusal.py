@@ -87,9 +87,9 @@ def _below_nothing(finding: ChannelFinding, variant: Variant, place: int) -> str
     before = [k for k, (e, t) in enumerate(system.terms) if (e.id, t.joint, t.link, t.name) == key and e.runs is None]
     if not before or not np.isfinite(term.lowest):
         return None
-    pair, found = [before[0], used.index(variant.columns[place])], finding.estimate
-    total = float(found.values[pair].sum())
-    half = NORMAL * float(np.sqrt(max(found.covariance[np.ix_(pair, pair)].sum(), 0.0)))
+    pair, estimate = [before[0], used.index(variant.columns[place])], finding.estimate
+    total = float(estimate.values[pair].sum())
+    half = NORMAL * float(np.sqrt(max(estimate.covariance[np.ix_(pair, pair)].sum(), 0.0)))
     if total + half >= term.lowest:
         return None
     left = Quantity(term.name, term.joint, total, term.unit, total - half, total + half)

@@ -21,7 +21,7 @@ _HOPELESS = -4.0  # log odds: what has less is not tried further
 _KEPT = 2  # projections, each by another noise: a look by what is left, and one back
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
-Found = tuple[Hypothesis, Variant]
+Member = tuple[Hypothesis, Variant]
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,17 @@ def attribute(
     before = search.beside((), noise)
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = search.projection(noise).visible(shapes)
-    found, noise = search.settled(*search.pruned(*search.forward(before, noise)))
-    found, noise = search.pruned(*search.paired(found, noise))
-    after = search.beside(found, noise)
+    structure, noise = search.settled(*search.pruned(*search.forward(before, noise)))
+    structure, noise = search.pruned(*search.paired(structure, noise))
+    after = search.beside(structure, noise)
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
     beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
-    return Attribution(search.causes(found, noise), noise, tuple(candidates), visible, beside)
+    return Attribution(search.causes(structure, noise), noise, tuple(candidates), visible, beside)
 
 
 def judged(
     system: System,
-    found: Sequence[Hypothesis],
+    structure: Sequence[Hypothesis],
     candidates: Sequence[Hypothesis],
     limits: Criterion,
     floor: np.ndarray | None,
@@ -75,7 +75,7 @@ def judged(
     floor, noise: (g,) RMS, 0 or None where unknown, and what the structure leaves.
     """
     search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
-    return search.causes([(one, one.variants[0]) for one in found], noise)
+    return search.causes([(one, one.variants[0]) for one in structure], noise)
 
 
 @dataclass(frozen=True)
@@ -91,39 +91,43 @@ class _Search:
     leaves: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
     projections: dict[bytes, Projection] = field(default_factory=dict)  # by the noise of the last looks
 
-    def beside(self, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+    def beside(self, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
         """Try what may stand beside a structure, once; equations are weighed by `noise` (g,)."""
-        asked = np.sort(_columns(found)).tobytes(), noise.tobytes()
+        asked = np.sort(_columns(structure)).tobytes(), noise.tobytes()
         if asked not in self.tried:
-            self.tried[asked] = self._beside(found, noise)
+            self.tried[asked] = self._beside(structure, noise)
         return self.tried[asked]
 
-    def instead(self, one: Found, found: Sequence[Found], noise: np.ndarray) -> Posterior:
+    def instead(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
         """Try what may stand in the place of one hypothesis of a structure, beside the others."""
-        rest = [each for each in found if each is not one]
-        return self._beside(rest, noise, [other for other in self.candidates if overlap(other, one[0])])
+        rest = [other for other in structure if other is not member]
+        return self._beside(rest, noise, [candidate for candidate in self.candidates if overlap(candidate, member[0])])
 
-    def _beside(self, found: Sequence[Found], noise: np.ndarray, some: Sequence[Hypothesis] | None = None) -> Posterior:
+    def _beside(
+        self, structure: Sequence[Member], noise: np.ndarray, some: Sequence[Hypothesis] | None = None
+    ) -> Posterior:
         """Try all candidates, or some of them."""
-        taken = set(_columns(found))
+        taken = set(_columns(structure))
         left = [
-            one
-            for one in (self.candidates if some is None else some)
-            if not any(set(variant.columns) & taken for variant in one.variants)
-            and not any(_same_place(one, each) for each, _ in found)
+            candidate
+            for candidate in (self.candidates if some is None else some)
+            if not any(set(variant.columns) & taken for variant in candidate.variants)
+            and not any(_same_place(candidate, member) for member, _ in structure)
         ]
-        return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
+        return Posterior.beside(self.projection(noise), structure, left, self.prior, self.limits, self.misfit(noise))
 
     def projection(self, noise: np.ndarray) -> Projection:
         """Return what the twin leaves of all variants by `noise`; most looks are by that of the two looks before."""
         asked = noise.tobytes()
-        found = self.projections.pop(asked, None)
+        projection = self.projections.pop(asked, None)
         if len(self.projections) == _KEPT:
             del self.projections[next(iter(self.projections))]
-        if found is None:
-            found = Projection(self.system, noise, [shape for one in self.candidates for shape in one.variants])
-        self.projections[asked] = found
-        return found
+        if projection is None:
+            projection = Projection(
+                self.system, noise, [shape for candidate in self.candidates for shape in candidate.variants]
+            )
+        self.projections[asked] = projection
+        return projection
 
     def misfit(self, noise: np.ndarray) -> np.ndarray:
         """Return (g,) the misfit along any effect, squared, as a part of the mean square that is left, `noise`.
@@ -132,106 +136,106 @@ class _Search:
         """
         limits, floor = self.limits, np.zeros_like(noise) if self.floor is None else self.floor
         unexplained = 1 - np.minimum((1 + limits.excess) * (floor / noise) ** 2, 1.0)
-        found = limits.misfit**2 + limits.misfit_unexplained**2 * unexplained
+        misfit = limits.misfit**2 + limits.misfit_unexplained**2 * unexplained
         fast = noise[self.system.halves[0]]
         for half in self.system.halves[1:]:
-            found[half] += 1 - np.minimum(fast / noise[half], 1.0) ** 2
-        return np.asarray(found)
+            misfit[half] += 1 - np.minimum(fast / noise[half], 1.0) ** 2
+        return np.asarray(misfit)
 
-    def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+    def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Add what explains most while that is not hopeless; return it and what it leaves, (g,).
 
         Two effects of one joint hide each other: neither is likely until both are there.
         """
-        found: list[Found] = []
+        structure: list[Member] = []
         for _ in track(range(_MOST), f"{len(self.candidates)} hypotheses tried for the next cause"):
-            if (new := self.likely(posterior, found, noise, _HOPELESS)) is None:
+            if (member := self.likely(posterior, structure, noise, _HOPELESS)) is None:
                 break
-            found.append(new)
-            noise = self.left(found, noise)
-            posterior = self.beside(found, noise)
-        return found, noise
+            structure.append(member)
+            noise = self.left(structure, noise)
+            posterior = self.beside(structure, noise)
+        return structure, noise
 
     def likely(
-        self, posterior: Posterior, found: Sequence[Found], noise: np.ndarray, least: float = 0.0
-    ) -> Found | None:
+        self, posterior: Posterior, structure: Sequence[Member], noise: np.ndarray, least: float = 0.0
+    ) -> Member | None:
         """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
         All are judged by what the first leaves: noise that holds its own effect would hide it. Where that is hopeless,
         what explains less may be likely. What the data speak against is not tried.
         """
         for first, enough in zip(posterior.promising(least), (least, 0.0), strict=False):
-            new = posterior.hypotheses[first], posterior.variant(first)
-            judged = self.beside(found, self.left([*found, new], noise))
-            place = judged.likeliest_at(new[0])
+            member = posterior.hypotheses[first], posterior.variant(first)
+            judged = self.beside(structure, self.left([*structure, member], noise))
+            place = judged.likeliest_at(member[0])
             if judged.log_odds[place] > max(enough, judged.log_prior[place]):
                 return judged.hypotheses[place], judged.variant(place)
         return None
 
-    def pruned(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+    def pruned(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Drop what is less likely than nothing beside the others, the least likely first."""
-        while found:
-            odds = [self.odds(one, found, noise) for one in track(found, "whether each cause is needed")]
+        while structure:
+            odds = [self.odds(member, structure, noise) for member in track(structure, "whether each cause is needed")]
             worst = int(np.argmin(odds))
             if odds[worst] > 0:
                 break
-            found = [*found[:worst], *found[worst + 1 :]]
-            noise = self.left(found, noise)
-        return found, noise
+            structure = [*structure[:worst], *structure[worst + 1 :]]
+            noise = self.left(structure, noise)
+        return structure, noise
 
-    def odds(self, one: Found, found: Sequence[Found], noise: np.ndarray) -> float:
+    def odds(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> float:
         """Return the log odds of one hypothesis of a structure beside the others."""
-        posterior = self.instead(one, found, noise)
-        return float(posterior.log_odds[_index(posterior, one[0])])
+        posterior = self.instead(member, structure, noise)
+        return float(posterior.log_odds[_index(posterior, member[0])])
 
-    def settled(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+    def settled(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
         for _ in range(_SWEEPS):
-            before = list(found)
-            for one in track(before, "each cause taken out and looked for anew"):
-                rest = [each for each in found if each is not one]
-                new = self.likely(self.beside(rest, noise), rest, noise)
-                found = rest if new is None else [*rest, new]
-            if sorted(_columns(found)) == sorted(_columns(before)):
+            before = list(structure)
+            for member in track(before, "each cause taken out and looked for anew"):
+                rest = [other for other in structure if other is not member]
+                instead = self.likely(self.beside(rest, noise), rest, noise)
+                structure = rest if instead is None else [*rest, instead]
+            if sorted(_columns(structure)) == sorted(_columns(before)):
                 break
-            noise = self.left(found, noise)
-            if {_place(one) for one, _ in found} == {_place(one) for one, _ in before}:
+            noise = self.left(structure, noise)
+            if {_place(member) for member, _ in structure} == {_place(member) for member, _ in before}:
                 break
-        return found, noise
+        return structure, noise
 
-    def paired(self, found: list[Found], noise: np.ndarray) -> tuple[list[Found], np.ndarray]:
+    def paired(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
         for _ in range(_SWEEPS):
-            pairs = [(a, b) for a, b in combinations(found, 2) if a[0].joint and _where(a[0]) == _where(b[0])]
+            pairs = [(a, b) for a, b in combinations(structure, 2) if a[0].joint and _where(a[0]) == _where(b[0])]
             for one, other in track(pairs, "two causes of one joint looked for anew"):
-                rest = [each for each in found if each is not one and each is not other]
+                rest = [each for each in structure if each is not one and each is not other]
                 pair = self.likeliest_pair(rest, noise, one[0])
                 if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
                     break
             else:
                 break
-            found = [*rest, *pair]
-            found, noise = self.settled(found, self.left(found, noise))
-        return found, noise
+            structure = [*rest, *pair]
+            structure, noise = self.settled(structure, self.left(structure, noise))
+        return structure, noise
 
-    def likeliest_pair(self, rest: Sequence[Found], noise: np.ndarray, like: Hypothesis) -> list[Found]:
+    def likeliest_pair(self, rest: Sequence[Member], noise: np.ndarray, like: Hypothesis) -> list[Member]:
         """Return the two likeliest hypotheses at the place of one, beside the rest of a structure.
 
         As in `Posterior.weights` each pair is judged by what it leaves of what the best explains.
         """
-        pairs: list[list[Found]] = []
+        pairs: list[list[Member]] = []
         explained, costs, scales = [], [], []
         there = [one for one in self.candidates if _where(one) == _where(like)]
         alone = self._beside(rest, noise, there)
         firsts = [(hypothesis, alone.variant(place)) for place, hypothesis in enumerate(alone.hypotheses)]
         self.projection(noise).prepare(_columns(firsts))
-        for first, found in enumerate(firsts):
-            beside = self._beside([*rest, found], noise, there)
+        for place, first in enumerate(firsts):
+            beside = self._beside([*rest, first], noise, there)
             second = next(beside.promising(-np.inf), None)
             if second is not None:
-                pairs.append([found, (beside.hypotheses[second], beside.variant(second))])
-                explained.append(alone.explained(first) + beside.explained(second))
-                costs.append(alone.cost(first) + beside.cost(second))
+                pairs.append([first, (beside.hypotheses[second], beside.variant(second))])
+                explained.append(alone.explained(place) + beside.explained(second))
+                costs.append(alone.cost(place) + beside.cost(second))
                 scales.append(beside.scale(second))
         if not pairs:
             return []
@@ -240,30 +244,32 @@ class _Search:
         count = self.limits.certainty + len(_columns(pairs[best]))
         return pairs[int(np.argmax(-0.5 * count * behind - costs))]
 
-    def left(self, found: Sequence[Found], noise: np.ndarray) -> np.ndarray:
+    def left(self, structure: Sequence[Member], noise: np.ndarray) -> np.ndarray:
         """Return what a structure leaves of each equation, (g,) RMS; `noise` weighs the equations.
 
         Whichever way a structure was come by, it is the same to the last digit, and so are looks by it.
         """
-        asked = tuple(sorted(_columns(found))), noise.tobytes()
+        asked = tuple(sorted(_columns(structure))), noise.tobytes()
         if asked not in self.leaves:
             self.leaves[asked] = self.system.residual_rms(asked[0], noise)
         return self.leaves[asked]
 
-    def causes(self, found: Sequence[Found], noise: np.ndarray) -> tuple[FoundCause, ...]:
+    def causes(self, structure: Sequence[Member], noise: np.ndarray) -> tuple[FoundCause, ...]:
         """Join what was found of one effect and scope into causes, and rank them by what they explain."""
         parts: dict[tuple[str, str], list[FoundCause]] = {}
-        for one in track(found, "what could be in each cause's place"):
-            parts.setdefault((one[0].effect, one[0].scope), []).append(_cause(one, self.instead(one, found, noise)))
+        for member in track(structure, "what could be in each cause's place"):
+            parts.setdefault((member[0].effect, member[0].scope), []).append(
+                _cause(member, self.instead(member, structure, noise))
+            )
         return tuple(sorted(map(_joined, parts.values()), key=lambda cause: -cause.gain))
 
 
-def _cause(found: Found, posterior: Posterior) -> FoundCause:
+def _cause(member: Member, posterior: Posterior) -> FoundCause:
     """Return one hypothesis of a structure as a cause, with what could stand in its place.
 
     What the catalogue lacks could, too: its part is no effect's.
     """
-    hypothesis, variant = found
+    hypothesis, variant = member
     own = _index(posterior, hypothesis)
     near = [k for k, one in enumerate(posterior.hypotheses) if overlap(one, hypothesis)]
     weights, none = posterior.weights(near)
@@ -304,8 +310,8 @@ def _index(posterior: Posterior, hypothesis: Hypothesis) -> int:
     return next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
 
 
-def _columns(found: Sequence[Found]) -> list[int]:
-    return [k for _, variant in found for k in variant.columns]
+def _columns(structure: Sequence[Member]) -> list[int]:
+    return [k for _, variant in structure for k in variant.columns]
 
 
 def _place(one: Hypothesis) -> tuple[str, str, str | None]:

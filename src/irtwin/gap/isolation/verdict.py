@@ -116,8 +116,8 @@ def _largest(
 
 def _excess(some: Sequence[Disturbance], finding: ChannelFinding, level: np.ndarray) -> np.ndarray:
     """Return (g,) the excess that some of what does not repeat makes in the equations of a channel."""
-    found = np.zeros(len(finding.places))
+    squares = np.zeros(len(finding.places))
     for one in some:
         if one.channel == finding.name:
-            found[finding.places.index(one.joint)] += one.size
-    return np.asarray(found / level**2)
+            squares[finding.places.index(one.joint)] += one.size
+    return np.asarray(squares / level**2)

@@ -62,10 +62,10 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
     reference = against_reference(finding)
 
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
-        found = []
+        of_runs = []
         for run in track(runs, lambda one: f"{finding.name} that is left of {one.run}"):
-            found += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
-        return found
+            of_runs += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
+        return of_runs
 
     before = traces(case.seen, fitted_values(finding, reference=reference))
     others = traces(case.others, fitted_values(finding, reference=True)) if reference else []
@@ -108,13 +108,13 @@ def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] 
     `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
     """
     channel, place = leaving or (None, None)
-    found = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
+    located = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
 
     def order(pair: tuple[ChannelResidual, list[GapLocation]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
         return -gain, -max((place.excess for place in pair[1]), default=0.0)
 
-    return [place for _, own in sorted(found, key=order) for place in own]
+    return [place for _, own in sorted(located, key=order) for place in own]
 
 
 def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
@@ -152,11 +152,11 @@ def _of(trace: Trace, added: np.ndarray) -> Trace:
 
 def _added(explained: Explained, k: int, traces: Sequence[Trace]) -> list[np.ndarray]:
     """Return what a cause adds to each trace, (N, g), as a measurement would show it."""
-    cause, found = explained.finding.causes[k], []
+    cause, parts = explained.finding.causes[k], []
     for trace in traces:
         part = as_filtered(trace.motion, explained.added(cause, trace.motion))
-        found.append(part.reshape(trace.residual.shape))
-    return found
+        parts.append(part.reshape(trace.residual.shape))
+    return parts
 
 
 def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[GapLocation]:
@@ -168,7 +168,7 @@ def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[GapLo
     located = locate(
         left.finding.name,
         names,
-        [found[0] if found else None for found in best],
+        [variable[0] if variable else None for variable in best],
         left.seen,
         left.level,
         reference=left.reference,

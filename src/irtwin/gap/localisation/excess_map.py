@@ -90,13 +90,13 @@ def _maps(
     regimes: tuple[tuple[str, ...], int],
     grouping: Grouping,
 ) -> list[Map | None]:
-    found: list[Map | None] = []
+    maps: list[Map | None] = []
     start = 0
     for kind in kinds:
         own = [mask[start : start + len(kind)] for mask in masks]
-        found.append(Map(*regimes, *_sums(kind, own, grouping)) if kind else None)
+        maps.append(Map(*regimes, *_sums(kind, own, grouping)) if kind else None)
         start += len(kind)
-    return found
+    return maps
 
 
 def _sums(
@@ -124,7 +124,7 @@ def joint_regimes(
     fastest = _largest([motion.dq[:, joint] for motion in motions])
     sharpest = _largest([motion.ddq[:, joint] for motion in motions])
     heaviest = _largest([torque[:, joint] for torque in torques])
-    found = []
+    regimes = []
     for motion, torque in zip(motions, torques, strict=True):
         speed, acceleration = motion.dq[:, joint], motion.ddq[:, joint]
         standing = _standing(motion)[:, joint]
@@ -132,8 +132,8 @@ def joint_regimes(
         steady = np.abs(acceleration) < slow * sharpest
         gaining = speed * acceleration > 0
         parts = _first_true([standing, _turning(speed, standing, near), near, steady, gaining, ~gaining])
-        found.append(np.column_stack([parts, np.abs(torque[:, joint]) > heaviest / 2]))
-    return found
+        regimes.append(np.column_stack([parts, np.abs(torque[:, joint]) > heaviest / 2]))
+    return regimes
 
 
 def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], slow: float) -> list[np.ndarray]:
@@ -146,13 +146,13 @@ def robot_regimes(motions: Sequence[Motion], torques: Sequence[np.ndarray], slow
     powers = [np.sum(torque * motion.dq, axis=1) for motion, torque in zip(motions, torques, strict=True)]
     loads = [np.sum((torque / heaviest) ** 2, axis=1) for torque in torques]
     most_gain, most_power, most_load = _largest(gains), _largest(powers), _largest(loads)
-    found = []
+    regimes = []
     for motion, gain, power, load in zip(motions, gains, powers, loads, strict=True):
         standing = np.asarray(_standing(motion).all(axis=1))
         parts = _first_true([standing, np.abs(gain) < slow * most_gain, gain > 0, gain <= 0])
         moved = standing & np.logical_or.accumulate(~standing)
-        found.append(np.column_stack([parts, power < -slow * most_power, load > most_load / 2, moved]))
-    return found
+        regimes.append(np.column_stack([parts, power < -slow * most_power, load > most_load / 2, moved]))
+    return regimes
 
 
 def _largest(signals: Sequence[np.ndarray]) -> float:

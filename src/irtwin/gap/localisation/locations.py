@@ -55,9 +55,9 @@ def locate(
         named[unsure], rank[unsure] = more[unsure] > 1, (added * np.sqrt(more))[unsure]
     if leaving is not None and not named[leaving].any():
         named[leaving] = (concentration[leaving] > 1) & (share[leaving] >= LEAST_SHARE)
-    found = [(place, r) for place, r in np.argwhere(named) if seen.regimes[r] != LOADED or follows[place] in _LOADS]
+    places = [(place, r) for place, r in np.argwhere(named) if seen.regimes[r] != LOADED or follows[place] in _LOADS]
     whole = share[:, : seen.parts].sum(axis=1)
-    found.sort(key=lambda at: (not acting[at[0]], -whole[at[0]], -rank[at]))
+    places.sort(key=lambda at: (not acting[at[0]], -whole[at[0]], -rank[at]))
     return [
         GapLocation(
             channel=channel,
@@ -72,7 +72,7 @@ def locate(
             concentration=float(concentration[place, r]),
             false_discovery_rate=float(q[place, r]),
         )
-        for place, r in found
+        for place, r in places
     ]
 
 

@@ -46,22 +46,22 @@ def followed(traces: Sequence[Trace], place: int, joint: str | None) -> tuple[st
 
 def variables(traces: Sequence[Trace], joint: int | None) -> dict[str, np.ndarray]:
     """Return the operating variables of all samples by name, of a joint or (None) of the whole robot."""
-    robot, found = joint is None, {}
+    robot, by_name = joint is None, {}
     motions = [trace.motion for trace in traces]
     if robot:
-        found["mechanical_power"] = _joined([(t.torque * t.motion.dq).sum(axis=1) for t in traces])
-        found["torque_squared"] = _joined([(t.torque**2).sum(axis=1) for t in traces])
-        found["speed"] = _joined([np.abs(motion.dq).sum(axis=1) for motion in motions])
+        by_name["mechanical_power"] = _joined([(t.torque * t.motion.dq).sum(axis=1) for t in traces])
+        by_name["torque_squared"] = _joined([(t.torque**2).sum(axis=1) for t in traces])
+        by_name["speed"] = _joined([np.abs(motion.dq).sum(axis=1) for motion in motions])
     else:
-        found["angle"] = _joined([motion.q[:, joint] for motion in motions])
-        found["speed"] = _joined([motion.dq[:, joint] for motion in motions])
-        found["acceleration"] = _joined([motion.ddq[:, joint] for motion in motions])
-        found["torque"] = _joined([trace.torque[:, joint] for trace in traces])
+        by_name["angle"] = _joined([motion.q[:, joint] for motion in motions])
+        by_name["speed"] = _joined([motion.dq[:, joint] for motion in motions])
+        by_name["acceleration"] = _joined([motion.ddq[:, joint] for motion in motions])
+        by_name["torque"] = _joined([trace.torque[:, joint] for trace in traces])
     warm = [motion.temperature for motion in motions if motion.temperature is not None]
     if len(warm) == len(motions):
-        found["temperature"] = _joined([w.mean(axis=1) if robot else w[:, joint] for w in warm])
-    found["time"] = _joined([motion.time - motion.time[0] for motion in motions])
-    return found
+        by_name["temperature"] = _joined([w.mean(axis=1) if robot else w[:, joint] for w in warm])
+    by_name["time"] = _joined([motion.time - motion.time[0] for motion in motions])
+    return by_name
 
 
 def curve(

@@ -60,11 +60,11 @@ class Candidates:
         whole = motion.whole or motion
         if self._run is not whole:
             self._hold(whole)
-        found: Parts = [[np.zeros((len(motion.time), 0))] for _ in range(self._equations)]
+        equations: Parts = [[np.zeros((len(motion.time), 0))] for _ in range(self._equations)]
         for place in range(len(self._effects)):
-            for equation, own in zip(found, self._own(place, whole, motion), strict=True):
+            for equation, own in zip(equations, self._own(place, whole, motion), strict=True):
                 equation += own
-        return [side_by_side(equation) for equation in found]
+        return [side_by_side(equation) for equation in equations]
 
     def _own(self, place: int, whole: Motion, motion: Motion) -> Parts:
         """Return an effect's columns over a part of the run that is held."""

@@ -57,8 +57,8 @@ def torque_system(
     blocks = accumulate(motions, equations(), pattern, by_products=bool(effects))
     noise = shaken_products([pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern)
     known = stack.prior_rows(stack.torque_terms)
-    found = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
-    return enough(replace(found, shaken=noise))
+    system = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
+    return enough(replace(system, shaken=noise))
 
 
 def power_system(
@@ -147,10 +147,10 @@ def shaken_products(
         return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided)
 
     motions = [motion for motion, _ in pairs]
-    rows, found = np.zeros(len(pattern)), [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
+    rows, products = np.zeros(len(pattern)), [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
     for motion in motions:  # one by one: blocks of all together take many times what their products do
         for block in accumulate_any([motion], difference, pattern, by_products=True):
             rows += block.rows
-            for total, factor in zip(found, block.factors, strict=True):
+            for total, factor in zip(products, block.factors, strict=True):
                 total += factor.T @ factor
-    return tuple(total / max(count, 1.0) for total, count in zip(found, rows, strict=True))
+    return tuple(total / max(count, 1.0) for total, count in zip(products, rows, strict=True))

@@ -75,12 +75,12 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     values: list[np.ndarray] = [np.zeros(0)] * len(variants)
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
     beside = projection.beside(chosen)
-    for places, columns, found, parts in beside.batches(variants):
+    for places, columns, whole, parts in beside.batches(variants):
         own = [variants[place].columns for place in places]
         scale = system.scale[own]
         expected = np.array([[system.all_terms[k].expected for k in some] for some in own]) / scale
         lowest = np.array([_lowest(system, variants[place], known) for place in places]) / scale
-        products, right = found[..., :-1], found[..., -1]
+        products, right = whole[..., :-1], whole[..., -1]
         fit = _bounded(products + np.eye(products.shape[1]), right + expected, lowest)
         explained[places] = 2 * (fit * right).sum(axis=1) - _squares(products, fit)
         squares, measured = beside.in_parts(columns, parts, fit)

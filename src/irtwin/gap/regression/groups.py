@@ -41,9 +41,9 @@ def _stretches(blocks: Sequence[Block]) -> list[int]:
     count = {run: sum(block.run == run for block in blocks) for run in {block.run for block in blocks}}
     per_run = max(2, -(-_GROUPS // len(count)))
     seen: dict[str, int] = {}
-    found = []
+    stretches = []
     for block in blocks:
         k = seen.get(block.run, 0)
         seen[block.run] = k + 1
-        found.append(k * min(per_run, count[block.run]) // count[block.run])
-    return found
+        stretches.append(k * min(per_run, count[block.run]) // count[block.run])
+    return stretches

@@ -99,12 +99,12 @@ def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis
 
     Such a shape is `of_change`, or acts in some observed runs only, beside reference runs (`both`).
     """
-    found = []
+    inside = []
     for one in candidates:
         kept = tuple(v for v in one.variants if one.scope == CHANGED or not _of_change(v.effect, both))
         if kept:
-            found.append(replace(one, variants=kept))
-    return found
+            inside.append(replace(one, variants=kept))
+    return inside
 
 
 def _of_change(effect: Effect, both: bool) -> bool:

@@ -85,8 +85,8 @@ def joint_equations(
                 return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
 
             rows: list[Given] = [*zip(own, parts, strict=True), of_power]
-            found = rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
-            return replace(found, slow=np.pad(turning(robot, motion.dq), ((0, 0), (0, 1))))
+            of_both = rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known))
+            return replace(of_both, slow=np.pad(turning(robot, motion.dq), ((0, 0), (0, 1))))
 
         return of_part
 

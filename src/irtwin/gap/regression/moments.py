@@ -45,9 +45,9 @@ class Places:
     @cached_property
     def at(self) -> np.ndarray:
         """(D + 1,) which of its columns stands at each place, -1 for none."""
-        found = np.full(self.size, -1)
-        found[self.every] = self.own
-        return found
+        at = np.full(self.size, -1)
+        at[self.every] = self.own
+        return at
 
 
 def numbers(rows: int, columns: int) -> int:
@@ -123,19 +123,19 @@ class Moments:
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the products (r, c) of some columns with others: of mostly more columns, each one's side by side."""
-        found = np.zeros((len(columns), len(rows)))
+        sums = np.zeros((len(columns), len(rows)))
         for products, weight in self.weighed:
             down, across = products.places.at[columns], products.places.at[rows]
             here, there = np.flatnonzero(down >= 0), np.flatnonzero(across >= 0)
             own = products.among(down[here], across[there])
             own *= weight
-            if own.shape == found.shape:
-                found += own
+            if own.shape == sums.shape:
+                sums += own
             else:
-                part = found[here]  # whole rows are picked faster than numbers one by one
+                part = sums[here]  # whole rows are picked faster than numbers one by one
                 part[:, there] += own
-                found[here] = part
-        return found.T
+                sums[here] = part
+        return sums.T
 
     def of(self, rows: np.ndarray) -> np.ndarray:
         """Return the products (r, D + 1) of some columns with all."""

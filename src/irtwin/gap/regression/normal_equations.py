@@ -76,7 +76,7 @@ class System:
             replace(block, factors=tuple(f[:, some] for f, some in zip(block.factors, held, strict=True)))
             for block in self.blocks
         )
-        found = replace(
+        system = replace(
             self,
             columns=tuple(self.column(k) for k in kept),
             pattern=self.pattern[:, inside],
@@ -84,7 +84,7 @@ class System:
             shaken=None,
         )
         places = [self.base + kept.index(k) for k in own]
-        return found, [p + len(kept) * (k >= self.changed) for p, k in zip(places, chosen, strict=True)]
+        return system, [p + len(kept) * (k >= self.changed) for p, k in zip(places, chosen, strict=True)]
 
     def joined(self, other: System) -> System:
         """Return the system with the blocks of another, of the same columns, as groups of their own."""
@@ -138,11 +138,11 @@ class System:
             return np.zeros((0, len(self.pattern)), dtype=bool)
         flat, first = np.concatenate(columns), np.cumsum([0, *map(len, columns[:-1])])
         own = np.where(flat >= self.changed, flat - len(self.columns), flat)
-        found: np.ndarray = np.logical_or.reduceat(self.pattern[:, own], first, axis=1).T
+        shown: np.ndarray = np.logical_or.reduceat(self.pattern[:, own], first, axis=1).T
         if self.beside_power:
-            of_torque = found[:, : self.halves[0].stop - 1].any(axis=1, keepdims=True)
-            found[:, [half.stop - 1 for half in self.halves]] &= ~of_torque
-        return found
+            of_torque = shown[:, : self.halves[0].stop - 1].any(axis=1, keepdims=True)
+            shown[:, [half.stop - 1 for half in self.halves]] &= ~of_torque
+        return shown
 
     @property
     def groups(self) -> int:
@@ -187,10 +187,10 @@ class System:
 
     def prior(self, chosen: Sequence[int] | np.ndarray = ()) -> np.ndarray:
         """Return the products of the prior's rows of the twin's terms and c chosen columns, (K + c, K + c)."""
-        found = np.eye(self.base + len(chosen))
+        products = np.eye(self.base + len(chosen))
         if self.prior_rows is not None:
-            found[: self.base, : self.base] = self._prior_products
-        return found
+            products[: self.base, : self.base] = self._prior_products
+        return products
 
     @cached_property
     def _prior_products(self) -> np.ndarray:
@@ -222,10 +222,10 @@ class System:
     def _among_all(self, equation: int, observed: bool, products: np.ndarray) -> np.ndarray:
         """Return products with what an equation holds, (k + 1,), as those with all columns, (D + 1,)."""
         places = self._places[observed][equation]
-        found = np.zeros(self.size + 1)
-        found[places.every] = products[places.own] * self._units[places.every]
-        found[-1] -= products @ self._expected[equation]
-        return found
+        among_all = np.zeros(self.size + 1)
+        among_all[places.every] = products[places.own] * self._units[places.every]
+        among_all[-1] -= products @ self._expected[equation]
+        return among_all
 
     @cached_property
     def _products(self) -> list[list[Products]]:
@@ -316,7 +316,7 @@ class System:
 
     def products_of(self, one: np.ndarray, other: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """Return in each part the product of each column with another, (N,) indices: (P, N); weighted by `noise`."""
-        found = np.zeros((len(self.halves), self.groups, len(one)))
+        sums = np.zeros((len(self.halves), self.groups, len(one)))
         weights = np.maximum(noise, self.quietest) ** -2.0
         for equation, weight in enumerate(weights):
             half = equation // (len(weights) // len(self.halves))
@@ -325,20 +325,20 @@ class System:
                 some = np.flatnonzero((at[one] >= 0) & (at[other] >= 0))
                 held = at[one[some]], at[other[some]]
                 for group in np.flatnonzero(self.group_observed == observed):
-                    found[half, group, some] += weight * self._products[group][equation].pairs(*held)
-        return found.reshape(-1, len(one))
+                    sums[half, group, some] += weight * self._products[group][equation].pairs(*held)
+        return sums.reshape(-1, len(one))
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.
 
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
-        found = self.rms(chosen, noise, range(self.groups), range(self.groups))
-        found = np.where(self.rows.any(axis=0), found, found.max(initial=0.0))
+        left = self.rms(chosen, noise, range(self.groups), range(self.groups))
+        left = np.where(self.rows.any(axis=0), left, left.max(initial=0.0))
         if self.apart:  # few rows are fitted easily: no law is known better where friction turns
-            fast, slow = np.split(found, 2)
-            found = np.concatenate([fast, np.maximum(fast, slow)])
-        return np.asarray(np.maximum(found, self.quietest))
+            fast, slow = np.split(left, 2)
+            left = np.concatenate([fast, np.maximum(fast, slow)])
+        return np.asarray(np.maximum(left, self.quietest))
 
     @cached_property
     def noise_before(self) -> np.ndarray:

@@ -34,9 +34,9 @@ class Projection:
         keeps = len(self._moments) * self._all.size <= MOST_HELD
         self._kept: list[np.ndarray] = []  # of each part, what is asked for beside the twin's terms (A, K)
         for own in every:
-            found = own.among(base, np.append(base, self._asked))
-            inner.append(found[:, : system.base])
-            across = np.ascontiguousarray(found[:, system.base :].T)
+            products = own.among(base, np.append(base, self._asked))
+            inner.append(products[:, : system.base])
+            across = np.ascontiguousarray(products[:, system.base :].T)
             self._all += across
             self._kept += [across] if keeps else []
         self._inner = np.array(inner)  # (P, K, K)
@@ -59,22 +59,22 @@ class Projection:
         flat = [self._asked[np.concatenate([one[side].ravel() for one in pairs])] for side in (0, 1)]
         products = self.system.products_of(flat[0], flat[1], self._noise)
         ends = np.cumsum([one.size for one, _ in pairs])[:-1]
-        every = [
-            found.reshape(-1, *one.shape)
-            for found, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
+        by_part = [
+            products_of.reshape(-1, *one.shape)
+            for products_of, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
         ]
-        before = [found.sum(axis=0) for found in every]
+        before = [left.sum(axis=0) for left in by_part]
         imitated = [self._imitated[columns] for columns in each]
         for part, inner in enumerate(self._inner):
             half = self._across(part) - self._imitated @ inner / 2  # what is left is symmetric in it
-            for columns, own, found in zip(each, imitated, every, strict=True):
+            for columns, own, left in zip(each, imitated, by_part, strict=True):
                 other = half[columns]
-                found[part] -= _pairs(own[:, :-1], other) + _pairs(other[:, :-1], own)
-        for known, columns, own, whole, found in zip(sizes.values(), each, imitated, before, every, strict=True):
+                left[part] -= _pairs(own[:, :-1], other) + _pairs(other[:, :-1], own)
+        for known, columns, own, whole, left in zip(sizes.values(), each, imitated, before, by_part, strict=True):
             after = whole - _pairs(own[:, :-1], self._all[columns])
             squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, whole)), strict=True)
             self._squares |= zip(known, squares, strict=True)
-            self.products.append((dict(zip(known, range(len(known)), strict=True)), after, found))
+            self.products.append((dict(zip(known, range(len(known)), strict=True)), after, left))
 
     def _across(self, part: int, at: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Return the products (n, K) of what is asked for, at some places, with the twin's terms in a part."""
@@ -103,10 +103,10 @@ class Projection:
         at = self.at(new)
         own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
         whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
-        for part, (found, inner) in enumerate(zip(own, self._inner, strict=True)):
+        for part, (products, inner) in enumerate(zip(own, self._inner, strict=True)):
             across = self._across(part)
             left = across[at] - self._imitated[at] @ inner
-            found -= self._imitated[at] @ across.T + left @ self._imitated.T
+            products -= self._imitated[at] @ across.T + left @ self._imitated.T
         self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
 
     def beside(self, chosen: Sequence[int]) -> Beside:

@@ -69,7 +69,7 @@ def as_filtered(motion: Motion, signal: np.ndarray) -> np.ndarray:
 def without_ends(motion: Motion, residual: np.ndarray) -> np.ndarray:
     """Return a residual (N, ...) with NaN at either end of the run, where a filter knows only one side."""
     half = len(kernel(motion.rate, motion.cutoff)) // 2 if motion.cutoff else 0
-    found = residual.copy()
-    found[:half] = np.nan
-    found[len(found) - half :] = np.nan
-    return found
+    inside = residual.copy()
+    inside[:half] = np.nan
+    inside[len(inside) - half :] = np.nan
+    return inside

@@ -65,8 +65,8 @@ def disturbances(case: Case) -> list[Disturbance]:
         series, load = _of_power(by_power, runs)
         meter = 0.0 if power_noise is None else float(power_noise[0])
         channels.append(_Channel("power", None, "W", series, by_power, meter, load))
-    found = [one for each in channels for one in each.disturbances(len(channels), case.thresholds.matters)]
-    return sorted(found, key=lambda one: -one.share)
+    differing = [one for each in channels for one in each.disturbances(len(channels), case.thresholds.matters)]
+    return sorted(differing, key=lambda one: -one.share)
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,13 @@ class _Channel:
 
     def disturbances(self, tests: int, limits: Matters) -> list[Disturbance]:
         """Return what matters beside what else differs, and the noise; the channel is one of `tests`."""
-        found, left = lines(self.series, tests)
+        peaks, left = lines(self.series, tests)
         parts = [_in_band(one.left(), pair) for one, pair in zip(left, self.pairs, strict=True)]
         rest = float(np.mean(parts)) / 2
         located: list[Located] = []
         if (load := self.load) is not None:
             located.append((SWITCHING, _load(load), load.level**2 * load.duty * (1 - load.duty), 0.0, load))
-        for line in found:
+        for line in peaks:
             kind = LINE if line.purity > 0.5 else BAND
             located.append((kind, self._wave(line), line.size, line.p, line))
         located += self._slow(left, tests)
@@ -109,9 +109,9 @@ class _Channel:
 
     def _slow(self, series: Sequence[EvenSeries], tests: int) -> list[Located]:
         """Return the drift and the offset between runs; what drifts is held against the offset that it began with."""
-        found = self._most(DRIFT, f"{self.unit}/s", [slow(one)[1] for one in series], tests)
-        flat = [from_start(one) for one in series] if found else series
-        return found + self._most(OFFSET, self.unit, [slow(one)[0] for one in flat], tests)
+        drift = self._most(DRIFT, f"{self.unit}/s", [slow(one)[1] for one in series], tests)
+        flat = [from_start(one) for one in series] if drift else series
+        return drift + self._most(OFFSET, self.unit, [slow(one)[0] for one in flat], tests)
 
     def _most(self, kind: str, unit: str, each: Sequence[np.ndarray], tests: int) -> list[Located]:
         """Return the largest of some values that say more than they cost, one for either kind, channel and pair."""
@@ -151,11 +151,11 @@ def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Even
     own = {name: _of_run(runs[name], motion, by_torque) for name, motion in motions.items()}
     watched = [_watched(pair, own) for pair in pairs]
     load = switching(watched, own)
-    found = [one.difference for one in watched]
+    series = [one.difference for one in watched]
     if load is not None:
         apart = [pair.of(*(load.states[name] for name in _names(pair))) for pair in pairs]
-        found = [one.with_columns(column) for one, column in zip(found, apart, strict=True)]
-    return [creep(one, each.squares).tamed() for one, each in zip(found, watched, strict=True)], load
+        series = [one.with_columns(column) for one, column in zip(series, apart, strict=True)]
+    return [creep(one, each.squares).tamed() for one, each in zip(series, watched, strict=True)], load
 
 
 def _watched(pair: Pair, runs: Mapping[str, EvenSeries]) -> Watched:

@@ -55,9 +55,9 @@ def lines(series: Sequence[EvenSeries], tests: int) -> tuple[list[Line], list[Ev
     is told where it says more of the samples than its two coefficients cost (Schwarz): p is below one over them.
     """
     series = list(series)
-    found: list[Line] = []
+    told: list[Line] = []
     grid = _grid(series)
-    while len(grid) > 4 * _AROUND and len(found) < _MOST:
+    while len(grid) > 4 * _AROUND and len(told) < _MOST:
         power = np.array([_power(one, grid) for one in series])
         noise = np.array([_noise(each, grid) for each in power])
         stands = (power / noise).sum(axis=0)
@@ -69,8 +69,8 @@ def lines(series: Sequence[EvenSeries], tests: int) -> tuple[list[Line], list[Ev
         line, series = _line(series, grid, best, noise[:, best])
         rest = sum(float(_power(one, grid)[near].sum()) for one in series)
         purity = 1 - min(rest / float(power[:, near].sum()), 1.0)
-        found.append(Line(*line, purity, p))
-    return found, series
+        told.append(Line(*line, purity, p))
+    return told, series
 
 
 def _grid(series: Sequence[EvenSeries]) -> np.ndarray:
@@ -95,8 +95,8 @@ def _power(one: EvenSeries, grid: np.ndarray) -> np.ndarray:
         return np.asarray(np.abs(sums) ** 2)
 
     taken = transform(one.basis()).sum(axis=1) / len(window)
-    found = transform(window[:, None] * one.left()[:, None])[:, 0] / float(window @ window)
-    return np.where(taken < 1 - _FREE, found, 0.0)
+    power = transform(window[:, None] * one.left()[:, None])[:, 0] / float(window @ window)
+    return np.where(taken < 1 - _FREE, power, 0.0)
 
 
 def _noise(power: np.ndarray, grid: np.ndarray) -> np.ndarray:

@@ -48,30 +48,34 @@ class Removed:
         return float(np.mean(np.concatenate(seen) ** 2)) if seen else 0.0
 
 
-def removed(case: Case, stack: Stack, plain: System | None, found: Sequence[Disturbance]) -> tuple[Case, list[Removed]]:
+def removed(
+    case: Case, stack: Stack, plain: System | None, disturbances: Sequence[Disturbance]
+) -> tuple[Case, list[Removed]]:
     """Return the case without the disturbances that effects explain, and these; `plain`: the twin's equations."""
     effects = {effect.disturbance: effect for effect in catalogue().values() if effect.disturbance}
     taken: list[Removed] = []
     if plain is not None:
         values = twin_values(plain, plain.solution((), Summed(plain.moments(plain.noise_before))))
-        steady = [one for one in found if one.kind == LINE and one.channel == "torque"]
+        steady = [one for one in disturbances if one.kind == LINE and one.channel == "torque"]
         if steady:
             left = {motion.run: torque_residual(stack, motion, values) for motion in case.with_torque}
             for joint in dict.fromkeys(one.joint for one in steady):
                 own = [one for one in steady if one.joint == joint]
                 taken += _waves(case, effects[LINE], own, left)
-    taken += [_load(case, effects[SWITCHING], one) for one in found if one.kind == SWITCHING]
+    taken += [_load(case, effects[SWITCHING], one) for one in disturbances if one.kind == SWITCHING]
     return _without(case, taken), taken
 
 
-def _waves(case: Case, effect: Effect, found: Sequence[Disturbance], left: Mapping[str, np.ndarray]) -> list[Removed]:
+def _waves(
+    case: Case, effect: Effect, disturbances: Sequence[Disturbance], left: Mapping[str, np.ndarray]
+) -> list[Removed]:
     """Return the waves of one joint's lines, fitted to what the twin leaves of each run."""
-    joint = case.robot.index(str(found[0].joint))
-    fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [one.shape.frequency for one in found])
+    joint = case.robot.index(str(disturbances[0].joint))
+    fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [one.shape.frequency for one in disturbances])
             for m in case.with_torque}  # fmt: skip
     seen = [fit for run, fit in fits.items() if run in case.observed]
     taken = []
-    for k, one in enumerate(found):
+    for k, one in enumerate(disturbances):
         fitted = replace(effect, f=one.shape.frequency, joints=(str(one.joint),))  # type: ignore[call-arg]
         amplitude = _amplitude(one, [fit.amplitude(k) for fit in seen])
         explained, before = np.sum([fit.squares(k) for fit in seen], axis=0)

@@ -46,8 +46,8 @@ class EvenSeries:
     def coefficients(self) -> np.ndarray:
         """Return the coefficients (m,) of the columns beside it in a fit to the values."""
         scale = np.maximum(np.linalg.norm(self.beside, axis=0), 1e-300)
-        found: np.ndarray = np.linalg.lstsq(self.beside / scale, self.values, rcond=1e-8)[0] / scale
-        return found
+        coefficients: np.ndarray = np.linalg.lstsq(self.beside / scale, self.values, rcond=1e-8)[0] / scale
+        return coefficients
 
     def left(self) -> np.ndarray:
         """Return what the columns beside it leave of the values, (N,)."""

@@ -148,11 +148,11 @@ def _on(
         pays -= off / (2 * max(variance, (_LEAST * level) ** 2))
     course = _likeliest(pays, np.log(count))
     time = pair.difference.time[: count * size : size]
-    found = {}
+    states = {}
     for k, (name, at) in enumerate(((first, one.time), (second, two.time + pair.shift))):
         place = np.clip(np.searchsorted(time, at, side="right") - 1, 0, count - 1)
-        found[name] = _BOTH[course, k][place]
-    return found
+        states[name] = _BOTH[course, k][place]
+    return states
 
 
 def _bin(one: EvenSeries) -> int:

@@ -39,10 +39,10 @@ def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> Ext
         return None
     observed = track([one for one in left if one.observed], lambda one: f"contacts in {one.motion.run}")
     runs = [_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in observed]
-    found = _leader(runs)
-    if found is None:
+    leader = _leader(runs)
+    if leader is None:
         return None
-    first, clock = found
+    first, clock = leader
     _, force = first.judged(*first.samples(clock))
     members = [one for one in runs if one is first or one.explained(*one.samples(clock), force) > 0]
     return ExternalContact(*_placed(members, clock), runs=tuple(sorted(one.name for one in members)))
@@ -50,12 +50,12 @@ def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> Ext
 
 def _leader(runs: Sequence[_Run]) -> tuple[_Run, Clock] | None:
     """Return the run with the largest sudden gain, and its window."""
-    best, found = 0.0, None
+    best, leader = 0.0, None
     for run in track(runs, lambda one: f"windows of {one.name}"):
         gain = np.where(run.gain > run.throughout, run.gain, 0.0)
         if len(gain) and gain.max() > best:
-            best, found = float(gain.max()), (run, run.clock(int(np.argmax(gain))))
-    return found
+            best, leader = float(gain.max()), (run, run.clock(int(np.argmax(gain))))
+    return leader
 
 
 def _placed(members: Sequence[_Run], clock: Clock) -> Clock:

@@ -84,17 +84,17 @@ class _Parts:
         tried = [int(k) for k in np.flatnonzero(self.observed)]
         order = [tried[k] for k in np.argsort([-fold.mass(k) for k in tried])]
         splits = [np.isin(every, order[:count]) for count in range(1, len(order) + 1)]
-        found = max(splits, key=fold.gain)
-        best = fold.gain(found)
+        carrying = max(splits, key=fold.gain)
+        best = fold.gain(carrying)
         for _ in range(_SWEEPS):
-            splits = [found ^ (every == k) for k in tried]
+            splits = [carrying ^ (every == k) for k in tried]
             moved = max(splits, key=fold.gain)
             if fold.gain(moved) <= best:
                 break
-            found, best = moved, fold.gain(moved)
-        if len(tried) == len(every) and fold.values(found)[self.base] < 0:
-            return ~found
-        return found
+            carrying, best = moved, fold.gain(moved)
+        if len(tried) == len(every) and fold.values(carrying)[self.base] < 0:
+            return ~carrying
+        return carrying
 
 
 class _Fold:

@@ -23,13 +23,13 @@ def known_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[Effect]:
     """
     angles = [one.motion.q for one in left if one.observed]
     turns = np.ptp(np.concatenate(angles), axis=0) / (2 * np.pi) if angles else np.zeros(len(robot.joints))
-    found = []
+    ripples = []
     for ripple in TorqueRipple().candidates(robot):
         periods = turns * ripple.shape["N"]
         joints = tuple(name for name, many in zip(robot.joint_names, periods, strict=True) if many >= 1)
         if joints:
-            found.append(ripple.on(*joints))
-    return found
+            ripples.append(ripple.on(*joints))
+    return ripples
 
 
 def fast_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[TorqueRipple]:
@@ -38,15 +38,15 @@ def fast_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[TorqueRipple
     Slow orders are tried one by one; of the fast ones there are too many, and a line is told from its neighbours only
     as finely as the joint turns far.
     """
-    found = []
+    ripples = []
     for joint, name in track(enumerate(robot.joint_names), lambda one: f"ripples of {one[1]}"):
         parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)
         order = _clearest(angle[kept], residual[kept])
         if order is not None:
-            found.append(TorqueRipple(N=order, joints=(name,)))
-    return found
+            ripples.append(TorqueRipple(N=order, joints=(name,)))
+    return ripples
 
 
 def _clearest(angle: np.ndarray, residual: np.ndarray) -> float | None:

@@ -80,7 +80,7 @@ def each_beside_the_other(
 
     system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m.
     """
-    found: dict[Effect | None, None] = {touch: None, untold_payload(case.robot, system, noise): None}
+    tried: dict[Effect | None, None] = {touch: None, untold_payload(case.robot, system, noise): None}
     for _ in range(_TURNS):
         apart = _apart_from(system, touch)
         payload = untold_payload(case.robot, apart, noise)
@@ -88,8 +88,8 @@ def each_beside_the_other(
         if left is None:
             break
         touch = contact(case.robot, left, _rms(left, noise))
-        found |= {payload: None, touch: None}
-    return tuple(one for one in found if one is not None)
+        tried |= {payload: None, touch: None}
+    return tuple(one for one in tried if one is not None)
 
 
 def _apart_from(system: System, touch: ExternalContact | None) -> System:
