@@ -191,6 +191,11 @@ class Effect(ABC):
         """Whether a screening found its place, or its runs, among many."""
         return self.runs is not None
 
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """From when to when of a run's clock it acts, s; None: throughout."""
+        return None
+
     @abstractmethod
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return the k coefficients, in the order of the columns."""

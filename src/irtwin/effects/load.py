@@ -197,6 +197,11 @@ class ExternalContact(Effect):
     start: float = -np.inf  # s
     stop: float = np.inf  # s
 
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """From start to stop; None: throughout."""
+        return (self.start, self.stop) if np.isfinite([self.start, self.stop]).any() else None
+
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return the force along three axes."""
         return tuple(Term(f"f_{axis}", "N", spread=200.0) for axis in "xyz")

@@ -124,8 +124,7 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     def left(members: frozenset[int]) -> np.ndarray:
         chosen = [k for player in sorted(members) for k in players[player]]
         total, moments = totals[bool(members)], weighed[bool(members)]
-        every = [system.solution(chosen, total, moments[group]) for group in judged]
-        return np.array([system.squares(one, int(group)) for group, one in zip(judged, every, strict=True)])
+        return np.array([system.squares_without(chosen, total, moments[group], int(group)) for group in judged])
 
     count = len(players)
     values = np.zeros((count, len(judged), len(system.pattern)))

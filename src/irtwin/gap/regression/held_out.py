@@ -86,5 +86,4 @@ def left_out(system: System, noise: np.ndarray, chosen: Sequence[int], judged: n
     """Return the squares that a fit with the chosen columns, weighted by `noise`, leaves of each group without it."""
     moments = system.group_moments(noise)
     total, every = Summed(moments), track(judged, "how far the gap closes without a group")
-    left = [system.squares(system.solution(chosen, total, moments[group]), int(group)) for group in every]
-    return np.array(left)
+    return np.array([system.squares_without(chosen, total, moments[group], int(group)) for group in every])

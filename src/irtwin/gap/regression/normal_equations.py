@@ -371,6 +371,19 @@ class System:
         vector[inside] = solved(factored(products[:, :-1], self.prior(chosen)), products[:, -1])
         return vector
 
+    def squares_without(self, chosen: Sequence[int], total: Moments, own: Moments, group: int) -> np.ndarray:
+        """Return each equation's squares (g,) in a group by a fit without it: the total without its `own` moments.
+
+        What acts for a while, in runs of the group alone, is not foretold by the part of it that is left.
+        """
+        vector = self.solution(chosen, total, own)
+        runs = {self.blocks[k].run for k in np.flatnonzero(self.group == group)}
+        for k in chosen:
+            effect = self.column(k).effect
+            if effect.window is not None and effect.runs is not None and runs.issuperset(effect.runs):
+                vector[k] = 0.0
+        return self.squares(vector, group)
+
     def fitted(self, chosen: Sequence[int]) -> np.ndarray:
         """Return the indices of the columns that are fitted: the twin's and those chosen."""
         return np.append(np.arange(self.base), np.array(chosen, dtype=int))

@@ -69,8 +69,7 @@ def acting(variants: Sequence[Variant]) -> tuple[tuple[str, ...], tuple[float, f
     if not effects:
         return None
     runs = sorted({run for effect in effects for run in effect.runs or ()})
-    window = next(((e.shape["start"], e.shape["stop"]) for e in effects if isinstance(e, ExternalContact)), None)
-    return tuple(runs), window
+    return tuple(runs), next((effect.window for effect in effects if effect.window), None)
 
 
 def each_beside_the_other(
