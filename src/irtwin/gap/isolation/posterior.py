@@ -5,7 +5,7 @@ names. Its variance, a row, is `v = misfit^2 + disagreement / rows`, known as fr
 left is then Student's, and what explains it has a Gaussian prior. The odds of k coefficients that explain `gain` a row,
 of the information `A`, and `missed` of it where they are as expected, give or take a size s, are
 
-    prior * ((1 + gain / (certainty v)) / (1 + missed / (certainty v))) ** ((certainty + k) / 2)
+    prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) * exp(-missed / (2 v))
         / sqrt(det(1 + s^2 A / (rows v)))
 
 over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; that
@@ -191,7 +191,7 @@ class Posterior:
             known = np.maximum(squares / scale[:, None], 0.0)
             room = 1 + sizes[..., None] ** 2 * known
             missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
-            each = 0.5 * np.log(room).sum(axis=-1) + self._explaining(missed, 1.0, count)
+            each = 0.5 * (np.log(room).sum(axis=-1) + missed)
             paid[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
         return paid
 
