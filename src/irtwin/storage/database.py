@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, Inspector, Table, exists, func, inspect, select, update
+from sqlalchemy import URL, Table, exists, func, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -387,7 +387,7 @@ class Workspace:
     def _make_tables(self) -> None:
         of_packages = package_tables()
         tables = [table for table in Base.metadata.sorted_tables if table not in of_packages]
-        there = inspect(self.engine).get_table_names()
+        there = engine.columns(self.engine)
         if not any(table.name in there for table in tables):  # readers need not wait for the lock
             if self.engine.dialect.name == "sqlite":
                 _check_that_nothing_is_lost(self.folder, "its database holds no tables")
@@ -395,25 +395,24 @@ class Workspace:
                 Base.metadata.create_all(session.connection())
                 stamp(session.connection())
         migrate(self.engine)
-        inspector = inspect(self.engine)
+        there = engine.columns(self.engine)
         for table in tables:
-            if not inspector.has_table(table.name):
+            if table.name not in there:
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is missing, damaged or of another irtwin "
                     f"version; {_FROM_A_BACKUP}"
                 )
-            if not _is_of_now(inspector, table):
+            if not _is_of_now(table, there):
                 raise InputError(
                     f"{engine.shown(self.engine.url)}: table {table.name} is of another irtwin version; "
                     "choose a new workspace and ingest again"
                 )
-        self._make_tables_of_packages(of_packages)
+        self._make_tables_of_packages(of_packages, there)
 
-    def _make_tables_of_packages(self, tables: Sequence[Table]) -> None:
+    def _make_tables_of_packages(self, tables: Sequence[Table], there: Mapping[str, set[str]]) -> None:
         """Make the tables that are not there, and anew those of another version: providers can fill them again."""
-        inspector = inspect(self.engine)
-        other = [table for table in tables if inspector.has_table(table.name) and not _is_of_now(inspector, table)]
-        if other or not all(inspector.has_table(table.name) for table in tables):
+        other = [table for table in tables if table.name in there and not _is_of_now(table, there)]
+        if other or not all(table.name in there for table in tables):
             with self._writing() as session:
                 Base.metadata.drop_all(session.connection(), other)
                 Base.metadata.create_all(session.connection(), list(tables))
@@ -424,8 +423,8 @@ def _told(run: Run) -> str:
     return PLANNED if run.kind == PLANNED_RUN else MEASURED
 
 
-def _is_of_now(inspector: Inspector, table: Table) -> bool:
-    return {column["name"] for column in inspector.get_columns(table.name)} == set(table.columns.keys())
+def _is_of_now(table: Table, there: Mapping[str, set[str]]) -> bool:
+    return there[table.name] == set(table.columns.keys())
 
 
 def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine import URL, ExceptionContext
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError, OperationalError
 from sqlalchemy.orm import Session
@@ -82,6 +82,20 @@ def shown(url: URL) -> str:
     """Return a URL as messages may show it: without a password, which may stand among its parameters too."""
     secret = {name: "***" for name in url.query if any(word in name.lower() for word in _SECRETS)}
     return url.update_query_dict(secret).render_as_string(hide_password=True)
+
+
+def columns(engine: Engine) -> dict[str, set[str]]:
+    """Return the names of each table's columns."""
+    with engine.connect() as connection:
+        if engine.dialect.name != "sqlite":
+            of_each = inspect(connection).get_multi_columns()
+            return {table: {column["name"] for column in columns} for (_, table), columns in of_each.items()}
+        found: dict[str, set[str]] = {}  # by one question: reflection asks SQLite table by table
+        for table, column in connection.exec_driver_sql(
+            "SELECT t.name, c.name FROM sqlite_master AS t, pragma_table_xinfo(t.name) AS c WHERE t.type = 'table'"
+        ):
+            found.setdefault(table, set()).add(column)
+        return found
 
 
 @contextmanager

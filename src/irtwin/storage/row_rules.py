@@ -53,8 +53,7 @@ def check_row(table: Table, row: Mapping[str, Any]) -> None:
 
 def check_rows(connection: Connection, where: str) -> None:
     """Raise InputError, which begins with `where`, for the first row of a database that irtwin would not write."""
-    there = inspect(connection).get_table_names()
-    for table in (table for table in Base.metadata.sorted_tables if table.name in there):
+    for table in _filled(connection):
         try:
             for row in connection.execute(select(table).execution_options(yield_per=1000)).mappings():
                 check_row(table, dict(row))
@@ -63,6 +62,15 @@ def check_rows(connection: Connection, where: str) -> None:
     if connection.dialect.name == "sqlite":  # which another program may open without asking for foreign keys
         for name, _, parent, _ in connection.exec_driver_sql("PRAGMA foreign_key_check"):
             raise _changed(where, name, f"it refers to no row of {parent}")
+
+
+def _filled(connection: Connection) -> list[Table]:
+    """Return the tables that have rows, by one question: to ask 69 for theirs takes a tenth of a second."""
+    there = inspect(connection).get_table_names()
+    tables = [table for table in Base.metadata.sorted_tables if table.name in there]
+    names = map(connection.dialect.identifier_preparer.format_table, tables)
+    asked = (f"SELECT {at} WHERE EXISTS (SELECT * FROM {name})" for at, name in enumerate(names))
+    return [tables[at] for (at,) in connection.exec_driver_sql(" UNION ALL ".join(asked))]
 
 
 def _changed(where: str, table: str, how: str) -> InputError:

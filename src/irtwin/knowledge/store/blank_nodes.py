@@ -29,7 +29,11 @@ def named_by_content(triples: Iterable[Triple], content: bytes) -> Iterator[Trip
             return Triple(*map(named, term))  # type: ignore[arg-type]
         return names.setdefault(term, BlankNode(f"f{file}n{len(names)}")) if isinstance(term, BlankNode) else term
 
-    return (cast(Triple, named(triple)) for triple in triples)
+    may_be_blank = (BlankNode, Triple)
+    return (
+        cast(Triple, named(it)) if isinstance(it.subject, may_be_blank) or isinstance(it.object, may_be_blank) else it
+        for it in triples
+    )
 
 
 def named_below(quads: Iterable[Quad], place: str) -> set[Quad]:
