@@ -21,7 +21,10 @@ from sqlalchemy import create_engine, text
 _CHROMIUM = (
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-gpu-rasterization",  # a card that is played takes longer for it
 )  # fmt: skip
+
+MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 
 settings.register_profile("untimed", deadline=None)  # speed is measured in bench/
 settings.load_profile("untimed")
@@ -48,24 +51,47 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(scope="session")
-def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the `data` of a robot "Arm" and the `workspace` that `irtwin run` made of it; who writes, copies.
-
-    It takes seconds, so that one process makes it for all.
-    """
-    from tests.data_sets import irtwin  # which brings physics: few tests need it
-    from tests.small_robots import data_set
-
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """Give a function that has a folder filled, and returns it: one process does so for all. Who writes, copies."""
     base = tmp_path_factory.getbasetemp()
     shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    with (shared / "small_run.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (shared / "small_run").exists():
-            folder = Path(tempfile.mkdtemp(dir=base))
-            done = irtwin("run", data_set(folder / "data", "Arm"), "--workspace", folder / "workspace")
-            assert done.status == 0, done.err
-            folder.rename(shared / "small_run")
-    return shared / "small_run"
+
+    def made(name: str, fill: Callable[[Path], object]) -> Path:
+        with (shared / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (shared / name).exists():
+                folder = Path(tempfile.mkdtemp(dir=base))
+                fill(folder)
+                folder.rename(shared / name)
+        return shared / name
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def small_run(made_once: MadeOnce) -> Path:
+    """The `data` of a robot "Arm" and the `workspace` that `irtwin run` made of it, in a folder; who writes, copies."""
+
+    def fill(folder: Path) -> None:
+        from tests.data_sets import irtwin  # which brings physics: few tests need it
+        from tests.small_robots import data_set
+
+        done = irtwin("run", data_set(folder / "data", "Arm"), "--workspace", folder / "workspace")
+        assert done.status == 0, done.err
+
+    return made_once("small_run", fill)
+
+
+@pytest.fixture(scope="session")
+def plant_place(made_once: MadeOnce) -> Path:
+    """The workspace of `tests/plants.py`, with a tariff, concluded; who writes, copies."""
+
+    def fill(folder: Path) -> None:
+        from tests.plants import make_plant
+
+        make_plant(folder)
+
+    return made_once("plant", fill)
 
 
 def _server_programs() -> Path | None:

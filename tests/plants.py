@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, parse, serialize
+from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import update
 from sqlalchemy.orm import Session
 
@@ -17,15 +17,11 @@ from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from tests import small_fleet
 
+TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 HOSTILE = "=1+1\"><script>alert('x')</script>"
 
 
 PLACE = "https://w3id.org/irtwin/id/place/Hall_Käfer"  # an individual whose IRI has a letter beyond ASCII
-
-
-def fill(graph: KnowledgeGraph, place: Path, copies: int = 1) -> None:
-    """Fill a graph with so many times four robots, whose rows are in the workspace `place`."""
-    tell(graph, robots(place), copies)
 
 
 def robots(place: Path) -> list[Quad]:
@@ -43,18 +39,14 @@ def robots(place: Path) -> list[Quad]:
     return [*quads, label]
 
 
-def tell(graph: KnowledgeGraph, quads: list[Quad], copies: int) -> None:
-    """Tell a graph the ontology, so many copies of the quads, and what it concludes."""
-    graph.load_ontology()
-    graph.replace((quad for number in range(copies) for quad in _renamed(quads, number)), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    reason(graph)
-
-
-def make_plant(place: Path, copies: int = 1) -> Path:
-    """Make a workspace's graph of so many times four robots, and return its folder."""
+def make_plant(place: Path) -> Path:
+    """Make a workspace of four robots, with a tariff and a graph that was reasoned over; return the graph's folder."""
+    (place / "plant.toml").write_text(TARIFF, encoding="utf-8")
     quads = robots(place)
     with KnowledgeGraph(place / "graph") as graph:
-        tell(graph, quads, copies)
+        graph.load_ontology()
+        graph.replace(quads, GRAPH_SOURCE, GRAPH_ACTIVITY)
+        reason(graph)
     return place / "graph"
 
 
@@ -63,11 +55,3 @@ def make_empty_plant(place: Path) -> Path:
     with KnowledgeGraph(place / "graph") as graph:
         graph.load_ontology()
     return place / "graph"
-
-
-def _renamed(quads: list[Quad], number: int) -> list[Quad]:
-    if number == 0:
-        return quads
-    text = serialize(quads, format=RdfFormat.N_QUADS)
-    assert text is not None
-    return list(parse(text.replace(b"Arm_", f"Arm_{number}_".encode()), format=RdfFormat.N_QUADS))

@@ -22,15 +22,20 @@ def faults(page: Any, *parts: str, rules: tuple[str, ...] = ()) -> list[tuple[st
 
 def narrow_and_dark(page: Any) -> list[tuple[str, list[Any]]]:
     """Make a page that `faults` has read narrow and dark; return what is wrong with it now."""
-    page.set_viewport_size({"width": 400, "height": 900})
-    page.emulate_media(color_scheme="dark")
-    wrong: list[tuple[str, list[Any]]] = [] if is_dark(page) else [("light", [])]
+    return on_screen(page, 400, "dark")
+
+
+def on_screen(page: Any, width: int, scheme: str) -> list[tuple[str, list[Any]]]:
+    """Show a page that `faults` has read on another screen; return what is wrong with it there."""
+    page.set_viewport_size({"width": width, "height": 900})
+    page.emulate_media(color_scheme=scheme)
+    wrong: list[tuple[str, list[Any]]] = [] if is_dark(page) == (scheme == "dark") else [("not", [scheme])]
     for _ in range(20):  # plots follow the window a moment later
-        if (width := page.evaluate("document.documentElement.scrollWidth")) == 400:
+        if (wide := page.evaluate("document.documentElement.scrollWidth")) == width:
             break
         page.wait_for_timeout(100)
     else:
-        wrong.append(("wide", [width]))
+        wrong.append(("wide", [wide]))
     return wrong + faults(page, rules=OF_THE_SCREEN)
 
 

@@ -26,6 +26,8 @@ from irtwin.storage.schema import Run
 from tests import small_fleet
 from tests.data_sets import irtwin
 
+pytestmark = pytest.mark.slow
+
 RUN = "https://w3id.org/irtwin/id/run/Arm_A.check_1"
 PAYLOAD = f"SELECT ?kg {{ <{RUN}> irt:Payload ?kg }}"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests import plants
 
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import reason
@@ -14,10 +13,9 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    place: Path = tmp_path_factory.mktemp("plant")
-    graph = KnowledgeGraph()
-    plants.fill(graph, place)
+def graph(plant_place: Path) -> KnowledgeGraph:
+    graph = KnowledgeGraph(workspace=plant_place)
+    graph.replace(KnowledgeGraph.as_it_stands(plant_place / "graph").quads(), "")
     before = set(map(str, validate(graph)))
     graph.update(
         "INSERT DATA { id:saving_action\\/Arm_C\\/check_gear_oil\\/j1 a irt:Saving_Action ; irt:Done_On '2026-03-02' ; "

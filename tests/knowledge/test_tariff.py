@@ -14,16 +14,11 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import term
 
 KWH = 3.6e6
-SAID = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 
 
 @pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    place = tmp_path_factory.mktemp("plant")
-    (place / "plant.toml").write_text(SAID, encoding="utf-8")
-    graph = KnowledgeGraph(workspace=place)
-    plants.fill(graph, place)
-    return graph
+def graph(plant_place: Path) -> KnowledgeGraph:
+    return KnowledgeGraph.as_it_stands(plant_place / "graph")
 
 
 def of(graph: KnowledgeGraph, subject: str, name: str) -> object:

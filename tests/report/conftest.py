@@ -5,13 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests import plants
 from tests.report.robots import Factory, PageOf
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import render
-
-TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 
 
 @pytest.fixture
@@ -34,10 +31,6 @@ def page_of(graph: KnowledgeGraph, tmp_path: Path) -> PageOf:
 
 
 @pytest.fixture(scope="session")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
+def plant(plant_place: Path) -> KnowledgeGraph:
     """A graph of four robots, for the pages of a plant."""
-    place = tmp_path_factory.mktemp("plant")
-    (place / "plant.toml").write_text(TARIFF, encoding="utf-8")
-    graph = KnowledgeGraph(workspace=place)
-    plants.fill(graph, place)
-    return graph
+    return KnowledgeGraph.as_it_stands(plant_place / "graph")

@@ -8,7 +8,7 @@ import pytest
 from basyx.aas import model
 from basyx.aas.adapter.aasx import AASXReader, DictSupplementaryFileContainer
 from basyx.aas.adapter.json import read_aas_json_file
-from tests.plants import HOSTILE, make_plant
+from tests.plants import HOSTILE
 
 from irtwin.errors import InputError
 from irtwin.location import Location
@@ -16,11 +16,8 @@ from irtwin.report.aas import export_shell
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> Location:
-    folder = tmp_path_factory.mktemp("plant")
-    (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\n')
-    make_plant(folder)
-    return Location.of(folder)
+def plant(plant_place: Path) -> Location:
+    return Location.of(plant_place)
 
 
 def element(submodel: model.Submodel, *path: str | int) -> object:

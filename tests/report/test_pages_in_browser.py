@@ -10,14 +10,13 @@ from pyoxigraph import Literal, NamedNode, Quad
 from tests import gap_cases
 from tests.gap_pages import page_of as gap_page
 from tests.report.robots import PageOf, six_axis
-from tests.screens import OF_THE_SCREEN, faults, is_dark, narrow_and_dark
+from tests.screens import faults, is_dark, narrow_and_dark, on_screen
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
 from irtwin.report.ontology.page import write_page
 
 pytestmark = pytest.mark.system
-SCREENS = [(1440, "light", ()), (400, "dark", OF_THE_SCREEN)]  # with the rules by which each is read, all on the first
 LARGEST = 3_000_000  # bytes of a report
 
 
@@ -41,43 +40,48 @@ def energy(graph: KnowledgeGraph, page_of: PageOf, tmp_path: Path) -> Path:
 
 def test_the_energy_page(browser: Any, energy: Path) -> None:
     assert energy.stat().st_size < LARGEST
-    for width, scheme, rules in SCREENS:
-        page = opened(browser, energy, width, scheme)
-        page.wait_for_selector("#figure-torque .scatterlayer .trace")
-        assert is_dark(page) == (scheme == "dark")
-        assert page.evaluate("document.documentElement.scrollWidth") == width
-        assert faults(page, rules=rules) == [], (width, scheme)
-        cut = "all => all.filter(it => it.offsetWidth > it.closest('.table').clientWidth).map(it => it.innerText)"
-        assert page.eval_on_selector_all(".table caption", cut) == []
-        buttons = page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
-        assert set(buttons) == {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
-        names = page.locator("#figure-torque .legendtext").all_text_contents()
-        assert names == ["measured", "modelled", "measured less modelled"]
-        banner = page.locator("#contradiction")
-        banner.scroll_into_view_if_needed()
-        assert banner.is_visible()
-        assert banner.inner_text().startswith(
-            "What is said of this robot contradicts itself: prp-fp: two values of irt:IR_Weight, <50>"
-        )
-        page.emulate_media(media="print", color_scheme=scheme)
-        page.evaluate("dispatchEvent(new Event('beforeprint'))")
-        assert not page.locator(".modebar").first.is_visible() and not is_dark(page)
-        paper = page.locator("#figure-torque .main-svg").first.evaluate("one => one.style.background")
-        assert "255, 255, 255" in paper
-        page.context.close()
+    page = opened(browser, energy, 1440, "light")
+    page.wait_for_selector("#figure-torque .scatterlayer .trace")
+    assert not is_dark(page)
+    assert page.evaluate("document.documentElement.scrollWidth") == 1440
+    assert faults(page) == []
+    buttons = page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
+    assert set(buttons) == {"Download plot as a PNG", "Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"}
+    names = page.locator("#figure-torque .legendtext").all_text_contents()
+    assert names == ["measured", "modelled", "measured less modelled"]
+    captions_and_banner_are_seen(page)
+    assert narrow_and_dark(page) == []
+    captions_and_banner_are_seen(page)
+    page.emulate_media(media="print", color_scheme="dark")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert not page.locator(".modebar").first.is_visible() and not is_dark(page)
+    paper = page.locator("#figure-torque .main-svg").first.evaluate("one => one.style.background")
+    assert "255, 255, 255" in paper
+    page.context.close()
+
+
+def captions_and_banner_are_seen(page: Any) -> None:
+    cut = "all => all.filter(it => it.offsetWidth > it.closest('.table').clientWidth).map(it => it.innerText)"
+    assert page.eval_on_selector_all(".table caption", cut) == []
+    banner = page.locator("#contradiction")
+    banner.scroll_into_view_if_needed()
+    assert banner.is_visible()
+    assert banner.inner_text().startswith(
+        "What is said of this robot contradicts itself: prp-fp: two values of irt:IR_Weight, <50>"
+    )
 
 
 def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
     gap_page(tmp_path, gap_cases.diagnosis("ambiguous"))
     file = tmp_path / "p.html"
     assert file.stat().st_size < LARGEST
-    for width, scheme, rules in SCREENS:
-        page = opened(browser, file, width, scheme)
-        page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
-        assert is_dark(page) == (scheme == "dark")
-        assert page.evaluate("document.documentElement.scrollWidth") == width
-        assert faults(page, rules=rules) == [], (width, scheme)
-        page.context.close()
+    page = opened(browser, file, 400, "dark")
+    page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
+    assert is_dark(page)
+    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    assert faults(page) == []
+    assert on_screen(page, 1440, "light") == []
+    page.context.close()
 
 
 def test_the_page_of_the_ontology(browser: Any, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -10,7 +11,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.endpoint import Server, make_graph, serving
-from tests.plants import make_plant
 
 
 @pytest.fixture(scope="session")
@@ -33,18 +33,16 @@ def start() -> Callable[..., object]:
 
 
 @pytest.fixture(scope="session")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def plant(plant_place: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server of four robots, one of them with a hostile name, a tariff and reports."""
-    folder = tmp_path_factory.mktemp("plant")
-    (folder / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
-    graph = make_plant(folder)
+    folder = Path(shutil.copytree(plant_place, tmp_path_factory.mktemp("plant"), dirs_exist_ok=True))
     for run in ("fit_1", "check_1"):
         write_samples(folder / "series" / f"Arm_A.{run}")
     (folder / "reports").mkdir()
     (folder / "reports/Arm_A.html").write_text(REPORT, encoding="utf-8")
     (folder / "reports/Arm_A.gap.html").write_text(REPORT, encoding="utf-8")
     (folder / "reports/out.html").symlink_to("/etc/hostname")
-    with serving(graph, token=None) as running:
+    with serving(folder / "graph", token=None) as running:
         yield running
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import socket
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 from asyncua import ua
 from asyncua.sync import Client
 from tests.endpoint import serving
-from tests.plants import HOSTILE, make_plant
+from tests.plants import HOSTILE
 
 pytestmark = pytest.mark.slow
 
@@ -36,10 +37,11 @@ def refused(action: Any) -> str:
     return str(error.value)
 
 
-def test_robots_are_read_by_opc_ua_and_nothing_is_written(tmp_path: Path) -> None:
+def test_robots_are_read_by_opc_ua_and_nothing_is_written(plant_place: Path, tmp_path: Path) -> None:
+    graph = Path(shutil.copytree(plant_place, tmp_path / "plant")) / "graph"
     with socket.create_server(("127.0.0.1", 0)) as found:
         port = found.getsockname()[1]
-    with serving(make_plant(tmp_path), "--opcua", port, token=None), Client(f"opc.tcp://127.0.0.1:{port}") as client:
+    with serving(graph, "--opcua", port, token=None), Client(f"opc.tcp://127.0.0.1:{port}") as client:
         ends = time.monotonic() + 20.0
         while "LastGapDiagnosed" not in values(client, HOSTILE):  # the last that is made
             assert time.monotonic() < ends
@@ -59,22 +61,12 @@ def test_robots_are_read_by_opc_ua_and_nothing_is_written(tmp_path: Path) -> Non
         assert "BadUserAccessDenied" in refused(lambda: client.delete_nodes([state]))
 
 
-def test_a_port_that_is_taken_is_told_in_a_line(tmp_path: Path) -> None:
-    graph = make_plant(tmp_path)
+def test_a_port_that_is_taken_is_told_in_a_line(plant_place: Path, tmp_path: Path) -> None:
+    workspace = shutil.copytree(plant_place, tmp_path / "plant")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        command = [
-            sys.executable,
-            "-m",
-            "irtwin",
-            "serve",
-            "--port",
-            "0",
-            "--opcua",
-            str(port),
-            "--workspace",
-            graph.parent,
-        ]
+        serve = [sys.executable, "-m", "irtwin", "serve", "--workspace", workspace]
+        command = [*serve, "--port", "0", "--opcua", str(port)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].endswith(f"port {port}: Address already in use; give --opcua another")

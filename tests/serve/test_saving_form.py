@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlencode
@@ -9,7 +10,6 @@ from urllib.parse import urlencode
 import httpx
 import pytest
 from tests.endpoint import CLIENT, TOKEN, Server, serving
-from tests.plants import make_plant
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED
@@ -53,9 +53,9 @@ def test_what_is_wrong_is_a_line(said: dict[str, str], why: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def writable(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder: Path = tmp_path_factory.mktemp("writable")
-    with serving(make_plant(folder), "--timeout", 300) as running:
+def writable(plant_place: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = Path(shutil.copytree(plant_place, tmp_path_factory.mktemp("writable"), dirs_exist_ok=True))
+    with serving(folder / "graph", "--timeout", 300) as running:
         yield running
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcp import Client, StdioServerParameters, stdio_client
 from tests.endpoint import make_graph
 
 from irtwin.storage.database import Workspace
@@ -25,6 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def called(folder: Path, *calls: tuple[str, dict[str, Any]]) -> list[Any]:
     """Return what tools answer: the document, or the text of a refusal."""
+    from mcp import Client, StdioServerParameters, stdio_client  # seconds to import, for each process
 
     async def ask() -> list[Any]:
         arguments = ["-m", "irtwin", "serve", "--workspace", "w", "--timeout", "20", "--mcp"]
