@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -172,12 +173,17 @@ class KnowledgeGraph:
         With them goes a name of their content, by which a graph that is made of these already is left alone.
         """
         if not self.has_ontology:
-            triples = chain.from_iterable(map(read_turtle, self.resources.paths("ontology")))
-            version = self._ontology_version()
-            self.replace(in_graph(chain(triples, self._tariff(), [version]), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
+            modules = _read_modules(*self._modules())
+            more = in_graph(chain(self._tariff(), [self._ontology_version()]), GRAPH_ONTOLOGY)
+            self.replace(chain(modules, more), GRAPH_ONTOLOGY)
+
+    def _modules(self) -> tuple[tuple[Path, ...], bytes]:
+        """Return the files of the ontology, and their content."""
+        paths = tuple(self.resources.paths("ontology"))
+        return paths, b"".join(path.read_bytes() for path in paths)
 
     def _ontology_version(self) -> Triple:
-        digest = hashlib.sha256(b"".join(path.read_bytes() for path in self.resources.paths("ontology")))
+        digest = hashlib.sha256(self._modules()[1])
         digest.update("".join(map(str, self._tariff())).encode())
         return Triple(NamedNode(ONTOLOGY), NamedNode(f"{OWL}versionInfo"), Literal(f"sha-256:{digest.hexdigest()}"))
 
@@ -511,6 +517,12 @@ class KnowledgeGraph:
         if isinstance(self._store, SparqlServer) or self._workspace is None:
             return {}
         return series_functions(self._store, self._workspace, faults)
+
+
+@lru_cache(maxsize=1)  # a run puts them into two graphs
+def _read_modules(paths: tuple[Path, ...], content: bytes) -> tuple[Quad, ...]:
+    """Return what modules of the ontology say, which are read anew where their content is another."""
+    return tuple(in_graph(chain.from_iterable(map(read_turtle, paths)), GRAPH_ONTOLOGY))
 
 
 def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
