@@ -3,8 +3,6 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALL ?= $(BIN)/python -m pip install
-# Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
-export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test suite compiled nightly check fuzz lint mappings guide wheel ontology lock clean
 

@@ -8,6 +8,7 @@ import itertools
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -23,6 +24,10 @@ _CHROMIUM = (
     "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--disable-gpu-rasterization",  # a card that is played takes longer for it
 )  # fmt: skip
+
+# Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 
@@ -44,9 +49,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: -slow[item.path])
 
 
+def pytest_sessionstart() -> None:
+    """Look for no garbage while tests are read."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Look for garbage more seldom, and not in what was read with the tests: it is a tenth of the time."""
     gc.freeze()
+    gc.enable()
     gc.set_threshold(20_000, 10, 10)
 
 

@@ -1,6 +1,7 @@
 """The physics without a workspace: the examples of the docstrings, run."""
 
 import doctest
+import functools
 import inspect
 import json
 import subprocess
@@ -22,7 +23,8 @@ def demo(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_examples_hold(demo):
+def test_examples_hold(demo, monkeypatch):
+    monkeypatch.setattr(irtwin, "identify", functools.cache(irtwin.identify))  # two examples ask for the same twin
     result = doctest.testmod(modelling, extraglobs={"demo": demo})
     assert result.attempted > 0
     assert result.failed == 0

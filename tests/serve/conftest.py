@@ -10,13 +10,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from tests.conftest import MadeOnce
 from tests.endpoint import Server, make_graph, serving
 
 
 @pytest.fixture(scope="session")
-def new_graph(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
+def new_graph(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
     """Give a function that makes a workspace's graph: the ontology and two robots."""
-    return lambda: make_graph(tmp_path_factory.mktemp("workspace"))
+    made = made_once("two_robots", make_graph)
+    return lambda: Path(shutil.copytree(made, tmp_path_factory.mktemp("workspace"), dirs_exist_ok=True)) / "graph"
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,19 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, RowMapping, Select, Table, delete, exists, insert, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    RowMapping,
+    Select,
+    Table,
+    delete,
+    exists,
+    insert,
+    inspect,
+    select,
+    update,
+)
 from sqlalchemy.orm import Session, aliased
 
 from irtwin.errors import InputError
@@ -93,10 +105,22 @@ def insert_values(session: Session, rows: Rows) -> None:
 
 def recorded_rows(session: Session, robot_id: str) -> Rows:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
+    there = filled(session.connection())
     return {
-        table.name: [] if query is None else [dict(row) for row in session.execute(query).mappings()]
+        table.name: [dict(row) for row in session.execute(query).mappings()]
+        if query is not None and table in there
+        else []
         for table, query in _recorded(session, robot_id)
     }
+
+
+def filled(connection: Connection) -> list[Table]:
+    """Return the tables that have rows, by one question: to ask 69 for theirs takes a tenth of a second."""
+    there = inspect(connection).get_table_names()
+    tables = [table for table in Base.metadata.sorted_tables if table.name in there]
+    names = map(connection.dialect.identifier_preparer.format_table, tables)
+    asked = (f"SELECT {at} WHERE EXISTS (SELECT * FROM {name})" for at, name in enumerate(names))
+    return [tables[at] for (at,) in connection.exec_driver_sql(" UNION ALL ".join(asked))]
 
 
 def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
