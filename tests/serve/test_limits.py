@@ -118,13 +118,13 @@ def test_a_broken_off_answer_does_not_look_whole(strict) -> None:
         strict.ask(ALL_PAIRS.replace("DISTINCT ", ""))
 
 
-def test_killed_workers_are_replaced(strict) -> None:
-    before = strict.workers()
+def test_killed_workers_are_replaced(server) -> None:
+    before = server.workers()
     for worker in before:
         os.kill(worker, signal.SIGKILL)
-    answers = [strict.ask("ASK { ?s ?p ?o }") for _ in range(6)]
+    answers = [server.ask("ASK { ?s ?p ?o }") for _ in range(6)]
     assert all(answer.status_code == 200 and answer.json()["boolean"] for answer in answers)
-    assert all(settled(strict, gone=worker) for worker in before)
+    assert all(settled(server, gone=worker) for worker in before)
 
 
 def test_many_clients_at_once_get_their_own_answers(server) -> None:
