@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,8 @@ from irtwin.report.aas import export_shell
 
 
 @pytest.fixture(scope="module")
-def plant(plant_place: Path) -> Location:
-    return Location.of(plant_place)
+def plant(plant_place: Path, tmp_path_factory: pytest.TempPathFactory) -> Location:
+    return Location.of(Path(shutil.copytree(plant_place, tmp_path_factory.mktemp("aas") / "plant")))
 
 
 def element(submodel: model.Submodel, *path: str | int) -> object:
