@@ -77,10 +77,12 @@ def follow(
     place: Workspace, graph: KnowledgeGraph, assertion: Assertion, announce: Announce = lambda line: None
 ) -> None:
     """Bring the graph up to date with what is kept now."""
+    from irtwin.providers.planner import renew
     from irtwin.rewriting import conclude, map_rows
 
     if assertion.facts or assertion.withdrawn:
         map_rows(place, graph)
+        renew(place, graph, lambda: map_rows(place, graph))
         graph.change(assertion.removed, ())  # of a user's own graph that nothing is left of
         conclude(graph, announce)
 

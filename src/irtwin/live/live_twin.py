@@ -27,6 +27,7 @@ from irtwin.live.known_robots import KnownRobots
 from irtwin.live.shown import ShownRuns
 from irtwin.live.stream_clock import HOLE, StreamClock, Tick, WrongTime, jump
 from irtwin.live.watched_run import WatchedRun
+from irtwin.providers.planner import renew
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import Header, Rows, read_journal
@@ -63,7 +64,7 @@ class LiveTwin:
         self._place, self._announce, self._broadcast = place, announce, broadcast
         self._kind = kind
         self._folder = place.folder / LIVE
-        self._shown = ShownRuns(place, graph)
+        self._graph, self._shown = graph, ShownRuns(place, graph)
         self.robots = KnownRobots(place, announce)
         self.stored = self.superseded = 0
         self.waited = 0.0
@@ -363,6 +364,7 @@ class LiveTwin:
     def _refresh(self) -> None:
         """Bring the graph up to date with the database; runs that last look again what it shows of them."""
         self._shown.refresh()
+        renew(self._place, self._graph, self._shown.refresh)
         with self._showing, self._lock:
             for run in [*self._left, *self._runs.values()]:
                 run.shown = None

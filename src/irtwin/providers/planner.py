@@ -15,6 +15,8 @@ from irtwin.storage.schema import METER
 
 _READY_FOR = "https://w3id.org/irtwin/rules/ready_for"
 
+_READY_AGAIN = "https://w3id.org/irtwin/rules/ready_again"
+_RENEWED = "SELECT DISTINCT ?name { ?provider irt:renewed_by ?property ; irt:Entry_Point ?name }"
 # Who waits for what another would populate, which waits in turn for the first, or for who waits so.
 _IN_A_CIRCLE = """
 SELECT DISTINCT ?one ?needed ?other {
@@ -40,31 +42,35 @@ def populate(
 ) -> bool:
     """Run every provider on every individual that is ready for it, and on those that get so by that, once on each.
 
+    Those that read all runs of a robot come last: what others make is there then.
+
     `refresh` brings the graph up to date with the database after providers made something. Returns whether any did.
 
     A robot whose data a provider refuses is left as it is from there on, and `set_aside` is told its robot_id and why;
     without `set_aside` the InputError is raised.
     """
+    renewed = _renewed(graph)
     refused: set[str] = set()
     done: set[tuple[str, str]] = set()
     while todo := {
         name: left
         for name, subjects in ready(graph).items()
-        if (left := [one for one in subjects if (name, one) not in done and _robot_id(one) not in refused])
+        if (left := [one for one in subjects if (name, one) not in done and _robot_id(graph, one) not in refused])
     }:
         before = len(done)
-        for name, subjects in todo.items():
+        for name, subjects in ({of: todo[of] for of in todo if of not in renewed} or todo).items():
             announce(f"  {name}: {len(subjects)} individual{'s' if len(subjects) > 1 else ''}")
             for subject in subjects:
-                if _robot_id(subject) in refused:
+                robot_id = _robot_id(graph, subject)
+                if robot_id in refused:
                     continue
                 try:
                     _provide(workspace, graph, name, subject)
                 except InputError as error:
                     if set_aside is None:
                         raise
-                    refused.add(_robot_id(subject))
-                    set_aside(_robot_id(subject), error)
+                    refused.add(robot_id)
+                    set_aside(robot_id, error)
                     continue
                 done.add((name, subject))
         if len(done) > before:
@@ -72,13 +78,29 @@ def populate(
     return bool(done)
 
 
+def renew(workspace: Workspace, graph: KnowledgeGraph, refresh: Callable[[], None]) -> None:
+    """Run the providers that read all runs of a robot where one of these is new, or what a user asserts."""
+    renewed = _renewed(graph)
+    todo = {name: subjects for name, subjects in ready(graph).items() if name in renewed}
+    for name, subjects in todo.items():
+        for subject in subjects:
+            _provide(workspace, graph, name, subject)
+    if todo:
+        refresh()
+
+
 def ready(graph: KnowledgeGraph) -> dict[str, list[str]]:
     """Return the IRIs of the individuals that are ready for each provider, by its name."""
-    rule = next(rule for rule in all_rules(graph.resources) if rule.name == _READY_FOR)
+    rules = [rule for rule in all_rules(graph.resources) if rule.name in (_READY_FOR, _READY_AGAIN)]
     ready_by_provider: dict[str, list[str]] = {}
-    for triple in sorted(graph.construct(rule.construct), key=str):
+    for triple in sorted(set().union(*(graph.construct(rule.construct) for rule in rules)), key=str):
         ready_by_provider.setdefault(triple.object.value.rpartition("/")[2], []).append(triple.subject.value)  # type: ignore[union-attr]
     return dict(sorted(ready_by_provider.items()))
+
+
+def _renewed(graph: KnowledgeGraph) -> set[str]:
+    """Return the names of the providers that read all runs of a robot."""
+    return {str(row["name"]) for row in graph.query(_RENEWED)}
 
 
 def in_a_circle(graph: KnowledgeGraph) -> str | None:
@@ -97,14 +119,16 @@ def _provide(workspace: Workspace, graph: KnowledgeGraph, name: str, subject: st
     """Run a provider on one individual, and keep what it made."""
     provide, package = load_provider(name), software_of(name)
     started = datetime.now(UTC)
-    made = provide(workspace, subject.rpartition("/")[2])
     below = subject.removeprefix(graph.base)
+    kind, _, key = below.partition("/")
+    made = provide(workspace, key if kind in ("robot", "run") else below)
     worked = activity(name, made.robot_id, below, started, package)
     meter = activity(METER, made.robot_id, below, started, package)
     metered = (meter, made.metered) if made.metered else None
     workspace.replace_activity(worked, made.used, made.rows, made.series, made.documents, metered=metered)
 
 
-def _robot_id(subject: str) -> str:
-    """Return the robot that a robot's or a run's IRI is about."""
-    return subject.rpartition("/")[2].partition(".")[0]
+def _robot_id(graph: KnowledgeGraph, subject: str) -> str:
+    """Return the robot that an individual's IRI is about: robot/ID, run/ID.NAME, saving_action/ID/REMEDY."""
+    kind, _, key = subject.removeprefix(graph.base).partition("/")
+    return (key or kind).partition("/")[0].partition(".")[0]

@@ -32,7 +32,8 @@ class Made:
     metered: Sequence[str] = ()
 
 
-# A provider works on one individual, named by its key in the database: a robot_id or a run_id.
+# A provider works on one individual, named by its key in the database: a robot_id, a run_id, or of any other kind its
+# IRI below the workspace's base.
 Provider = Callable[[Workspace, str], Made]
 
 

@@ -124,7 +124,7 @@ class PlantPages:
 
     async def _actions_table(self, request: Request) -> Response:
         asked, _ = self._chosen(request)
-        known = {name: page.questions()[name] for name in ("robots", "actions", "before_and_after")}
+        known = {name: page.questions()[name] for name in ("robots", "actions")}
         answers = await self._asking.answers(request, known, {})
         return await table(request, "actions", lambda: actions.actions_sheet(actions.actions(answers, asked)))
 

@@ -408,6 +408,21 @@ class RunPrice(Made):
     saving_upper_j: Mapped[float | None]
 
 
+class SavingVerification(Made):
+    """What the runs before and after a saving action say that it saved, with a 95 % interval."""
+
+    action: Mapped[str] = mapped_column(primary_key=True)  # its whole IRI
+    robot_id: Mapped[str]
+    result: Mapped[str]  # "verified", "not verified" or "too few runs": then nothing stands in what follows the counts
+    runs_before: Mapped[int]
+    runs_after: Mapped[int]
+    compared_for: Mapped[str | None]  # "piece", "cycle" or "hour"
+    adjusted_baseline_j: Mapped[float | None]
+    saving_j: Mapped[float | None]
+    saving_lower_j: Mapped[float | None]
+    saving_upper_j: Mapped[float | None]
+
+
 class EnergyShare(Made):
     """The ledger: energy of one effect, in one joint where it has one, over a run."""
 

@@ -2,57 +2,42 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
 from dataclasses import dataclass
 
 from irtwin.report.plant.choice import ALL, Selection
 from irtwin.report.plant.energies import kwh
 from irtwin.report.plant.sheet import Sheet
-from irtwin.report.plant.verification import Verification, verification
 from irtwin.report.questions import Answers, Row
 
 
 @dataclass(frozen=True)
 class Action:
-    """A row of `actions.rq`; once it is done with what it saved, and how many others the robot had on that day."""
+    """A row of `actions.rq`, and how many others were done at the robot on that day."""
 
     row: Row
-    saved: Verification | None
     others: int
 
     @property
     def state(self) -> str:
         """What is known of it, in words."""
-        return "proposed" if self.saved is None else f"done, {self.saved.words}"
+        if not self.row["done_on"]:
+            return "proposed"
+        return f"done, {self.row['result'] or 'not verified yet'}"
 
 
 def actions(answers: Answers, asked: Selection = ALL) -> tuple[Action, ...]:
-    """Return what `actions.rq` and `before_and_after.rq` answer of those `robots.rq` that are asked for.
+    """Return what `actions.rq` answers of those `robots.rq` that are asked for.
 
     Proposals come first, the greatest saving a year before all; then what was done, the newest first.
     """
-    runs: dict[str, list[Row]] = defaultdict(list)
-    for run in answers["before_and_after"].rows:
-        runs[run["robot"]].append(run)
     rows = answers["actions"].rows
-    days: dict[str, list[str]] = defaultdict(list)
-    for row in rows:
-        if row["done_on"]:
-            days[row["robot"]].append(row["done_on"])
+    days = Counter((row["robot"], row["done_on"]) for row in rows if row["done_on"])
     robots = {robot["robot"] for robot in answers["robots"].rows if asked.finds(robot)}
-    found = [_action(row, runs[row["robot"]], days[row["robot"]]) for row in rows if row["robot"] in robots]
+    found = [Action(row, max(days[row["robot"], row["done_on"]] - 1, 0)) for row in rows if row["robot"] in robots]
     found.sort(key=lambda one: (-(one.row["year_j"] or 0.0), one.row["name"], one.row["what"]))
     found.sort(key=lambda one: one.row["done_on"] or "~", reverse=True)
     return tuple(found)
-
-
-def _action(row: Row, runs: list[Row], days: list[str]) -> Action:
-    on = row["done_on"]
-    if not on:
-        return Action(row, None, 0)
-    before = max((day for day in days if day < on), default="")
-    until = min((day for day in days if day > on), default="~")
-    return Action(row, verification(runs, on, before, until), days.count(on) - 1)
 
 
 def actions_sheet(found: tuple[Action, ...]) -> Sheet:
@@ -65,12 +50,7 @@ def actions_sheet(found: tuple[Action, ...]) -> Sheet:
 
 
 def _cells(one: Action) -> tuple[str | int | float | None, ...]:
-    row, saved = one.row, one.saved
+    row = one.row
     said = (row["name"], row["what"], row["place"], one.state, row["done_on"], row["by"], kwh(row["year_j"]))
-    verified: tuple[str | int | float | None, ...] = (None,) * 7
-    if saved is not None:
-        verified = (saved.before, saved.after, *(None,) * 5)
-        if saved.adjusted_j is not None:
-            energies = (saved.adjusted_j, saved.saved_j, saved.lower_j, saved.upper_j)
-            verified = (saved.before, saved.after, saved.unit, *map(kwh, energies))
-    return *said, kwh(row["run_j"]), *verified, row["action"]
+    energies = (kwh(row[name]) for name in ("adjusted_j", "saved_j", "lower_j", "upper_j"))
+    return *said, kwh(row["run_j"]), row["before"], row["after"], row["unit"], *energies, row["action"]

@@ -10,9 +10,9 @@ import jinja2
 
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
+from irtwin.providers.verification import FEWEST
 from irtwin.report.plant import choice, links, paging
 from irtwin.report.plant.energies import kwh
-from irtwin.report.plant.verification import FEWEST
 from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
