@@ -16,11 +16,15 @@ DEGREE = ua.EUInformation("http://www.opcfoundation.org/UA/units/un/cefact", 174
 
 
 class ServedRobot:
-    """Moves while it is started. values: by node id, put over what moves; still: nothing has a new time."""
+    """Moves while it is started. values: by node id, put over what moves; still: nothing has a new time.
+
+    stands: it does not move, and its values have new times; hung: how many joints' values have none, from the base on.
+    """
 
     def __init__(self) -> None:
         self.values: dict[str, Any] = {}
-        self.still = False
+        self.still = self.stands = False
+        self.hung = 0
         with socket.socket() as it:
             it.bind(("127.0.0.1", 0))
             self.address = f"opc.tcp://127.0.0.1:{it.getsockname()[1]}"
@@ -30,7 +34,7 @@ class ServedRobot:
 
     def start(self, certificates: tuple[Path, Path] | None = None) -> None:
         """Answer, and ask for certificates where one is given, with its key."""
-        self.values, self.still = {}, False
+        self.values, self.still, self.stands, self.hung = {}, False, False, 0
         self._do(self._start(certificates))
 
     def stop(self) -> None:
@@ -77,9 +81,9 @@ class ServedRobot:
     async def _move(self) -> None:
         step = 0
         while True:
-            step += 1
+            step += not self.stands
             for joint, nodes in enumerate(self._nodes):
-                for node in () if self.still else nodes:
+                for node in () if self.still or joint < self.hung else nodes:
                     await node.write_value(30.0 * math.sin(0.01 * step + joint))
             for name, value in list(self.values.items()):
                 said = value if isinstance(value, ua.DataValue) else ua.DataValue(value)

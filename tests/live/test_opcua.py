@@ -150,6 +150,22 @@ def test_a_robot_that_stands_has_states_though_no_position_has_a_new_time(served
     assert steps == pytest.approx([0.5] * len(steps), abs=0.1)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("hung", [1, 6])
+def test_a_node_that_hangs_while_its_status_is_good_is_refused(served: ServedRobot, hung: int) -> None:
+    served.stands = True
+    it = Followed(served)
+    it.until(lambda: len(it.states) > 40)
+    assert it.refused == []
+    served.hung, served.stands = hung, False
+    it.until(lambda: it.refused)
+    assert it.refused[0].endswith("position ns=2;s=A1: hangs: its status is good, its time stands still")
+    served.hung, count = 0, len(it.states)
+    it.until(lambda: len(it.states) > count + 10)
+    it.end()
+    assert it.said == []
+
+
 def test_a_connection_that_is_lost_is_made_again(served: ServedRobot) -> None:
     it = Followed(served)
     it.until(lambda: len(it.states) > 10)

@@ -21,6 +21,7 @@ import math
 import os
 import threading
 import time
+from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -51,6 +52,8 @@ _TEXTS = ("device", "user", "certificate", "key", "server_certificate")
 _PATIENCE = 5.0  # s for an answer
 _AGAIN = 1.0  # s until the next try to connect
 _STANDS = 0.5  # s after which a state comes though no position has a new time: the robot stands
+_HUNG = 2.0  # s, or five times its usual pause, after which a node that says a new time at rest, too, hangs
+_AT_REST = 20  # values that came again with a new time: the server says when it looked, not when they changed
 _OLD = 2.0  # s by which a position's time may lie behind the server's clock, which many tell in whole seconds
 logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # what matters is raised, and told in one line
 _LOST = (OSError, ua.UaError, asyncio.CancelledError)  # what asyncua raises where a connection breaks
@@ -63,6 +66,35 @@ class _Place:
     key: str
     node: Node
     unit: Unit
+
+
+class _NodeTimes:
+    """Tells which nodes hang: their status is good, and their time stands still though it went on at rest before.
+
+    A server that says when a value changed, not when it looked, tells nobody which of its nodes hang.
+    """
+
+    def __init__(self) -> None:
+        self._heard: dict[str, tuple[ua.DataValue, float]] = {}  # the newest by its time, and when it came
+        self._began: dict[str, float] = {}
+        self._times: Counter[str] = Counter()
+        self._at_rest: Counter[str] = Counter()
+
+    def hear(self, node: str, value: ua.DataValue, now: float) -> None:
+        """Take what a node says at a moment, s."""
+        newest, _ = self._heard.get(node, (None, now))
+        if newest is not None and newest.SourceTimestamp == value.SourceTimestamp:
+            return
+        self._at_rest[node] += newest is not None and newest.Value == value.Value
+        self._times[node] += 1
+        self._began.setdefault(node, now)
+        self._heard[node] = value, now
+
+    def hangs(self, node: str, now: float) -> bool:
+        """Whether a node's time has stood still for too long."""
+        _, at = self._heard[node]
+        usual = (at - self._began[node]) / max(self._times[node] - 1, 1)
+        return self._at_rest[node] >= _AT_REST and now - at > max(_HUNG, 5.0 * usual)
 
 
 class OpcUa:
@@ -80,6 +112,7 @@ class OpcUa:
         self.address, self._robot, self.robot_id, self._rate = address, robot, robot_id, rate
         self._said = _read_file(file, len(robot.joints))
         self._stamp = self._newest = self._told = -math.inf
+        self._times = _NodeTimes()
         try:
             self.what = asyncio.run(self._described())
         except (*_LOST, ValueError) as error:
@@ -124,6 +157,8 @@ class OpcUa:
             due = time.monotonic()
             while not done.is_set():
                 values = await client.read_attributes([place.node for place in places])
+                for place, value in zip(places, values, strict=True):
+                    self._times.hear(str(place.node), value, time.monotonic())
                 try:
                     if (stamp := self._moment(places, values, clock)) is not None:
                         take(self._state(places, values, stamp))
@@ -162,6 +197,10 @@ class OpcUa:
         it = None if value.Value is None else value.Value.Value
         if value.StatusCode is not None and not value.StatusCode.is_good():
             raise InputError(f"{self.address}: {place.key} {place.node}: {value.StatusCode.name}")
+        if self._times.hangs(str(place.node), time.monotonic()):
+            raise InputError(
+                f"{self.address}: {place.key} {place.node}: hangs: its status is good, its time stands still"
+            )
         if isinstance(it, bool) or not isinstance(it, int | float):
             raise InputError(f"{self.address}: {place.key} {place.node}: {shown(it)} is not a number")
         return place.unit.factor * it + place.unit.offset
