@@ -314,13 +314,23 @@ def test_what_cannot_be_told_stops_with_what_to_give(
     assert sorted(tmp_path.iterdir()) == [log]
 
 
+def test_all_that_cannot_be_told_is_asked_for_in_one_line(tmp_path: Path) -> None:
+    columns = {"t": good()["time"], "P": good()["power"]} | {f"T{k}": good()[f"tau_joint_a{k}"] for k in range(1, 7)}
+    log = plain(tmp_path, **columns)
+    with pytest.raises(InputError) as asked:
+        bring([log], tmp_path / "set", NAME, Options())
+    assert str(asked.value).count("--map 'T*=tau' or --map 'T*=temp'; and ") == 1
+    assert str(asked.value).endswith("give --power-at mains or --power-at dc_bus")
+    bring([log], tmp_path / "set", NAME, Options(maps=("T*=-",), power_at="mains"))
+
+
 def test_numbers_of_a_message_of_ros_say_no_joint(tmp_path: Path) -> None:
     columns = {"time": good()["time"]} | per_joint("q", "/joint_states/position[{}]", 0)
     log = write_text(tmp_path / "run.csv", columns | per_joint("tau", "/joint_states/effort[{}]", 0))
-    with pytest.raises(DoubtError, match="joints come in any order") as doubt:
+    with pytest.raises(InputError, match="joints come in any order") as doubt:
         bring([log], tmp_path / "set", NAME, Options())
-    (answer,) = doubt.value.answers
-    assert answer.text == "--map '/joint_states/position[*]=q'"
+    assert "give --map '/joint_states/position[*]=q'; and " in str(doubt.value)
+    assert str(doubt.value).endswith("give --map '/joint_states/effort[*]=tau'")
     bring([log], tmp_path / "set", NAME, Options(), lambda doubt: doubt.answers[0])
     assert_same(read_data_set(tmp_path / "set"), "q torque")
 
@@ -349,6 +359,16 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
     assert said.status == 0
     assert "mrad as c1" in said.out
     assert_same(read_data_set(tmp_path / "set"), "q torque")
+
+
+@pytest.mark.parametrize(("number", "channels"), [(1, [f"dq_joint_a{k}" for k in range(1, 7)]), (2, [""] * 6)])
+def test_one_joint_that_is_given_tells_those_that_are_counted_on(
+    tmp_path: Path, number: int, channels: list[str]
+) -> None:
+    speeds = np.gradient(good()["q_joint_a1"], good()["time"])
+    log = plain(tmp_path, **{f"speed{k}": speeds for k in range(1, 7)})
+    brought = bring([log], tmp_path / "set", NAME, Options(maps=(f"speed{number}=dq_joint_a1:rad/s",)))
+    assert [one.channel for one in brought.forms[0].columns if one.column.startswith("speed")] == channels
 
 
 @pytest.mark.parametrize(

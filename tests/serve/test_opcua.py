@@ -54,6 +54,8 @@ def test_robots_are_read_by_opc_ua_and_nothing_is_written(plant_place: Path, tmp
             "AcActiveEnergyTotalImportLp": pytest.approx(1.27778, rel=1e-5),
         }
         assert values(client, HOSTILE)["State"] is None
+        assert values(client, "Arm_B")["State"] == "stale"  # its stream gave up while it moved
+        assert values(client, "Arm_B", *main)["AcActivePowerTotal"] is None
         machines = next(it for it in client.nodes.objects.get_children() if it.read_browse_name().Name == "Machines")
         (state,) = [it for it in machines.get_children()[0].get_variables() if it.read_browse_name().Name == "State"]
         assert "BadUserAccessDenied" in refused(lambda: state.write_value("off"))

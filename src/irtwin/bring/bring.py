@@ -100,17 +100,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
     logs = [_read(file, described, topics) for file in files]
     logs = [log.named(options.names) for log in logs] if options.names else logs
     logs = [with_power(log) for log in logs] if robot is None else logs
-    while True:
-        said = told(options.maps, options.gear_ratios, options.power_at, described)
-        try:
-            said.check(name for log in logs for name in log.names)
-            forms = [_Form(group, described, said, options.repair) for group in _of_one_form(logs)]
-            power_at = _one_place(forms)
-            break
-        except DoubtError as doubt:
-            if ask is None:
-                raise
-            options = options.with_answer(ask(doubt))
+    said, forms, power_at = _settled(logs, described, options, ask)
     name = options.name or described.name
     runs: dict[Path, tuple[RunText, TakenRun]] = {}
     for form in forms:
@@ -160,6 +150,49 @@ class _Form:
         usable = [aligned(log, means, repair=repair) for log in logs]
         self.said = [line for log in usable for line in (*log.recording.said, *log.said)]
         self.taken: TakenLogs = take(usable, means, robot, said)
+
+
+_Settled = tuple[UserSaid, list[_Form], tuple[str | None, str]]
+
+
+def _settled(logs: Sequence[Recording], robot: Robot, options: Options, ask: Ask | None) -> _Settled:
+    """Return what the user says and answers, logs by form, and where power was measured.
+
+    Where nobody answers, one line asks for all that is asked whatever the answers.
+    """
+    while True:
+        try:
+            return _formed(logs, robot, options)
+        except DoubtError as doubt:
+            if ask is not None:
+                options = options.with_answer(ask(doubt))
+                continue
+            first, last = (_questions(logs, robot, options, which) for which in (0, -1))
+            asked = [text for text in first if text in last]
+            raise doubt if len(asked) == 1 else InputError("; and ".join(asked)) from None
+
+
+def _questions(logs: Sequence[Recording], robot: Robot, options: Options, which: int) -> list[str]:
+    """Return all that is asked where each question gets its first answer, or its last."""
+    asked: list[str] = []
+    while True:
+        try:
+            _formed(logs, robot, options)
+        except DoubtError as doubt:
+            if str(doubt) not in asked and doubt.answers:
+                asked.append(str(doubt))
+                options = options.with_answer(doubt.answers[which])
+                continue
+        except InputError:  # it may come of an answer that nobody gave
+            pass
+        return asked
+
+
+def _formed(logs: Sequence[Recording], robot: Robot, options: Options) -> _Settled:
+    said = told(options.maps, options.gear_ratios, options.power_at, robot)
+    said.check(name for log in logs for name in log.names)
+    forms = [_Form(group, robot, said, options.repair) for group in _of_one_form(logs)]
+    return said, forms, _one_place(forms)
 
 
 def _of_one_form(logs: Sequence[Recording]) -> list[list[Recording]]:

@@ -55,6 +55,9 @@ def _per_joint(recording: Recording, field: str, meanings: Sequence[Meaning], ro
     strong = [each for each in rest if not each.weak]
     weak = [each.unused("its name says no channel") for each in rest if each.weak and strong]
     sets = _sets(recording, strong or rest, robot, len(given))
+    if given and not sets:  # their numbers count on from what was given
+        numbered = _sets(recording, [*given.values(), *(strong or rest)], robot, 0)
+        sets = [one for one in numbered if all(one[name].column == each.column for name, each in given.items())]
     if len(sets) > 1 and (measured := [one for one in sets if all(each.measured for each in one.values())]):
         sets = measured if len(measured) == 1 else sets
     if len(sets) > 1:
@@ -63,7 +66,8 @@ def _per_joint(recording: Recording, field: str, meanings: Sequence[Meaning], ro
     if len(taken) < len(robot.joints):
         label = CHANNELS[field].label
         lone = "the log format has it of each joint, or of none"
-        return [*(each.unused(f"no {label} of a joint that is known: {lone}") for each in strong or rest), *weak]
+        unknown = [*given.values(), *(strong or rest)]
+        return [*(each.unused(f"no {label} of a joint that is known: {lone}") for each in unknown), *weak]
     used = {each.column for each in taken.values()}
     others = [
         each.unused("other columns were taken for the robot's joints")
