@@ -42,6 +42,29 @@ def test_power_and_energy_become_power(tmp_path: Path, header: str, values: np.n
     assert found_in(tmp_path / "set") == ((), f"irtwin run {tmp_path / 'set'}")
 
 
+@pytest.mark.parametrize(
+    ("header", "moment"),
+    [
+        ("Datum/Uhrzeit;Wirkleistung [kW]", "{day}.03.2026 {hour:02}:{minute:02}"),
+        ("Datum;Uhrzeit;Leistung kW", "{day:02}.03.2026;{hour:02}:{minute:02}:00"),
+        ("date;time;power kW", "2026-03-{day:02};{hour:02}:{minute:02}"),
+    ],
+)
+def test_dates_as_meters_write_them(tmp_path: Path, header: str, moment: str) -> None:
+    quarters = [divmod(15 * k, 60) for k in range(192)]
+    times = [moment.format(day=2 + hour // 24, hour=hour % 24, minute=minute) for hour, minute in quarters]
+    rows = [f"{time};{2 + 0.5 * (k % 3)}".replace(",", ".") for k, time in enumerate(times)]
+    text = "\n".join(
+        [header, *(f"{row.rpartition(';')[0]};{row.rpartition(';')[2].replace('.', ',')}" for row in rows)]
+    )
+    (tmp_path / "meter.csv").write_text(text + "\n")
+    bring([tmp_path / "meter.csv"], tmp_path / "set", None, Options())
+    (run,) = read_data_set(tmp_path / "set").runs
+    assert run.started is not None and run.started.isoformat() == "2026-03-02T00:00:00+00:00"
+    assert run.signals.time[-1] == pytest.approx(191 * 900.0)
+    assert run.signals.power[:3] == pytest.approx([2000.0, 2500.0, 3000.0])
+
+
 def test_what_is_no_power_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column was taken for power or energy; say which it is: --map COLUMN=pow"):
         brought(tmp_path, "time,value", np.full(COUNT, 300.0))

@@ -122,7 +122,7 @@ def test_the_torque_of_a_pendulum_is_printed(pendulum):
     ("arguments", "message"),
     [
         (["dh", "nowhere.urdf"], "nowhere.urdf: cannot be read"),
-        (["dh", "nowhere/dataset.toml"], "not found; a data set is a folder"),
+        (["dh", "nowhere/dataset.toml"], "nowhere: there is no such file or folder"),
         (["dh", KR6, "--link", "hand"], 'has no link "hand"'),
         (["dh", KR6, "--convention", "craig"], "'craig' is not one of"),
         (["urdf", KR6, "--out", KR6 / "robot.urdf"], "robot.urdf: cannot be written"),

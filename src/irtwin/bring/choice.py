@@ -234,8 +234,9 @@ def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], se
             )
         there = ", ".join(recording.names)
         shown = there if len(there) < 400 else f"{there[:400]} ..."
+        named = ", or --names A,B,..., left to right" if recording.names[0] == "column_1" else ""
         raise InputError(
-            f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{held} "
+            f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{named}{held} "
             f"(there are {shown})"
         )
 

@@ -16,7 +16,7 @@ def word_set(text: str) -> frozenset[str]:
 
 # words, in small letters, by field of Signals; of several in a name the last one counts
 _WORDS = {
-    "time": "time timestamp stamp datetime zeit zeitstempel clock elapsed t",
+    "time": "time timestamp stamp datetime date datum zeit uhrzeit zeitstempel clock elapsed t",
     "q": "q pos position positions ang angle angles winkel theta act position_actual istposition lage jointposition",
     "dq": "dq qd qdot vel velocity velocities speed speeds omega geschwindigkeit drehzahl",
     "ddq": "ddq qdd qddot acc accel acceleration accelerations beschleunigung",

@@ -7,16 +7,19 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv
 
-from irtwin.bring.head import LOOKED_AT, Head, head_of, numbers_in
+from irtwin.bring.head import CLOCK, DATE, LOOKED_AT, Head, head_of, numbers_in
 from irtwin.bring.recording import Recording, as_columns
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
 from irtwin.signals.sources.csv_source import csv_fault
+from irtwin.signals.sources.parquet_file import is_text
 from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS
 
 _LARGEST = 1_000_000_000  # bytes
@@ -51,6 +54,7 @@ def read_text(path: Path) -> Recording:
     _check_names(path, form)
     names, units = form.head.names_in(form.rows), form.head.units_in(form.rows)
     table, cut = _table(path, text.split("\n", before)[-1], form, names, before)
+    table = _with_moments(table)
     columns, texts = as_columns(path, table, ("line", before + 1))
     nameless = f"{path}: has no line of names; its columns are called column_1, column_2 and so on, or as --names says"
     return Recording(
@@ -129,7 +133,8 @@ def _decoded(path: Path, content: bytes) -> str:
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
     if b"\0" in content[:4096]:
-        raise InputError(f"{path}: is no text; give a CSV, Parquet or Excel file or a ROS bag")
+        packed = "is packed; unpack it, and give what is in it" if content[:2] in (b"PK", b"\x1f\x8b") else "is no text"
+        raise InputError(f"{path}: {packed}: a CSV, Parquet or Excel file or a ROS bag")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -137,6 +142,20 @@ def _decoded(path: Path, content: bytes) -> str:
     if not text.strip():
         raise InputError(f"{path}: is empty; a log has one line of names and one line a sample")
     return text
+
+
+def _with_moments(table: pa.Table) -> pa.Table:
+    """Return a table in which a date and the time of day beside it are one column, as meters write them in two."""
+    for place, pair in enumerate(pairwise(table.columns)):
+        if not all(is_text(one.type) or pa.types.is_date(one.type) or pa.types.is_time(one.type) for one in pair):
+            continue
+        days, hours = (one.cast(pa.string()) for one in pair)
+        cells = zip(days.slice(0, LOOKED_AT).to_pylist(), hours.slice(0, LOOKED_AT).to_pylist(), strict=True)
+        if all(day and hour and DATE.fullmatch(day) and CLOCK.fullmatch(hour) for day, hour in cells):
+            moments = pc.binary_join_element_wise(days, hours, " ")
+            name = " ".join(table.column_names[place : place + 2])
+            return table.remove_column(place + 1).set_column(place, name, moments)
+    return table
 
 
 def _table(path: Path, body: str, form: TextForm, names: list[str], before: int) -> tuple[pa.Table, str | None]:

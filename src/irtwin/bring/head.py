@@ -11,6 +11,8 @@ from irtwin.signals.unit import QUANTITIES, unit_of
 
 LOOKED_AT = 60  # rows that tell it
 MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-")  # in small letters: nothing was measured
+DATE = re.compile(r"\d{4}-\d{2}-\d{2}|\d{1,2}\.\d{1,2}\.\d{4}")
+CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d*)?)?")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 
 
@@ -54,10 +56,11 @@ def numbers_in(cells: Sequence[str]) -> int:
 
 
 def _is_sample(cells: Sequence[str]) -> bool:
-    """Whether a row holds numbers, in half of it at least: times and texts may stand beside them."""
+    """Whether a row holds numbers, in half of it at least beside date and clock: texts may stand beside them."""
     numbers = numbers_in(cells)
     blank = sum(cell.strip().lower() in MISSING for cell in cells)
-    return numbers > 0 and 2 * (numbers + blank) >= len(cells)
+    times = sum(bool(DATE.fullmatch(cell.strip()) or CLOCK.fullmatch(cell.strip())) for cell in cells)
+    return numbers > 0 and 2 * (numbers + blank) >= len(cells) - times
 
 
 def _are_units(cells: Sequence[str]) -> bool:

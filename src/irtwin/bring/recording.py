@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,10 +18,12 @@ from irtwin.robot.description import Robot
 from irtwin.signals.sources.catalogue import registered, source_of
 from irtwin.signals.sources.parquet_file import is_text, open_parquet, read_columns
 from irtwin.signals.sources.source import check_names, check_values
+from irtwin.signals.toml_file import BAG_FOLDER
 
 BAGS = (".bag", ".mcap", ".db3")
 SHEETS = (".xlsx", ".xlsm")
 _TRIED = 50  # cells that tell whether a column of text holds numbers or times
+_DOTTED = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\d{1,2})(:.*))?")
 _YEARS = (1677, 2262)  # beyond, nanoseconds since 1970 are no int64
 _BEYOND = "times before 1678 or after 2261"
 
@@ -80,8 +83,12 @@ def read_recording(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recor
     from irtwin.bring.spreadsheet import read_sheet
 
     suffix = path.suffix.lower()
+    if suffix in (".urdf", ".xacro"):
+        raise InputError(f"{path}: describes a robot, and is no log; give it by --robot, and name a log")
     if is_motion(path):
         return read_motion(path, robot)
+    if path.is_dir() and not (path / BAG_FOLDER).exists():
+        raise InputError(f"{path}: is a folder, and no bag of ROS 2; name the logs in it, as {path}/*.csv")
     if path.is_dir() or suffix in BAGS:
         return _bag(path, robot, topics)
     if suffix in SHEETS:
@@ -175,9 +182,12 @@ def _number(text: str) -> float | None:
 
 
 def _instant(text: str) -> np.datetime64 | None:
-    """Return a time of ISO 8601, to the nanosecond; UTC where it has no zone."""
+    """Return a time of ISO 8601, or one whose date is written 2.3.2026, to the nanosecond; UTC where it has no zone."""
     from datetime import UTC, datetime
 
+    if dotted := _DOTTED.fullmatch(text):
+        day, month, year, hour, clock = dotted.groups()
+        text = f"{year}-{month:0>2}-{day:0>2}" + (f"T{hour:0>2}{clock}" if hour else "")
     whole, sign, rest = text.replace(",", ".").partition(".")
     digits = rest[: next((place for place, sign in enumerate(rest) if not sign.isdecimal()), len(rest))]
     try:

@@ -57,7 +57,9 @@ def _parse(text: str, source: str) -> Element:
         root: Element = SafeXml.fromstring(text.encode("utf-8"), forbid_dtd=True)
     except ParseError as error:
         line, column = error.position
-        raise InputError(f"{source}, line {line}, column {column + 1}: not well-formed XML ({error.msg})") from error
+        raise InputError(
+            f"{source}, line {line}, column {column + 1}: not well-formed XML ({error.msg}); give a URDF"
+        ) from error
     except DefusedXmlException as error:
         raise InputError(f"{source}: contains a DTD or an entity; remove the <!DOCTYPE ...>") from error
     except (LookupError, ValueError) as error:

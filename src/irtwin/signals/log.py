@@ -215,16 +215,21 @@ def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
 def _document(file: Path) -> dict[str, Any]:
     folder, real = real_path(file.parent), real_path(file)
     if folder is not None and folder.is_file():
+        given = f"LOG --robot {file.parent}" if folder.suffix.lower() == ".urdf" else f"{file.parent} --robot ROBOT"
         raise InputError(
-            f"{file.parent}: is a file; a data set is a folder: "
-            f"`irtwin import {file.parent} --robot ROBOT --out FOLDER` makes one of a log"
+            f"{file.parent}: is a file; a data set is a folder: `irtwin import {given} --out FOLDER` makes one of a log"
         )
+    if folder is not None and not folder.exists():
+        raise InputError(f"{file.parent}: there is no such file or folder; name a data set")
     if real is None or not real.exists():
         if real is not None and any(real.parent.glob(f"*/{file.name}")):
             raise InputError(
                 f"{file.parent}: holds data sets, and is none itself; name one, or take all by --out RESULTS"
             )
-        raise InputError(f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/")
+        raise InputError(
+            f"{file}: not found; a data set is a folder with dataset.toml, a URDF and runs/: "
+            "`irtwin import LOG ... --robot ROBOT --out FOLDER` makes one of logs"
+        )
     return read_toml(file)
 
 
