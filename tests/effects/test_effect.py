@@ -238,3 +238,14 @@ def test_columns_by_joint_are_those_of_torque_without_zeros():
             np.testing.assert_array_equal(columns[joint], dense[:, joint, used])
         np.testing.assert_allclose(stack.shift_torque(motion, columns), dense @ stack.shift(motion), atol=1e-12)
         assert stack.shift_torque(motion, columns).any()
+
+
+def test_what_columns_carry_is_their_sum_over_joints():
+    robot = arm(3)
+    told = swing(robot, 1, seconds=0.5)
+    contact = catalogue()["external_contact"]
+    others = ["load_dependent_friction", "presliding_hysteresis", replace(contact, runs=("x",))]
+    stack = Stack(robot, [*BASELINE, *others])
+    for motion in (told, told.part(10, 30)):
+        expected = np.einsum("njk,nj->nk", stack.torque_columns(motion), motion.dq)[:, stack.real]
+        np.testing.assert_allclose(stack.carried(motion, motion.dq), expected, rtol=1e-9, atol=1e-9)

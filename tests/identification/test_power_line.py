@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -56,8 +57,9 @@ def test_a_line_meets_power_where_it_is_taken_and_touches_it_beside():
     def power(of):
         return stack.predicted_power_columns(loaded, of) @ values
 
-    columns, torque = stack.columns_by_joint(loaded), stack.real_torque(loaded, coefficients)
-    line = power_line(stack, loaded, columns, torque, stack.power_columns(loaded, torque), values)
+    torque = stack.real_torque(loaded, coefficients)
+    now = stack.power_columns(loaded, torque)
+    line = power_line(stack, loaded, partial(stack.carried, loaded), torque, now, values)
 
     def said(of):
         return line.carried @ of[stack.real] + line.free @ free + line.known

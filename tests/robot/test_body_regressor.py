@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.robot import body_regressor as module
-from irtwin.robot.body_regressor import body_regressor, point_jacobian, regressor_slope
+from irtwin.robot.body_regressor import body_regressor, carried_bodies, point_jacobian, regressor_slope
 
 
 def tree(parents: list[int], slides: list[bool], rng: np.random.Generator) -> pin.Model:
@@ -39,7 +39,10 @@ def test_it_is_what_pinocchio_says_of_each_sample(data, joints, seed):
     slides = data.draw(st.lists(st.booleans(), min_size=joints, max_size=joints), "slides")
     rng = np.random.default_rng(seed)
     model, states = tree(parents, slides, rng), rng.uniform(-3, 3, (3, 4, joints))
-    np.testing.assert_allclose(body_regressor(model, *states), one_by_one(model, *states), rtol=1e-11, atol=1e-10)
+    found, along = body_regressor(model, *states), rng.uniform(-3, 3, (4, joints))
+    np.testing.assert_allclose(found, one_by_one(model, *states), rtol=1e-11, atol=1e-10)
+    expected = np.einsum("njk,nj->nk", found, along)
+    np.testing.assert_allclose(carried_bodies(model, *states, along), expected, rtol=1e-9, atol=1e-9)
 
 
 @settings(max_examples=30)

@@ -210,6 +210,12 @@ class Effect(ABC):
         """Return columns @ values (k,): (N, n) N m where `signal` is torque, else (N,) W."""
         return np.asarray(self.columns(robot, motion, predicted) @ values)
 
+    def carried(
+        self, robot: Robot, motion: Motion, along: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return (N, k) the columns of torque, each joint's times its `along` (N, n), summed over joints."""
+        return np.asarray(np.einsum("njk,nj->nk", self.columns(robot, motion, predicted), along))
+
     def undecided(self, motion: Motion) -> np.ndarray | None:
         """Return (N, n) where the effect cannot say the joint's torque, so that a fit leaves these samples out."""
         return None
@@ -313,6 +319,14 @@ class JointEffect(Effect):
         if self.signal == "power":
             return np.asarray(sum(part @ weight for part, weight in zip(parts, weights, strict=True)))
         return np.asarray(sum(part * weight for part, weight in zip(parts, weights, strict=True)))
+
+    def carried(
+        self, robot: Robot, motion: Motion, along: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return (N, k): each joint's own columns times its `along` (N, n)."""
+        parts = [part * along for part in self.samples(robot, motion, predicted)]
+        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        return np.array([part[:, joint] for joint in acting for part in parts]).reshape(-1, len(along)).T
 
 
 def quantity(

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from irtwin.effects.effect import Effect, Predicted, Term
 from irtwin.errors import InputError
-from irtwin.robot.body_regressor import body_regressor
+from irtwin.robot.body_regressor import body_regressor, carried_bodies
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange
 from irtwin.signals.motion import Motion
@@ -56,6 +56,12 @@ class RigidBody(Effect):
     ) -> np.ndarray:
         """Return the (N, n) torque of bodies of these inertial parameters (10 n,), by recursive Newton-Euler."""
         return inverse_dynamics(model_of(robot, values), motion)
+
+    def carried(
+        self, robot: Robot, motion: Motion, along: np.ndarray, predicted: Predicted | None = None
+    ) -> np.ndarray:
+        """Return (N, 10 n) the columns, each joint's times its `along` (N, n), summed over joints."""
+        return carried_bodies(robot.model, motion.q, motion.dq, motion.ddq, along)
 
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray:
         """Return the payload that the controller was told, as a point mass on the last body.

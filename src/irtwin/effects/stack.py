@@ -177,11 +177,19 @@ class Stack:
         shift = self.shift(motion)
         if not shift.any():
             return np.zeros(motion.dq.shape)
-        return self.sum_by_joint(columns, shift)
+        return np.column_stack([own @ shift[used] for own, used in zip(columns, self.pattern, strict=True)])
 
-    def sum_by_joint(self, columns: Sequence[np.ndarray], values: np.ndarray) -> np.ndarray:
-        """Return the torque (N, n), N m, of coefficients (K,) by the columns of each joint."""
-        return np.column_stack([own @ values[used] for own, used in zip(columns, self.pattern, strict=True)])
+    def carried(self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
+        """Return (N, R), for each coefficient of real torque, its column in each joint times `along` (N, n), summed.
+
+        It is the power that the column carries, if along is a speed; `values` as in `torque_columns`.
+        """
+        below = self._torques(motion, values).below if self.coupled else {}
+        found = [np.zeros((len(along), 0))]
+        for effect in self._torque:
+            if effect.channel == "torque":
+                found.append(self._carried(effect, motion, along, below.get(effect.stage)))
+        return side_by_side(found)
 
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return (N, n) where some effect cannot say the joint's torque."""
@@ -289,6 +297,13 @@ class Stack:
             return np.asarray(self.columns(effect, motion, below) @ values)
         stop = motion.start + len(motion.time)
         return effect.contribution(self.robot, motion, values, below and below.part(motion.start, stop))
+
+    def _carried(self, effect: Effect, motion: Motion, along: np.ndarray, below: Predicted | None) -> np.ndarray:
+        """Return (N, k) what columns of an effect of torque carry `along` (N, n); `below` as in `columns`."""
+        if effect.memory or not effect.acts_in(motion):
+            return np.asarray(np.einsum("njk,nj->nk", self.columns(effect, motion, below), along))
+        stop = motion.start + len(motion.time)
+        return effect.carried(self.robot, motion, along, below and below.part(motion.start, stop))
 
     def bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
         """Return the (10 n,) inertial parameters with payload by (K,) torque coefficients; None: those of the URDF."""

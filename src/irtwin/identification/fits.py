@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -110,7 +111,7 @@ def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
     line_of = _line_about(stack, values)
 
     def equations(motion: Motion) -> Rows:
-        own, line, work = line_of(motion)
+        own, (line, work) = stack.columns_by_joint(motion, values[: len(stack.torque_terms)]), line_of(motion)
         rows = [*([columns] for columns in own), [line.carried, line.free, work[:, None]]]
         return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known), work < 0)
 
@@ -122,25 +123,25 @@ def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
     line_of = _line_about(stack, values)
 
     def equations(motion: Motion) -> Rows:
-        _, line, work = line_of(motion)
+        line, work = line_of(motion)
         return power_rows(motion, [line.carried, line.free, work[:, None]], line.known, work < 0)
 
     return equations
 
 
-def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[list[np.ndarray], PowerLine, np.ndarray]]:
-    """Return what gives the columns of torque, power's line about the coefficients, and the joints' work (N,), W."""
+def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine, np.ndarray]]:
+    """Return what gives power's line about the coefficients, and the joints' work (N,), W."""
     torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
     power_values = _expected(stack.power_terms)
     power_values[stack.fixed] *= 1 + scale
     power_values[~stack.fixed] = free
 
-    def line_of(motion: Motion) -> tuple[list[np.ndarray], PowerLine, np.ndarray]:
-        own = stack.columns_by_joint(motion, torque_values)
-        torque = stack.sum_by_joint(own, np.where(stack.real, torque_values + stack.shift(motion), 0.0))
+    def line_of(motion: Motion) -> tuple[PowerLine, np.ndarray]:
+        torque = stack.real_torque(motion, torque_values)
         now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
-        line = power_line(stack, motion, own, torque, now, power_values)
-        return own, line, now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        carrying = partial(stack.carried, motion, values=torque_values)
+        line = power_line(stack, motion, carrying, torque, now, power_values)
+        return line, now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
 
     return line_of
 
@@ -202,9 +203,10 @@ def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.n
 
     def equations(motion: Motion) -> Rows:
         assert motion.power is not None
-        columns, torque = stack.columns_by_joint(motion, torque_values), stack.real_torque(motion, torque_values)
-        power = stack.predicted_power_columns(motion, torque_values, power_values)
-        line = power_line(stack, motion, columns, torque, power, power_values)
+        torque = stack.real_torque(motion, torque_values)
+        power = stack.predicted_power_columns(motion, torque_values, power_values, torque)
+        carrying = partial(stack.carried, motion, values=torque_values)
+        line = power_line(stack, motion, carrying, torque, power, power_values)
         joined = np.concatenate([line.carried, line.free], axis=1)
         return Rows(joined[:, None], line.known[:, None], motion.power[:, None])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Given, Rows
 from irtwin.signals.motion import Motion
 
-Columns = Sequence[np.ndarray]
+Carrying = Callable[[np.ndarray], np.ndarray]
 
 _STEP = 1e-2  # N m, exact for what is quadratic in torque
 
@@ -32,21 +32,21 @@ class PowerLine:
 
 
 def power_line(
-    stack: Stack, motion: Motion, columns: Columns, torque: np.ndarray, power: np.ndarray, values: np.ndarray
+    stack: Stack, motion: Motion, carrying: Carrying, torque: np.ndarray, power: np.ndarray, values: np.ndarray
 ) -> PowerLine:
     """Return the equation of power, linear in the coefficients of torque about the real `torque` (N, n).
 
-    columns: of torque, for each joint (N, k) by the stack's pattern; power: (N, L) those of power on that torque;
-    values: (L,) its coefficients.
+    carrying: gives (N, R) what real columns carry by a slope; power: (N, L) columns of power on that torque; values:
+    (L,) its coefficients.
     """
     slope = power_slope(stack, motion, torque, values)
-    real = carried(columns, slope, stack.pattern, stack.real)
+    real = carrying(slope)
     fixed = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
     known = power[:, stack.fixed] @ fixed + real @ stack.shift(motion)[stack.real] - (slope * torque).sum(axis=1)
     return PowerLine(slope, real, power[:, ~stack.fixed], known)
 
 
-def carried(rows: Columns, slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
+def carried(rows: Sequence[np.ndarray], slope: np.ndarray, pattern: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Return (N, R) the power that each real column carries: what it has in each joint's `rows`, times the slope.
 
     `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).

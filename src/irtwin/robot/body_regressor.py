@@ -23,31 +23,47 @@ _PIECE = 2048  # samples that are worked on at once: they stay in the processor'
 class _Joint:
     """A joint that turns or `slides`: its parent's index (-1: the base) and its `axis` (6,), in its own frame.
 
-    A motion of the parent is seen in the joint's frame by the `maps`, (6, 6) each: one as it is, one times the joint's
-    position if it slides, or else its sine, and one times its cosine. `crossed` (6, 6) is a motion times the axis.
+    A motion of the parent is seen in the joint's frame by the `maps`, (6 + 2 r, 6): as it is, times the joint's
+    position if it slides, or else its sine, and times its cosine. The latter two have the rows alone that are not
+    zero: r of the six, `moved` of the line's three and of the turn's. `crossed` (6, 6) is a motion times the axis.
     """
 
     parent: int
     axis: np.ndarray
     maps: np.ndarray
+    moved: slice
     crossed: np.ndarray
     slides: bool
 
     def seen(self, motions: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Return motions (m, 6, N) of the parent in the joint's frame, at positions (N,)."""
-        still, *moved = (self.maps @ motions).reshape(len(motions), -1, *motions.shape[1:]).swapaxes(0, 1)
-        for part, by in zip(moved, (q,) if self.slides else (np.sin(q), np.cos(q)), strict=True):
-            part *= by
-            still += part
-        return np.asarray(still)
+        """Return motions (m, 6, N) of the parent in the joint's frame, at positions (N,), and last its axis."""
+        count, samples = len(motions), motions.shape[2]
+        seen = np.empty((count + 1, len(self.maps), samples))
+        np.matmul(self.maps, motions, out=seen[:count])
+        found = seen[:, :6]
+        parts = seen[:count, 6:].reshape(count, 2, 2, -1, samples)
+        parts *= self._by(q)[:, None, None]
+        rows = self._rows(found[:count])
+        rows += parts[:, 0]
+        rows += parts[:, 1]
+        found[count] = self.axis[:, None]
+        return found
 
     def handed_down(self, slopes: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return slopes (m, 6, N) by motions seen in the joint's frame as slopes by those of the parent."""
-        still, *moved = self.maps.reshape(-1, 6, 6).swapaxes(1, 2)
-        found = still @ slopes
-        for part, by in zip(moved, (q,) if self.slides else (np.sin(q), np.cos(q)), strict=True):
-            found += part @ slopes * by
+        rows = self._rows(slopes).reshape(len(slopes), -1, slopes.shape[2])
+        found = self.maps[:6].T @ slopes
+        for part, by in zip(self.maps[6:].reshape(2, -1, 6), self._by(q), strict=True):
+            found += part.T @ (rows * by)
         return np.asarray(found)
+
+    def _rows(self, motions: np.ndarray) -> np.ndarray:
+        """Return the rows (m, 2, r / 2, N) of motions (m, 6, N) that depend on the joint's position."""
+        return motions.reshape(len(motions), 2, 3, -1)[:, :, self.moved]
+
+    def _by(self, q: np.ndarray) -> np.ndarray:
+        """Return (2, N) what the maps that are not as they are go with."""
+        return np.stack([q, np.zeros_like(q)] if self.slides else [np.sin(q), np.cos(q)])
 
 
 def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
@@ -62,6 +78,21 @@ def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
         states = (np.ascontiguousarray(each[cut].T) for each in (q, dq, ddq))
         _fill(found[:, :, cut], joints, model.gravity.vector, *states)
     return found.transpose(2, 0, 1)
+
+
+def carried_bodies(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return (N, 10 n) the sum over joints of `along` (N, n) times the regressor: power, if along is a speed.
+
+    It takes one motion of each body instead of one for each joint that carries it.
+    """
+    joints = _joints(model)
+    found = np.empty((10 * model.nv, len(q)))
+    for first in range(0, len(q), _PIECE):
+        cut = slice(first, first + _PIECE)
+        states = (np.ascontiguousarray(each[cut].T) for each in (q, dq, ddq, along))
+        for index, (own, _) in enumerate(_motions(joints, model.gravity.vector, *states)):
+            found[10 * index : 10 * index + 10, cut] = _torques(own[2:], own[0], own[1])[0]
+    return found.T
 
 
 def regressor_slope(
@@ -94,8 +125,7 @@ def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
         # a motion along each of the base's axes, and what a unit of speed of each carrier makes
         motions = np.repeat(np.eye(6)[:3, :, None], states.shape[1], axis=2)
         for index in chain:
-            axis = np.broadcast_to(joints[index].axis[:, None], (1, 6, states.shape[1]))
-            motions = np.concatenate([joints[index].seen(motions, states[index]), axis])
+            motions = joints[index].seen(motions, states[index])
         along, carried = motions[:3, :3], lever @ motions[3:]
         found[cut, chain] = np.einsum("akn,mkn->nma", along, carried)
     return found
@@ -111,10 +141,17 @@ def _joints(model: pin.Model) -> list[_Joint]:
         parent = model.jointPlacements[index].toActionMatrixInverse()
         slides = not axis[3:].any()
         # the exponential of -q times `across`, whose cube is 0 for a line and less itself for a turn
-        series = [np.eye(6), -across] if slides else [np.eye(6) + across @ across, -across, -across @ across]
-        maps = np.concatenate([part @ parent for part in series])
-        found.append(_Joint(model.parents[index] - 1, axis, maps, -across, slides))
+        still = np.eye(6) if slides else np.eye(6) + across @ across
+        series = np.array([-across, -across @ across]).reshape(2, 2, 3, 6)
+        moved = _stretch(np.flatnonzero(series.any(axis=(0, 1, 3))))
+        maps = np.concatenate([still, series[:, :, moved].reshape(-1, 6)]) @ parent
+        found.append(_Joint(model.parents[index] - 1, axis, maps, moved, -across, slides))
     return found
+
+
+def _stretch(places: np.ndarray) -> slice:
+    """Return the slice of two or three of three places."""
+    return slice(places[0], places[-1] + 1, places[1] - places[0])
 
 
 def _fill(
@@ -127,20 +164,29 @@ def _fill(
 
 
 def _motions(
-    joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+    joints: Sequence[_Joint],
+    gravity: np.ndarray,
+    q: np.ndarray,
+    dq: np.ndarray,
+    ddq: np.ndarray,
+    along: np.ndarray | None = None,
 ) -> list[tuple[np.ndarray, list[int]]]:
     """Return each body's motions (2 + c, 6, N) at a few samples (n, N), and the c joints that carry it.
 
-    These are its speed, its acceleration less gravity, and what a unit of speed of each of the joints makes.
+    These are its speed, its acceleration less gravity, and what a unit of speed of each of the joints makes; or, third
+    and last, what speeds `along` (n, N) make.
     """
-    still = np.zeros((6, q.shape[1]))
-    base = np.stack([still, still - gravity[:, None]])
+    base = np.zeros((2 if along is None else 3, 6, q.shape[1]))
+    base[1] -= gravity[:, None]
     found: list[tuple[np.ndarray, list[int]]] = []
     for index, joint in enumerate(joints):
         before, carrying = (base, []) if joint.parent < 0 else found[joint.parent]
-        own = np.concatenate([joint.seen(before, q[index]), np.broadcast_to(joint.axis[:, None], (1, *still.shape))])
-        own[0] += joint.axis[:, None] * dq[index]
-        own[1] += joint.axis[:, None] * ddq[index] + joint.crossed @ own[0] * dq[index]
+        own = joint.seen(before, q[index])
+        own[0] += own[-1] * dq[index]
+        own[1] += own[-1] * ddq[index] + joint.crossed @ own[0] * dq[index]
+        if along is not None:
+            own[2] += own[3] * along[index]
+            own = own[:3]
         found.append((own, [*carrying, index]))
     return found
 

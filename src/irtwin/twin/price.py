@@ -157,7 +157,7 @@ def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
             continue
         torque = stack.real_torque(piece, torque_values)
         slope = own[:, None] * power_slope(stack, piece, torque, power_values)
-        over_torque += np.einsum("tj,tjk->k", slope, stack.torque_columns(piece, torque_values)) * stack.real
+        over_torque[stack.real] += stack.carried(piece, slope, torque_values).sum(axis=0)
         over_power += own @ stack.predicted_power_columns(piece, torque_values, power_values)
     places = {(p.effect, p.joint, p.link, p.name): place for place, p in enumerate(twin.parameters)}
     result = np.zeros(len(twin.parameters))

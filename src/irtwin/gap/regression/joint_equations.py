@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -78,7 +79,8 @@ def joint_equations(
 
         def of_part(motion: Motion) -> Rows:
             own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
-            line = power_line(stack, motion, own, torque, stack.power_columns(motion, torque), power.values)
+            carrying = partial(carried, own, pattern=stack.pattern, real=stack.real)
+            line = power_line(stack, motion, carrying, torque, stack.power_columns(motion, torque), power.values)
             electrical = added.part(motion)
 
             def of_power() -> list[np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -58,6 +58,6 @@ class ThroughPower(Stack):
     def _columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
         torque_values, power_values = self._values
         own = self._own.predicted_power_columns(motion, torque_values, power_values)
-        columns = self._own.columns_by_joint(motion, torque_values)
-        carried = power_line(self._own, motion, columns, torque, own, power_values).carried
+        carrying = partial(self._own.carried, motion, values=torque_values)
+        carried = power_line(self._own, motion, carrying, torque, own, power_values).carried
         return np.column_stack([carried, own, -carried @ torque_values[self.real]])
