@@ -51,7 +51,7 @@ def left(robot: Robot, motions: list[Motion]) -> np.ndarray:
 @pytest.mark.parametrize("law", LAWS)
 def test_a_soft_law_is_followed_and_its_friction_found(law: str, width: float) -> None:
     motions = [measured(LAWS[law], width, seed) for seed in (1, 2)]
-    robot = with_friction_near_zero(ROBOT, motions, EFFECTS)
+    robot, _ = with_friction_near_zero(ROBOT, motions, EFFECTS)
     assert np.all(left(robot, motions) < 0.07)  # of noise of 0.05 N m
     assert np.all(left(ROBOT, motions) > 0.07)
     speeds = np.repeat(np.linspace(-4 * width, 4 * width, 81)[:, None], 2, axis=1)
@@ -60,7 +60,7 @@ def test_a_soft_law_is_followed_and_its_friction_found(law: str, width: float) -
 
 
 def test_sharp_friction_stays_sharp() -> None:
-    robot = with_friction_near_zero(ROBOT, [measured(None, 1.0, seed) for seed in (1, 2)], EFFECTS)
+    robot, _ = with_friction_near_zero(ROBOT, [measured(None, 1.0, seed) for seed in (1, 2)], EFFECTS)
     np.testing.assert_allclose(direction(robot, np.array([[0.006, -0.006]])), [[1, -1]], atol=0.02)
     np.testing.assert_allclose([joint.dry_friction for joint in robot.joints], truth(ROBOT)["Fc"], rtol=0.05)
 
@@ -69,7 +69,7 @@ def test_joints_have_laws_of_their_own() -> None:
     sharp, soft = measured(None, 1.0, 3), measured(LAWS["root"], 0.01, 3)
     assert sharp.torque is not None and soft.torque is not None
     mixed = replace(sharp, torque=np.column_stack([sharp.torque[:, 0], soft.torque[:, 1]]))
-    first, second = with_friction_near_zero(ROBOT, [mixed], EFFECTS).joints
+    first, second = with_friction_near_zero(ROBOT, [mixed], EFFECTS)[0].joints
     assert (first.friction_width or 0.0) < 0.003
     assert second.friction_width == pytest.approx(0.01, rel=0.3)
     assert second.friction_exponent == pytest.approx(2.0, rel=0.3)
@@ -79,7 +79,7 @@ def test_without_torque_friction_turns_at_once() -> None:
     known = replace(
         ROBOT, joints=tuple(replace(one, friction_width=0.01, friction_exponent=2.0) for one in ROBOT.joints)
     )
-    robot = with_friction_near_zero(known, [replace(measured(None, 1.0, 1), torque=None)], EFFECTS)
+    robot, _ = with_friction_near_zero(known, [replace(measured(None, 1.0, 1), torque=None)], EFFECTS)
     assert [(joint.friction_width, joint.dry_friction) for joint in robot.joints] == [(None, None)] * 2
 
 

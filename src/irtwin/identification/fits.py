@@ -14,6 +14,7 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
+from irtwin.identification.reduced_torque import ReducedTorque
 from irtwin.signals.motion import Motion
 
 Terms = Sequence[tuple[Effect, Term]]
@@ -25,15 +26,21 @@ _REPEATS = 8  # of fit and prediction, at most
 _SCALE = Term("scale", "1", spread=0.05)  # of real over logged torque, less one: drives' constants are nominal
 
 
-def fit_torque(stack: Stack, motions: Sequence[Motion]) -> tuple[list[Block], Estimate]:
-    """Fit the coefficients of torque to measured torque; return them with the equations, reduced."""
-    terms, known = _of(stack.torque_terms), stack.prior_rows(stack.torque_terms)
+def fit_torque(
+    stack: Stack, motions: Sequence[Motion], known: ReducedTorque | None = None
+) -> tuple[list[Block], Estimate]:
+    """Fit the coefficients of torque to measured torque; return them with the equations, reduced.
+
+    `known`: such equations of all these motions, if they were reduced before.
+    """
+    terms, prior = _of(stack.torque_terms), stack.prior_rows(stack.torque_terms)
+    reduced = None if known is None else known.of(stack)
 
     def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
-        blocks = accumulate(motions, _torque_equations(stack, values), stack.pattern)
-        return blocks, estimate(blocks, stack.pattern, terms, known)
+        blocks = reduced or accumulate(motions, _torque_equations(stack, values), stack.pattern)
+        return blocks, estimate(blocks, stack.pattern, terms, prior)
 
-    blocks, found = fit(_alone(stack, motions) if stack.coupled else None)
+    blocks, found = fit(_alone(stack, motions, known) if stack.coupled else None)
     for _ in range(_REPEATS if stack.coupled else 0):
         before = found.values
         blocks, found = fit(before)
@@ -223,12 +230,13 @@ def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
     return equations
 
 
-def _alone(stack: Stack, motions: Sequence[Motion]) -> np.ndarray:
+def _alone(stack: Stack, motions: Sequence[Motion], known: ReducedTorque | None) -> np.ndarray:
     """Return the coefficients of the effects that need no prediction, fitted without the others, which are none."""
     direct = Stack(stack.robot, [effect for effect in stack.effects if effect.signal == "torque" and not effect.needs])
     values = np.zeros(len(stack.torque_terms))
     if direct.torque_terms:
-        blocks = accumulate(motions, _torque_equations(direct, None), direct.pattern)
+        reduced = None if known is None else known.of(direct)
+        blocks = reduced or accumulate(motions, _torque_equations(direct, None), direct.pattern)
         found = estimate(blocks, direct.pattern, _of(direct.torque_terms))
         values[[not effect.needs for effect, _ in stack.torque_terms]] = found.values
     return values

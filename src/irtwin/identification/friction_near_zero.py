@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect
-from irtwin.effects.friction import CoulombFriction, sharp_sign, turn
+from irtwin.effects.friction import SLOW, CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
 from irtwin.identification.progress import track
+from irtwin.identification.reduced_torque import Column, ReducedTorque, column
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -30,15 +31,19 @@ _NEARLY_ALL = 0.85  # of the ranks: real turns have 0.87 and more, forms of fric
 _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
-def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> Robot:
+def with_friction_near_zero(
+    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]
+) -> tuple[Robot, ReducedTorque | None]:
     """Return the robot with each joint's dry friction and its turn, as its torque shows them beside some effects.
 
     A joint whose torque shows no turn, or in which it makes no sure difference, has friction that turns at once.
+    Beside it stand the equations of torque from which that was found, of columns as this robot has them; None where
+    there was no torque.
     """
     measured = [motion for motion in motions if motion.torque is not None]
     plain = replace(robot, joints=tuple(_with(joint, (None, None)) for joint in robot.joints))
     if not measured:
-        return plain
+        return plain, None
     named = {effect for effect in effects if isinstance(effect, str)}
     beside = [
         effect
@@ -53,11 +58,13 @@ def with_friction_near_zero(robot: Robot, motions: Sequence[Motion], effects: Se
         for shape in effect.candidates(plain)
         if isinstance(shape, JointEffect) and shape != effect
     ]
-    found = _found(stack, open_shapes, measured, [_COARSE] * len(robot.joints))
+    tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
+    found, blocks = _found(stack, open_shapes, measured, tried)
     if any(turn for turn, _ in found):
-        finer = [[] if turn is None else _around(turn) for turn, _ in found]
-        found = _found(stack, open_shapes, measured, finer)
-    return replace(plain, joints=tuple(_with(*both) for both in zip(plain.joints, found, strict=True)))
+        tried = [[] if turn is None else _around(turn) for turn, _ in found]
+        found, blocks = _found(stack, open_shapes, measured, tried)
+    turned = replace(plain, joints=tuple(_with(*both) for both in zip(plain.joints, found, strict=True)))
+    return turned, ReducedTorque(blocks, _places(stack, open_shapes, tried, turned))
 
 
 def _with(joint: Joint, found: Dry) -> Joint:
@@ -68,11 +75,14 @@ def _with(joint: Joint, found: Dry) -> Joint:
 
 def _found(
     stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
-) -> list[Dry]:
-    """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none."""
+) -> tuple[list[Dry], list[Block]]:
+    """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none.
+
+    Beside it stand the equations, reduced.
+    """
     blocks, pattern = _reduced(stack, open_shapes, motions, tried)
     every = track(enumerate(tried), "friction near zero speed of each joint")
-    return [_best(blocks, pattern, joint, turns) for joint, turns in every]
+    return [_best(blocks, pattern, joint, turns) for joint, turns in every], blocks
 
 
 def _around(found: Turn) -> list[Turn]:
@@ -112,10 +122,36 @@ def _reduced(
     return accumulate(motions, equations, pattern), pattern
 
 
+def _places(
+    stack: Stack, open_shapes: Sequence[JointEffect], tried: Sequence[Sequence[Turn]], turned: Robot
+) -> list[dict[Column, int]]:
+    """Return where in each joint's equations columns stand that the `turned` robot has, too."""
+    found = []
+    same = {effect: _alike(effect, stack.robot, turned) for effect in (*stack.effects, *open_shapes)}
+    for joint, used, turns in zip(turned.joints, stack.pattern, tried, strict=True):
+        own = [stack.torque_terms[k] for k in np.flatnonzero(used)]
+        own += [(shape, term) for shape in open_shapes for term in shape.joint_terms(joint)]
+        places = {column(*pair): place for place, pair in enumerate(own) if same[pair[0]]}
+        width, exponent = joint.friction_width, joint.friction_exponent
+        (dry,) = CoulombFriction().joint_terms(joint)
+        turn = 0 if width is None or exponent is None else 1 + list(turns).index((width, exponent))
+        found.append({**places, column(CoulombFriction(), dry): len(own) + turn})
+    return found
+
+
+def _alike(effect: Effect, one: Robot, other: Robot) -> bool:
+    """Return whether an effect's columns are the same of two robots, whose friction turns otherwise."""
+    shape = (16, len(one.joints))
+    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, *shape))
+    slow = Motion(np.arange(16.0), q, SLOW * dq, ddq, run="slow", temperature=np.full(shape, 50.0))
+    return np.array_equal(effect.columns(one, slow), effect.columns(other, slow))
+
+
 def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
     yield sharp_sign(dq)[:, None]
+    powers = {exponent: np.abs(dq) ** exponent for exponent in {exponent for _, exponent in shapes}}
     for width, exponent in shapes:
-        yield turn(dq, width, exponent)[:, None]
+        yield turn(dq, width, exponent, powers[exponent])[:, None]
 
 
 def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Dry:

@@ -65,7 +65,7 @@ def identify(
     measured = [motion for motion in motions if motion.torque is not None or motion.power is not None]
     if not with_torque and not with_power:
         raise InputError("neither torque nor power was measured in any run; log tau_, i_ or power")
-    robot = with_friction_near_zero(robot, with_torque, effects)
+    robot, reduced = with_friction_near_zero(robot, with_torque, effects)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
     left: list[Block] = []
@@ -73,8 +73,8 @@ def identify(
     condition: float | None = None
     change: float | None = None
     if with_torque:
-        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque)[1])
-        blocks, torque = fit_torque(stack, with_torque)
+        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, reduced)[1])
+        blocks, torque = fit_torque(stack, with_torque, reduced)
         powered = bool(with_power) and not stack.fixed.all()
         if powered:
             values = torque.values

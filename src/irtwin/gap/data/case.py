@@ -140,7 +140,7 @@ class Case:
         robot = self.robot
         for motions in (self.seen, self.others):
             if motions:
-                turned = with_friction_near_zero(self.robot, motions, self.effects)
+                turned, _ = with_friction_near_zero(self.robot, motions, self.effects)
                 both = zip(robot.joints, turned.joints, strict=True)
                 robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
         return replace(self, robot=robot)
