@@ -54,7 +54,8 @@ _CHUNK = 8192  # samples whose columns are held at once,
 _ROWS = 2048  # of which no more than this are left by decimation: they stay in the processor's cache
 _PANEL = 64  # columns that LAPACK takes together
 _ROUNDING = 1e-15  # of a column's square: less of what others leave of it is rounding
-_SHARED = 5e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
+_SHARED = 2e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
+_BESIDE = 100  # columns take as long as what a sample takes beside its columns
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SLOW = 0.02  # of the kernel: a row with more of it is slow, as one reversal outweighs many quiet rows
@@ -136,7 +137,8 @@ def accumulate_any(
     def grown(some: Sequence[tuple[Motion, int, int]]) -> list[Block]:
         return _grown(some, asked, lambda motion, start, stop: _Growing(motion, start, stop, pattern, kind))
 
-    blocks = grown(found) if samples * int(pattern.sum()) < _SHARED or not can_copy() else shared(grown, found)
+    long = samples * (_BESIDE + int(pattern.sum())) >= _SHARED
+    blocks = shared(grown, found) if long and can_copy() else grown(found)
     return [block for block in blocks if block.rows.any()]
 
 
