@@ -1,6 +1,7 @@
 """What `identify` of a long log costs, beside a loop over Pinocchio's regressor and `numpy.linalg.lstsq`.
 
-In bench/: `python identify_speed.py [SAMPLES] [--loop]`, each way in a process of its own, as memory is its most.
+In bench/: `python identify_speed.py [SAMPLES] [--loop | --read]`, each way in a process of its own, as memory is its
+most. `--read` is the bound by memory: all numbers of the log, read once.
 """
 
 from __future__ import annotations
@@ -50,6 +51,13 @@ def loop(robot: Robot, motion: Motion) -> np.ndarray:
     return np.asarray(np.linalg.lstsq(rows.reshape(-1, 12 * n), motion.torque.ravel())[0])
 
 
+def read(motion: Motion) -> None:
+    """Read all numbers of the log once."""
+    for part in (motion.time, motion.q, motion.dq, motion.ddq, motion.torque, motion.power):
+        assert part is not None
+        part.ravel() @ part.ravel()
+
+
 def _processor() -> float:
     """Return the seconds of processor that this process and its copies took."""
     return sum(os.times()[:4])
@@ -57,16 +65,18 @@ def _processor() -> float:
 
 def main() -> None:
     """Time one way on one log."""
-    words = [word for word in sys.argv[1:] if word != "--loop"]
+    words = [word for word in sys.argv[1:] if not word.startswith("--")]
     robot = read_urdf(URDFS / "kuka_kr6_r700.urdf")
     motion = log(robot, int(float(words[0])) if words else 200_000)
     began, used, before = time.perf_counter(), _processor(), most_used()
     if "--loop" in sys.argv:
         loop(robot, motion)
+    elif "--read" in sys.argv:
+        read(motion)
     else:
         identify(robot, [motion], [*BASELINE, "copper_loss"])
     wall, processor = time.perf_counter() - began, _processor() - used
-    print(f"{wall:.1f} s, {processor:.1f} s of processor, {(most_used() - before) / 1e6:.0f} MB more than the log")
+    print(f"{wall:.2f} s, {processor:.2f} s of processor, {(most_used() - before) / 1e6:.0f} MB more than the log")
 
 
 if __name__ == "__main__":
