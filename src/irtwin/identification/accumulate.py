@@ -14,7 +14,6 @@ from itertools import groupby
 import numpy as np
 import scipy
 
-from irtwin.effects.stack import side_by_side
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell_step
 from irtwin.identification.two_processes import can_copy, shared
@@ -216,8 +215,8 @@ class _Thin:
             slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
         rows = []
         for equation, used in enumerate(pattern):
-            columns = decimate(side_by_side(sample.own(equation, used)), taps, step)
-            rows.append(side_by_side([columns, measured[:, equation, None]]))
+            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
+            rows.append(np.column_stack([*columns, measured[:, equation]]))
         return cls(rows, keep, slow)
 
 
@@ -248,11 +247,6 @@ def triangle(rows: np.ndarray) -> np.ndarray:
     return np.triu(factored[: rows.shape[1]])
 
 
-def on_top(*parts: np.ndarray) -> np.ndarray:
-    """Return rows (some, k) of several arrays as one, each column in one stretch of memory: so LAPACK takes it."""
-    return np.concatenate([part.T for part in parts], axis=1).T
-
-
 class _Triangle:
     """Rows of k columns, reduced to a triangle as they come."""
 
@@ -260,7 +254,7 @@ class _Triangle:
         self._factor = np.zeros((0, columns))
 
     def add(self, rows: np.ndarray) -> None:
-        self._factor = triangle(on_top(self._factor, rows))
+        self._factor = triangle(np.concatenate([self._factor, rows]))
 
     def factor(self) -> np.ndarray:
         return self._factor
@@ -277,7 +271,7 @@ class _Products:
         if self._few is None:
             self._products += rows.T @ rows
             return
-        self._few = on_top(self._few, rows)
+        self._few = np.concatenate([self._few, rows])
         if len(self._few) > self._few.shape[1]:
             self._products, self._few = self._few.T @ self._few, None
 
@@ -323,10 +317,9 @@ class _Growing:
             slow = np.zeros_like(keep) if thin.slow is None else thin.slow[part, equation] & keep
             self._rows[equation] += keep.sum()
             self._slow_rows[equation] += slow.sum()
-            own = thin.rows[equation][part].T
-            reduced.add(own[:, keep & ~slow].T)
+            reduced.add(thin.rows[equation][part][keep & ~slow])
             if slow.any():
-                apart.add(own[:, slow].T)
+                apart.add(thin.rows[equation][part][slow])
 
     def block(self) -> Block:
         """Return what the block has become."""

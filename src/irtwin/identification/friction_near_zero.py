@@ -13,7 +13,7 @@ import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.friction import SLOW, CoulombFriction, sharp_sign, turn
-from irtwin.effects.stack import Stack
+from irtwin.effects.stack import Stack, side_by_side
 from irtwin.identification.accumulate import Block, Rows, accumulate
 from irtwin.identification.estimators import combine
 from irtwin.identification.progress import track
@@ -112,8 +112,8 @@ def _reduced(
         assert motion.torque is not None
         own = stack.columns_by_joint(motion)
         shapes = [sample for shape in open_shapes for sample in shape.samples(robot, motion, None)]
-        columns = [
-            [some, *(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])]
+        columns = [  # single columns take ten times as long to filter
+            [some, side_by_side([*(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])])]
             for k, some in enumerate(own)
         ]
         undecided = stack.undecided(motion) | sticking.undecided(motion)

@@ -58,31 +58,25 @@ def decimation(rate: float, cutoff: float) -> int:
 
 
 def decimate(signal: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
-    """Filter (N, ...) by the (2 K + 1,) taps and keep every step-th sample from sample K to N - K (exclusive).
-
-    What is returned has each column in one stretch of memory.
-    """
-    columns = signal.reshape(len(signal), -1).T
-    count = max(0, -(-(len(signal) - len(taps) + 1) // step))
-    if len(taps) == 1 or not count:
-        return np.asarray(signal[::step][:count])
+    """Filter (N, ...) by the (2 K + 1,) taps and keep every step-th sample from sample K to N - K (exclusive)."""
+    flat = signal.reshape(len(signal), -1)
+    count = max(0, -(-(len(flat) - len(taps) + 1) // step))
+    if len(taps) == 1:
+        return flat[::step].reshape((count, *signal.shape[1:]))
+    kept = np.empty((count, flat.shape[1]))
     band = _band(taps, step, min(_AT_ONCE, count))
-    rows, length = band.shape[1], band.shape[1] * step
-    stretches = -(-count // rows) + -(-len(band) // length) - 1
-    laid_out = np.zeros((len(columns), stretches * length))  # in stretches, each `length` samples on from the last
-    laid_out[:, : len(signal)] = columns[:, : laid_out.shape[1]]
-    laid_out = laid_out.reshape(-1, length)
-    kept = laid_out @ band[:length]
-    for begun in range(1, -(-len(band) // length)):  # what of the band lies in stretches further on
-        kept[:-begun] += laid_out[begun:, : len(band) - begun * length] @ band[begun * length : (begun + 1) * length]
-    return np.asarray(kept.reshape(len(columns), -1)[:, :count].T.reshape((count, *signal.shape[1:])))
+    for first in range(0, count, _AT_ONCE):
+        rows = min(_AT_ONCE, count - first)
+        length = (rows - 1) * step + len(taps)
+        kept[first : first + rows] = band[:rows, :length] @ flat[first * step : first * step + length]
+    return kept.reshape((count, *signal.shape[1:]))
 
 
 def _band(taps: np.ndarray, step: int, rows: int) -> np.ndarray:
-    """Return the matrix that filters and decimates: each column is the taps, `step` further on than in the last."""
-    band = np.zeros(((rows - 1) * step + len(taps), rows))
+    """Return the matrix that filters and decimates: each row is the taps, `step` further on than in the last."""
+    band = np.zeros((rows, (rows - 1) * step + len(taps)))
     for row in range(rows):
-        band[row * step : row * step + len(taps), row] = taps
+        band[row, row * step : row * step + len(taps)] = taps
     return band
 
 
