@@ -102,6 +102,14 @@ def by_drake(file: Path, joints: tuple[str, ...]) -> Inverse:
     return torque
 
 
+def by_irtwin(file: Path, joints: tuple[str, ...]) -> Inverse:
+    """The model as `--simulator` reads it."""
+    from irtwin.simulator.model import read_model
+
+    model = read_model(file, parse_urdf(file.with_suffix(".urdf").read_text()))
+    return lambda q, dq, ddq: model.torque(q[None], dq[None], ddq[None])[0]
+
+
 def by_mujoco(file: Path, joints: tuple[str, ...]) -> Inverse:
     import mujoco
 
@@ -138,6 +146,8 @@ ENGINES: dict[str, tuple[str, Callable[[Path, tuple[str, ...]], Inverse]]] = {
     "URDF, Drake": ("urdf", by_drake),
     "SDF, Drake": ("sdf", by_drake),
     "MJCF, MuJoCo": ("mjcf", by_mujoco),
+    "SDF, MuJoCo by irtwin": ("sdf", by_irtwin),
+    "USD, MuJoCo by irtwin": ("usd", by_irtwin),
 }
 HELD = ("rigid_body", "coulomb_friction", "viscous_friction")
 
@@ -162,7 +172,7 @@ def main() -> None:
                 except ModuleNotFoundError as error:
                     print(f"# {name}: {error}")
                     continue
-                wanted = known(twin, states, (*HELD, "rotor_inertia") if form == "mjcf" else HELD)
+                wanted = known(twin, states, (*HELD, "rotor_inertia") if form in ("mjcf", "usd") else HELD)
                 found = np.array([inverse(*state) for state in zip(q, dq, ddq, strict=True)])
                 print(
                     f"| {twin.robot.name} | {name} | {np.abs(found - wanted).max():.1e} | {np.abs(wanted).max():.0f} |"

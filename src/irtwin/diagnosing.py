@@ -56,15 +56,15 @@ def diagnose(
     """Diagnose the gap between a robot's twin, or its simulator, and its runs.
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
-    in their shapes, and its numbers as the prior. `simulator` is the file of a model of MuJoCo: what it says of the
-    observed motions is held against the robot, as runs of a simulator are; commands of runs are played through its
-    servos (channel "position"), and their torque is held against them. `withhold` takes effects out of the twin and
-    leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace`
-    the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to write, each
-    whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added,
-    `motion_file` the motion of the next experiment, where one is designed, `sysid_file` a Python script that fits
-    what differs by `mujoco.sysid`, `simulator_file` the simulator's model with the numbers that the robot has, and
-    beside it as many `draws` of what these could be, FILE-1 and so on.
+    in their shapes, and its numbers as the prior. `simulator` is the file of a model, MJCF, URDF, SDF or USD: what it
+    says of the observed motions is held against the robot, as runs of a simulator are; commands of runs are played
+    through its servos (channel "position"), and their torque is held against them. `withhold` takes effects out of the
+    twin and leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a
+    `workspace` the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to
+    write, each whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the
+    causes added, `motion_file` the motion of the next experiment, where one is designed, `sysid_file` a Python script
+    that fits what differs by `mujoco.sysid`, `simulator_file` the simulator's model with the numbers that the robot
+    has, and beside it as many `draws` of what these could be, FILE-1 and so on.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
@@ -78,6 +78,8 @@ def diagnose(
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
     model = None if simulator is None else read_model(Path(simulator), data_set.robot)
+    if model is not None and files.simulator is not None:
+        model.file.check_written(files.simulator)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:

@@ -193,11 +193,13 @@ def write_expectation(expected: Expectation, out: Path) -> None:
 
 
 def write_model(twin: Twin, form: str, out: Path) -> list[str]:
-    """Write a twin's robot as "urdf", "mjcf" or "sdf"; return a line on what that holds, and one on what it does not.
+    """Write a twin's robot as "urdf", "mjcf", "sdf" or "usd"; return lines on what that holds, and does not.
 
     Raises InputError where there is no place to write, or a body of the twin is not consistent.
     """
     check_place(out)
+    if form == "usd" and out.suffix not in (".usda", ".usd"):  # readers go by it
+        raise InputError(f"{out}: USD is written as text; name the file {out.stem}.usda")
     write(out, text_of(twin, form).encode())
     held = [f"{effect} ({place})" for effect, place in places(twin, form) if place]
     lacking = [effect for effect, place in places(twin, form) if not place]

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irtwin.errors import InputError
-from irtwin.simulator.model_file import read_model_file
+from irtwin.simulator.formats import read_model_file
 
 TEXT = """<?xml version='1.0'?>
 <!-- an arm; <joint name="lift" damping="7"/> was here -->
@@ -67,7 +67,7 @@ def test_an_element_of_another_file_is_not_changed(tmp_path):
     ("text", "said"),
     [
         ("<mujoco>", r"line 1, column 9: no element found; mend the XML"),
-        ("<sdf/>", r"outermost element is <sdf>; give a model of MuJoCo, <mujoco>, or a URDF"),
+        ("<world/>", r"outermost element is <world>; give an MJCF, <mujoco>, a URDF, an SDF or a USD"),
         ('<!DOCTYPE m [<!ENTITY a "b">]><mujoco/>', r"line 1: declares a document type; remove it"),
         ('<mujoco><include file="../other.xml"/></mujoco>', r'<include file="../other.xml"> is outside the folder'),
         ('<mujoco><asset><mesh file="/etc/passwd"/></asset></mujoco>', r"outside the folder of the model"),

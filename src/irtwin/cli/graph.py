@@ -163,6 +163,7 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
 @click.option("--urdf", type=FILE, help="URDF file to write: a robot's twin.")
 @click.option("--mjcf", type=FILE, help="The same for MuJoCo.")
 @click.option("--sdf", type=FILE, help="The same for Gazebo and Drake.")
+@click.option("--usd", metavar="FILE.usda", type=FILE, help="The same for Isaac Sim and Newton.")
 @click.option("--aas", type=FILE, help="FILE.aasx or FILE.json to write: a robot as an Asset Administration Shell.")
 @click.option("--mcap", type=FILE, help="MCAP file to write: a run, for ROS 2.")
 @click.option("--bag", type=PLACE, help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
@@ -180,6 +181,7 @@ def export(
     urdf: Path | None,
     mjcf: Path | None,
     sdf: Path | None,
+    usd: Path | None,
     aas: Path | None,
     mcap: Path | None,
     bag: Path | None,
@@ -194,9 +196,9 @@ def export(
     --ros writes a package for ROS 1 and 2 made of what the graph says of a robot: URDF, SRDF, limits, kinematics,
     RViz and launch files. MoveIt's setup needs nothing added to it. `irtwin robot ros` makes it of a URDF.
 
-    --urdf, --mjcf and --sdf write a robot with the bodies, damping, dry friction and armature of its twin, as far as
-    the format has them; what it has no place for is said. Of the URDF all else stays as it was. The package of --ros
-    has them too, where the robot has a twin.
+    --urdf, --mjcf, --sdf and --usd write a robot with the bodies, damping, dry friction and armature of its twin, as
+    far as the format has them; what it has no place for is said. Of the URDF all else stays as it was. The package of
+    --ros has them too, where the robot has a twin.
 
     --aas writes an Asset Administration Shell with nameplate, carbon footprint and energy a day. Needs irtwin[aas].
 
@@ -206,14 +208,15 @@ def export(
     \b
     Example: irtwin export --mjcf kr6.xml --robot KUKA_KR6_R700
     """
-    every = {"owl": owl, "ros": ros, "urdf": urdf, "mjcf": mjcf, "sdf": sdf, "aas": aas, "mcap": mcap, "bag": bag}
+    models = {"urdf": urdf, "mjcf": mjcf, "sdf": sdf, "usd": usd}
+    every = {"owl": owl, "ros": ros, **models, "aas": aas, "mcap": mcap, "bag": bag}
     form, out = _asked(every)
     if (run_name is not None) != (form in ("mcap", "bag")):
         raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
-    if form in ("urdf", "mjcf", "sdf"):
+    if form in models:
         _export_model(form, out, location, robot, twin)
     elif twin is not None:
-        raise click.UsageError("--twin goes with --urdf, --mjcf or --sdf.")
+        raise click.UsageError("--twin goes with --urdf, --mjcf, --sdf or --usd.")
     elif owl is not None:
         from irtwin import asking
 

@@ -155,8 +155,8 @@ def demo(
     "--simulator",
     metavar="MODEL.xml",
     type=FILE,
-    help="Model of the robot, MJCF or URDF, to hold the data against: what differs is said. Logs with commands are "
-    "played through it where it has servos. Needs irtwin[mujoco].",
+    help="Model of the robot, MJCF, URDF, SDF or USD, to hold the data against: what differs is said. Logs with "
+    "commands are played through it where it has servos. Needs irtwin[mujoco], and irtwin[usd] for USD.",
 )
 @click.option(
     "--save-simulator",

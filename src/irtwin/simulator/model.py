@@ -18,13 +18,14 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
-from irtwin.simulator.model_file import ModelFile, read_model_file
+from irtwin.simulator.assembly import add_servo
+from irtwin.simulator.formats import read_model_file
+from irtwin.simulator.model_file import ModelFile
 
 if TYPE_CHECKING:
     import mujoco
 
 _SECOND = " beside its servo"
-_GAINS = " by its controller's gains"
 _APART = 1e-3  # m, frames that are at one place
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
 
@@ -164,7 +165,7 @@ def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tupl
     except ModuleNotFoundError as error:
         raise InputError(f"{file.path}: reading a model needs MuJoCo; install irtwin[mujoco]") from error
     try:
-        spec = mujoco.MjSpec.from_file(str(file.path))
+        spec = file.spec()
         drop_pictures(spec, file.is_urdf)
         added = {joint: both for joint, both in gains.items() if add_servo(spec, joint, both)}
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
@@ -180,22 +181,6 @@ def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tupl
         return spec.compile(), delays, added
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
-
-
-def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bool:
-    """Give a joint a position servo in place of its motors; return whether it has none of its own."""
-    import mujoco
-
-    own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
-    if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
-        return False
-    for one in drives:
-        spec.delete(one)
-    servo = spec.add_actuator(name=f"{joint}{_GAINS}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-    servo.gainprm[0], servo.biasprm[:3] = gains[0], (0.0, -gains[0], -gains[1])
-    servo.forcelimited, servo.forcerange = own.actfrclimited, own.actfrcrange
-    return True
 
 
 def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:

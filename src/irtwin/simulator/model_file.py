@@ -1,16 +1,21 @@
-"""A model's file, MJCF or URDF: read without reaching outside its folder, and changed in single numbers."""
+"""A model's file of XML: read without reaching outside its folder, and changed in single numbers."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
+from irtwin.robot.xml_elements import outermost
+
+if TYPE_CHECKING:
+    import mujoco
 
 _MOST = 20_000_000  # bytes
 _IN_URDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
@@ -69,11 +74,20 @@ class ModelFile:
     @property
     def is_urdf(self) -> bool:
         """Whether it is a URDF."""
-        return self.tags[0].element == "robot"
+        return any(tag.element == "robot" for tag in self.tags[:1])
 
     def holds(self, number: str) -> bool:
-        """Return whether it has a place for a joint's number, by what MJCF calls it."""
+        """Return whether it has a place for a number, by what MJCF calls it."""
         return not self.is_urdf or number in _IN_URDF
+
+    def check_written(self, out: Path) -> None:
+        """Raise InputError where it cannot be written to another file."""
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return MuJoCo's specification of it. Raises ValueError or mujoco.FatalError where MuJoCo refuses it."""
+        import mujoco
+
+        return mujoco.MjSpec.from_file(str(self.path))
 
     def number(self, joint: str, number: str) -> tuple[Tag, str]:
         """Return the tag and the attribute that hold a joint's number."""
@@ -93,68 +107,33 @@ class ModelFile:
         return None
 
 
-def read_model_file(path: Path) -> ModelFile:
-    """Read a model file, and look at those that it names.
-
-    Raises InputError where one is no XML, has entities or more than 20 MB, or names a file outside the folder.
-    """
-    file = _scanned(path)
-    outermost = file.tags[0].element
-    if file.is_urdf:
-        return replace(file, tags=tuple(_with_dynamics(file.tags)))  # files that it names are meshes: nobody loads them
-    if outermost != "mujoco":
-        raise InputError(f"{path}: outermost element is <{outermost}>; give a model of MuJoCo, <mujoco>, or a URDF")
-    _check_inside(file, path.parent, {})
-    return file
-
-
-def _with_dynamics(tags: Sequence[Tag]) -> Iterator[Tag]:
-    """Yield the tags of a URDF, with one of <dynamics> that is yet to come in each joint that has none."""
-    for place, tag in enumerate(tags):
-        yield tag
-        inside = takewhile(lambda one: one.element not in ("joint", "link"), tags[place + 1 :])
-        if tag.element == "joint" and not any(one.element == "dynamics" for one in inside):
-            yield Tag("dynamics", {}, tag.stop, tag.stop)
-
-
-def _scanned(path: Path) -> ModelFile:
+def read_xml(path: Path) -> ModelFile:
+    """Read the XML of a model file. Raises InputError where it is none, declares a document type, or is over 20 MB."""
     content = read_input(path, _MOST)
     as_text(path, content)  # what is changed is sought byte by byte
-    tags: list[Tag] = []
-    parser = expat.ParserCreate()
-
-    def begin(element: str, attributes: dict[str, str]) -> None:
-        start = parser.CurrentByteIndex
-        tags.append(Tag(element, attributes, start, _end(content, start)))
-
-    def refuse(*_: object) -> None:
-        raise InputError(f"{path}, line {parser.CurrentLineNumber}: declares a document type; remove it")
-
-    parser.StartElementHandler = begin
-    parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(content, True)
+        whole = outermost(content)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise InputError(f"{path}, line {error.lineno}, column {error.offset + 1}: {reason}; mend the XML") from error
-    return ModelFile(path, content, tuple(tags))
+    except ValueError as error:
+        raise InputError(f"{path}, {error}") from error
+    return ModelFile(path, content, tuple(Tag(one.tag, one.attributes, one.start, one.inside) for one in whole.walk()))
 
 
-def _end(content: bytes, start: int) -> int:
-    """Return where the start tag that begins at a byte is over; `>` may stand in a value."""
-    quote = b""
-    for place in range(start, len(content)):
-        byte = content[place : place + 1]
-        if quote:
-            quote = b"" if byte == quote else quote
-        elif byte in (b'"', b"'"):
-            quote = byte
-        elif byte == b">":
-            return place + 1
-    raise AssertionError("the parser has seen its end")
+def with_dynamics(file: ModelFile) -> ModelFile:
+    """Return a URDF with a tag of <dynamics> that is yet to come in each joint that has none."""
+    tags: list[Tag] = []
+    for place, tag in enumerate(file.tags):
+        tags.append(tag)
+        if tag.element == "joint":
+            inside = takewhile(lambda one: one.element not in ("joint", "link"), islice(file.tags, place + 1, None))
+            if not any(one.element == "dynamics" for one in inside):
+                tags.append(Tag("dynamics", {}, tag.stop, tag.stop))
+    return replace(file, tags=tuple(tags))
 
 
-def _check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
+def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
     """Raise InputError where a file, or one that it includes, names one outside the folder of the model."""
     seen[file.path] = None
     folders: dict[str, str] = {}
@@ -170,7 +149,7 @@ def _check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None
                 f'{file.path}: <{element} file="{named}"> is outside the folder of the model; move it there'
             )
         if element == "include" and place not in seen:
-            _check_inside(_scanned(place), folder, seen)
+            check_inside(read_xml(place), folder, seen)
 
 
 def _files(file: ModelFile) -> Iterator[tuple[str, str]]:

@@ -23,7 +23,18 @@ OF_JOINTS = ("stiffness", "damping", "friction", "holding", "armature", "offset"
 PARTS = {"payload": ("payload", "payload_x", "payload_y", "payload_z"), "base_tilt": ("tilt_x", "tilt_y")}
 OF_ROBOT = tuple(name for names in PARTS.values() for name in names)  # the same at all joints
 NAMES = (*OF_JOINTS, *OF_ROBOT)
-_IN_JOINT = {"frictionloss": "friction", "armature": "armature"}  # attribute and name
+CALLED = {  # by what a model's file calls it, and MuJoCo's specification
+    "stiffness": "kp",
+    "damping": "damping",
+    "friction": "frictionloss",
+    "holding": "solimpfriction",
+    "armature": "armature",
+    "offset": "offset",
+    "delay": "delay",
+    "torque_limit": "forcerange",
+    "payload": "inertial",
+    "base_tilt": "gravity",
+}
 _IN_SERVO = ("stiffness", "offset", "delay", "torque_limit")  # and damping, of some
 _UNLIMITED = np.array([[-1e12], [1e12]])  # N m
 _FARTHEST = 2 * np.pi  # rad that a joint is off: a servo without limit gives no more torque than there
@@ -71,6 +82,12 @@ class Servos:
         found = np.repeat(np.isin(NAMES, OF_JOINTS)[:, None], self.numbers.shape[1], axis=1)
         found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
         return found
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        """Whether the file has a place for each number (k, n) that one can have; a dead band is played alone."""
+        holds = [part_of(name) not in CALLED or self.model.file.holds(CALLED[part_of(name)]) for name in NAMES]
+        return np.array(holds)[:, None] & (self.in_file | ~np.isin(NAMES, _IN_SERVO)[:, None])
 
     @cached_property
     def in_file(self) -> np.ndarray:
@@ -143,7 +160,8 @@ class Servos:
         What the file has no place for stays out: a URDF's friction that creeps and armature, and gains that are told.
         """
         changes: dict[Tag, dict[str, float | str | None]] = {}
-        file = self.model.file
+        file, differs = self.model.file, differs & self.held
+        numbers = np.where(self.held, numbers, self.numbers)
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
         for place, joint in enumerate(self.model.joints):
             own = dict(zip(NAMES, differs[:, place], strict=True))
@@ -151,10 +169,10 @@ class Servos:
             of_joint: dict[str, float | str | None] = {}
             if own["damping"] and in_joint[place] != self.dampings(self.numbers[1])[0][place]:
                 of_joint["damping"] = float(in_joint[place])
-            of_joint |= {key: told[name] for key, name in _IN_JOINT.items() if own[name]}
+            of_joint |= {CALLED[name]: told[name] for name in ("friction", "armature") if own[name]}
             if own["holding"]:
                 of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
-            for key in filter(file.holds, of_joint):
+            for key in of_joint:
                 tag, attribute = file.number(joint, key)
                 changes.setdefault(tag, {})[attribute] = of_joint[key]
             if self.in_file[place] and any(own[name] for name in ("damping", *_IN_SERVO)):
@@ -170,13 +188,10 @@ class Servos:
 
     def unwritten(self, differs: np.ndarray) -> list[str]:
         """Return which numbers that differ (k, n) the file has no place for, in words."""
-        told = []
-        for row, name in enumerate(OF_JOINTS):
-            lacks = ~self.in_file if name in _IN_SERVO else np.zeros(len(self.in_file), dtype=bool)
-            lacks |= self.model.file.is_urdf and name in ("holding", "armature")
-            told += [f"{name} of {self.model.joints[place]}" for place in np.flatnonzero(differs[row] & lacks)]
-        parts = [part for part in PARTS if self.model.file.is_urdf and differs[row_of(part)].any()]
-        return told + [part.replace("_", " ") for part in parts]
+        lacks = differs & ~self.held
+        rows = [(name, lacks[row]) for row, name in enumerate(OF_JOINTS)]
+        told = [f"{name} of {self.model.joints[place]}" for name, row in rows for place in np.flatnonzero(row)]
+        return told + [part.replace("_", " ") for part in PARTS if lacks[row_of(part)].any()]
 
     def _of_servo(
         self, tag: Tag, place: int, told: Mapping[str, float], own: Mapping[str, bool], damping: float

@@ -13,18 +13,9 @@ from irtwin.document.document import Document
 from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.differences import not_held
 from irtwin.simulator.payload import together
-from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, tilted
+from irtwin.simulator.servos import CALLED, HOLDS, NAMES, OF_JOINTS, tilted
 
 _SCRIPT = Path(__file__).with_name("sysid_script.py")
-_CALLED = {  # by what a model's file calls it, and MuJoCo's specification
-    "stiffness": "kp",
-    "friction": "frictionloss",
-    "holding": "solimpfriction",
-    "armature": "armature",
-    "offset": "offset",
-    "delay": "delay",
-    "torque_limit": "forcerange",
-}
 _LEAST = 0.1  # of the smaller side, of what may not: motion alone hardly tells the scale of a joint without gravity
 _SIGNED = {  # what may be below zero, and how far beyond both sides it is sought at least: rad, m, m/s^2
     "offset": (0.0,),
@@ -80,8 +71,8 @@ def free(chosen: DifferingNumbers) -> Iterator[Free]:
             if name == "damping":
                 which = int(ways[0][1, place] != ways[1][1, place])  # of two, what differs
                 yield _bounded(joint, ("damping", "kv")[which], *(some[which, place] for some in ways))
-            elif name in _CALLED:
-                yield _bounded(joint, _CALLED[name], own[row, place], robots[row, place])
+            elif name in CALLED:
+                yield _bounded(joint, CALLED[name], own[row, place], robots[row, place])
     mass, *off = robots[len(OF_JOINTS) :, 0]
     if chosen.differs[NAMES.index("payload")].any():
         bare, laden = (together(model.compiled, model.flange, each, np.array(off[:3])) for each in (0.0, mass))

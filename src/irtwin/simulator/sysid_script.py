@@ -19,7 +19,9 @@ import numpy as np
 from mujoco import sysid
 
 from irtwin.signals.log import DataSet, read_data_set
-from irtwin.simulator.model import add_servo, drop_pictures
+from irtwin.simulator.assembly import add_servo
+from irtwin.simulator.formats import read_model_file
+from irtwin.simulator.model import drop_pictures
 
 # files, from where this one is
 MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"
@@ -79,8 +81,9 @@ def parameters() -> sysid.ParameterDict:
 
 def loaded(model: Path) -> mujoco.MjSpec:
     """Return a model's specification, with servos by the controllers' gains that are told."""
-    spec = mujoco.MjSpec.from_file(str(model))
-    if model.suffix == ".urdf":  # what pictures need may be missing
+    file = read_model_file(model)
+    spec = file.spec()
+    if file.is_urdf:  # what pictures need may be missing
         drop_pictures(spec, is_urdf=True)
     for joint, gains in GAINS.items():
         add_servo(spec, joint, gains)

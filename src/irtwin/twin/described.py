@@ -17,18 +17,21 @@ from irtwin.robot.sdf_text import sdf_text
 from irtwin.robot.structure import Structure, structure_of
 from irtwin.robot.urdf import parse_urdf
 from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.robot.usd_text import usd_text
 from irtwin.twin.twin import Twin
 
 _URDF = {"damping": "damping", "frictionloss": "friction"}  # what MJCF's numbers are called
-NUMBERS = {"urdf": _URDF, "mjcf": {name: name for name in (*_URDF, "armature")}, "sdf": _URDF}
+_MJCF = {name: name for name in (*_URDF, "armature")}
+NUMBERS = {"urdf": _URDF, "mjcf": _MJCF, "sdf": _URDF, "usd": _URDF | {"armature": "armature"}}
 _SAME = 1e-12  # of a body's numbers
 
 
 def text_of(twin: Twin, form: str) -> str:
-    """Return the twin's robot in a format, "urdf", "mjcf" or "sdf". Raises InputError as `described` does."""
+    """Return the twin's robot in a format of NUMBERS. Raises InputError as `described` does."""
     robot = described(twin, twin.robot)
-    if form == "mjcf":
-        return mjcf_text(robot, {joint: numbers.get("armature", 0.0) for joint, numbers in _numbers(twin).items()})
+    if form in ("mjcf", "usd"):
+        armature = {joint: numbers.get("armature", 0.0) for joint, numbers in _numbers(twin).items()}
+        return mjcf_text(robot, armature) if form == "mjcf" else usd_text(robot, armature)
     return sdf_text(robot) if form == "sdf" else robot.urdf
 
 

@@ -1,0 +1,73 @@
+"""Elements of XML and where they stand among its bytes, so that one is changed and all else stays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+_TAG = re.compile(rb"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
+
+
+@dataclass
+class Element:
+    """An element of the bytes from `start` to `stop`, its start tag as far as `inside`."""
+
+    tag: str
+    attributes: dict[str, str]
+    start: int
+    inside: int
+    stop: int = 0
+    children: list[Element] = field(default_factory=list)
+
+    def child(self, tag: str) -> Element | None:
+        """Return its first child of a tag, None where it has none."""
+        return next((one for one in self.children if one.tag == tag), None)
+
+    def walk(self) -> Iterator[Element]:
+        """Yield it and all within it, in the order of the file."""
+        todo = [self]
+        while todo:
+            yield (one := todo.pop())
+            todo += reversed(one.children)
+
+
+def outermost(content: bytes) -> Element:
+    """Return the outermost element. Raises expat.ExpatError, and ValueError where it declares a document type."""
+    parser = expat.ParserCreate()
+    open_ones = [Element("", {}, 0, 0)]
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        start = parser.CurrentByteIndex
+        tag_text = _TAG.match(content, start)
+        assert tag_text is not None  # the parser has seen it whole
+        element = Element(tag, attributes, start, tag_text.end())
+        open_ones[-1].children.append(element)
+        open_ones.append(element)
+
+    def end(tag: str) -> None:
+        element = open_ones.pop()
+        closed = content.endswith(b"/>", element.start, element.inside)
+        element.stop = element.inside if closed else content.index(b">", parser.CurrentByteIndex) + 1
+
+    def refuse(*_: object) -> None:
+        raise ValueError(f"line {parser.CurrentLineNumber}: declares a document type; remove it")
+
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.StartDoctypeDeclHandler = refuse
+    parser.Parse(content, True)
+    return open_ones[0].children[0]
+
+
+def with_child(content: bytes, element: Element, tag: str, text: str) -> bytes:
+    """Return the bytes with the element's child of a tag replaced by a text, or with such a child."""
+    child = element.child(tag)
+    if child is not None:
+        return content[: child.start] + text.encode() + content[child.stop :]
+    before, own, after = content[: element.start], content[element.start : element.stop], content[element.stop :]
+    if own.endswith(b"/>"):
+        own = own[:-2].rstrip() + f"></{element.tag}>".encode()
+    place = own.rindex(b"</")
+    gap = b"\n" if b"\n" in own else b""
+    return before + own[:place].rstrip() + gap + text.encode() + gap + own[place:] + after

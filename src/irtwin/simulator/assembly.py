@@ -1,0 +1,147 @@
+"""Links and joints, as SDF and USD tell them, made into a model of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import mujoco
+
+WORLD = "world"
+_SERVO = " by its servo"
+_MOST = 500  # links, base to flange: MuJoCo goes down the tree by recursion
+_UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # MuJoCo's order of an inertia's numbers
+
+
+@dataclass(frozen=True)
+class Link:
+    """A body: kg, its centre (3,), m, and the inertia (3, 3) about that, kg m^2, in its own axes.
+
+    `place` (4, 4): where it is in the world, if no joint moves it. `frames`: points (3,) of it that have a name.
+    """
+
+    name: str
+    place: np.ndarray
+    mass: float = 0.0
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+    frames: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint: "revolute", "prismatic" or "fixed"; rad, N m and the like, or m and N.
+
+    `origin` (4, 4): the child in its parent, the joint at zero; `anchor` and `axis` (3,) in the child. `numbers`: those
+    of a joint that MJCF calls so. `effort`: the most that drives it. `servo`: its gains; None where it has none.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: np.ndarray
+    anchor: np.ndarray
+    axis: np.ndarray
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    effort: float = np.inf
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    servo: tuple[float, float] | None = None
+
+
+def assembled(links: Iterable[Link], connections: Sequence[Connection], gravity: np.ndarray) -> mujoco.MjSpec:
+    """Return the specification of links; those that no joint connects to another stand fixed in the world.
+
+    gravity: (3,) m/s^2. Raises ValueError, saying why, where joints make no tree, or a number is not finite.
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = gravity
+    above: dict[str, Connection] = {}
+    for one in connections:
+        _check_finite(
+            f'joint "{one.name}"', one.origin, one.anchor, one.axis, *one.numbers.values(), *(one.servo or ())
+        )
+        if one.child in above:
+            raise ValueError(f'link "{one.child}" is the child of two joints, {above[one.child].name} and {one.name}')
+        above[one.child] = one
+    below: dict[str, list[Link]] = {}
+    for link in links:
+        _check_finite(f'link "{link.name}"', link.place, link.mass, link.centre, link.inertia)
+        below.setdefault(above[link.name].parent if link.name in above else WORLD, []).append(link)
+    todo = [(WORLD, spec.worldbody, 0)]
+    while todo:
+        parent, body, depth = todo.pop()
+        for link in below.pop(parent, ()):
+            todo.append((link.name, _body(body, link, above.get(link.name)), depth + 1))
+        if depth > _MOST:
+            raise ValueError(f"a chain of more than {_MOST} links cannot be modelled")
+    if below:
+        raise ValueError(f'the joints about link "{next(iter(below.values()))[0].name}" form a loop, or lead nowhere')
+    for one in connections:
+        if one.servo is not None:
+            add_servo(spec, one.name, one.servo)
+    return spec
+
+
+def _check_finite(what: str, *values: np.ndarray | float) -> None:
+    if not all(np.isfinite(one).all() for one in values):
+        raise ValueError(f"{what} has a number that is not finite")
+
+
+def _body(parent: mujoco.MjsBody, link: Link, joint: Connection | None) -> mujoco.MjsBody:
+    place = link.place if joint is None else joint.origin
+    body = parent.add_body(name=link.name, pos=place[:3, 3], quat=_quaternion(place))
+    if link.mass:
+        body.mass, body.ipos, body.explicitinertial = link.mass, link.centre, True
+        body.fullinertia = [link.inertia[at] for at in _UPPER]
+    for name, at in link.frames.items():
+        body.add_site(name=name, pos=at)
+    if joint is not None and joint.kind != "fixed":
+        _joint(body, joint)
+    return body
+
+
+def _joint(body: mujoco.MjsBody, one: Connection) -> None:
+    import mujoco
+
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if one.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+    joint = body.add_joint(name=one.name, type=kind, pos=one.anchor, axis=one.axis)
+    if np.isfinite(one.limits).all():
+        joint.limited, joint.range = True, one.limits
+    if np.isfinite(one.effort):
+        joint.actfrclimited, joint.actfrcrange = True, (-one.effort, one.effort)
+    joint.armature, joint.frictionloss = one.numbers.get("armature", 0.0), one.numbers.get("frictionloss", 0.0)
+    joint.damping[0], joint.stiffness[0] = one.numbers.get("damping", 0.0), one.numbers.get("stiffness", 0.0)
+    joint.springref = one.numbers.get("springref", 0.0)
+
+
+def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bool:
+    """Give a joint a position servo in place of its motors; return whether it has none of its own."""
+    import mujoco
+
+    own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
+    if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
+        return False
+    for one in drives:
+        spec.delete(one)
+    servo = spec.add_actuator(name=f"{joint}{_SERVO}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servo.gainprm[0], servo.biasprm[:3] = gains[0], (0.0, -gains[0], -gains[1])
+    servo.forcelimited, servo.forcerange = own.actfrclimited, own.actfrcrange
+    own.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the servo has it now
+    return True
+
+
+def _quaternion(place: np.ndarray) -> np.ndarray:
+    import mujoco
+
+    found = np.empty(4)
+    mujoco.mju_mat2Quat(found, place[:3, :3].ravel())
+    return found

@@ -1,0 +1,30 @@
+"""A model's file in each of the formats that are read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from irtwin.errors import InputError
+from irtwin.simulator.model_file import ModelFile, check_inside, read_xml, with_dynamics
+from irtwin.simulator.sdf_file import SdfFile
+from irtwin.simulator.usd_file import ENDINGS, read_usd
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """Read a model file, MJCF, URDF, SDF or USD, and look at those that it names.
+
+    Raises InputError where one is none of these, has entities or is too large, or names a file outside the folder.
+    """
+    if path.suffix.lower() in ENDINGS:
+        return read_usd(path)
+    file = read_xml(path)
+    match file.tags[0].element:
+        case "robot":
+            return with_dynamics(file)  # files that it names are meshes: nobody loads them
+        case "sdf":
+            return SdfFile(file.path, file.content, file.tags)  # the same
+        case "mujoco":
+            check_inside(file, path.parent, {})
+            return file
+        case other:
+            raise InputError(f"{path}: outermost element is <{other}>; give an MJCF, <mujoco>, a URDF, an SDF or a USD")

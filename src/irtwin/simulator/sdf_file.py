@@ -1,0 +1,227 @@
+"""A model in SDF, as Gazebo and Drake have it: read into MuJoCo, and changed in numbers of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+import scipy
+from defusedxml import ElementTree as SafeXml
+
+from irtwin.errors import InputError
+from irtwin.robot.urdf import numbers
+from irtwin.robot.xml_elements import outermost, with_child
+from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
+from irtwin.simulator.model_file import ModelFile, Tag
+
+if TYPE_CHECKING:
+    import mujoco
+
+_IN_SDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
+_READ = {**_IN_SDF, "stiffness": "spring_stiffness", "springref": "spring_reference"}
+_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+_KNOWN = {  # where a word that SDF does not know would take a number away
+    "dynamics": {*_READ.values()},
+    "limit": {"lower", "upper", "effort", "velocity", "stiffness", "dissipation"},
+    "inertial": {"mass", "pose", "inertia", "density", "auto_inertia_params", "fluid_added_mass"},
+    "inertia": {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"},
+}
+_NO_LIMIT = 1e16  # as SDF has it by itself
+_MODEL = "__model__"
+_BEFORE = (1, 4)  # the last version whose axes are said in the frame of the model
+
+
+class SdfFile(ModelFile):
+    """An SDF: its numbers are texts of elements, where those of MJCF and URDF are attributes."""
+
+    def holds(self, number: str) -> bool:
+        """Return whether it has a place for a number, by what MJCF calls it."""
+        return number in _IN_SDF
+
+    def number(self, joint: str, number: str) -> tuple[Tag, str]:
+        """Return the joint's tag, and the element of its <dynamics> that holds a number."""
+        return self.tag(["joint"], "name", joint), _IN_SDF[number]
+
+    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
+        """Return the file with numbers of joints changed; all else stays, byte for byte."""
+        content = self.content
+        for tag in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+            for name, value in changes[tag].items():
+                joint = next(one for one in outermost(content).walk() if one.start == tag.start)
+                axis, text = joint.child("axis"), f"<{name}>{value!r}</{name}>"
+                assert axis is not None  # else it does not move
+                dynamics = axis.child("dynamics")
+                if dynamics is None:
+                    content = with_child(content, axis, "dynamics", f"<dynamics>{text}</dynamics>")
+                else:
+                    content = with_child(content, dynamics, name, text)
+        return content
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return the one model that has joints. Raises InputError where it cannot be told, ValueError if no tree."""
+        root = SafeXml.fromstring(self.content, forbid_dtd=True)
+        _check_words(root, str(self.path))
+        models = [*root.findall("model"), *root.findall("world/model")]
+        models = [model for model in models if model.find("joint/axis") is not None] or models[:1]
+        if len(models) != 1:
+            names = ", ".join(str(model.get("name")) for model in models)
+            raise InputError(f"{self.path}: has {len(models)} models with joints ({names}); give a file of the robot's")
+        (model,) = models
+        other = next((one.tag for one in model if one.tag in ("include", "model")), None)
+        if other is not None:
+            raise InputError(f"{self.path}: its model has <{other}>; write it out whole, as `gz sdf -p` does")
+        source = f'{self.path}: model "{model.get("name")}"'
+        frames = _Frames(model, source)
+        version = tuple(int(one) for one in str(root.get("version", "1.7")).split(".") if one.isdigit())
+        links = (_link(link, frames, source) for link in model.findall("link"))
+        joints = [_joint(joint, frames, source, version <= _BEFORE) for joint in model.findall("joint")]
+        gravity = root.findtext("world/gravity")
+        return assembled(links, joints, np.array(numbers(gravity or "0 0 -9.81", 3, f"{self.path}: gravity")))
+
+
+class _Frames:
+    """Frames of a model by name, each said in another one."""
+
+    def __init__(self, model: Element, source: str) -> None:
+        self.source = source
+        self.links = {str(one.get("name")) for one in model.findall("link")}
+        fixed = {one: one.get("attached_to", _MODEL) for one in model.findall("frame")}
+        moved = {one: one.findtext("child", "").strip() for one in model.findall("joint")}
+        self.attached = {str(one.get("name")): to for one, to in (fixed | moved).items()}
+        self._said: dict[str, tuple[Element, str]] = {}
+        for one in (*model.findall("link"), *fixed, *moved):
+            pose, name = one.find("pose"), str(one.get("name"))
+            beside = None if pose is None else pose.get("relative_to")
+            self._said[name] = one, beside or self.attached.get(name, _MODEL)
+        self._found = {_MODEL: _pose(model, source)}
+        self.on: dict[str, list[str]] = {}
+        for one in fixed:
+            self.on.setdefault(self._end(str(one.get("name"))), []).append(str(one.get("name")))
+
+    def place(self, name: str) -> np.ndarray:
+        """Return where a frame is in the world, (4, 4)."""
+        way = [name]
+        while way[-1] not in self._found:
+            if way[-1] not in self._said:
+                raise InputError(f'{self.source}: has no frame "{way[-1]}", which another is said in')
+            way.append(self._said[way[-1]][1])
+            self._check(way)
+        for one, beside in reversed(list(pairwise(way))):
+            self._found[one] = self._found[beside] @ _pose(self._said[one][0], f"{self.source}: {one}")
+        return self._found[name]
+
+    def link(self, name: str) -> str:
+        """Return the link that a frame is fixed to."""
+        found = self._end(name)
+        if found not in self.links and found != WORLD:
+            raise InputError(f'{self.source}: has no link "{name}", which a joint names')
+        return found
+
+    def _end(self, name: str) -> str:
+        way = [name]
+        while way[-1] in self.attached:
+            way.append(self.attached[way[-1]])
+            self._check(way)
+        return way[-1]
+
+    def _check(self, way: list[str]) -> None:
+        if len(way) > len(self._said) + 1:
+            raise InputError(f'{self.source}: frame "{way[-1]}" is said in itself')
+
+
+def _pose(element: Element, where: str) -> np.ndarray:
+    """Return the (4, 4) of an element's <pose>; where it has none, nothing is moved."""
+    pose = element.find("pose")
+    if pose is None or not (pose.text or "").strip():
+        return np.eye(4)
+    turned = pose.get("rotation_format") == "quat_xyzw"
+    *xyz, first, second, third = values = numbers(pose.text, 7 if turned else 6, f"{where}: pose")
+    if turned:
+        turn = scipy.spatial.transform.Rotation.from_quat(values[3:]).as_matrix()
+        return np.asarray(pin.SE3(turn, np.array(values[:3])).homogeneous)
+    angles = np.array([first, second, third])
+    angles = np.deg2rad(angles) if pose.get("degrees", "").strip() in ("true", "1") else angles
+    return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(angles), np.array(xyz)).homogeneous)
+
+
+def _link(link: Element, frames: _Frames, source: str) -> Link:
+    name = str(link.get("name"))
+    where, place = f'{source}: link "{name}"', frames.place(name)
+    inertial = link.find("inertial")
+    if inertial is not None and inertial.get("auto") in ("true", "1"):
+        raise InputError(f"{where}: its inertia is that of its shapes (auto); give its mass and inertia")
+    body = Element("inertial") if inertial is None else inertial
+    within = _pose(body, where)
+    turn, moments = within[:3, :3], np.zeros((3, 3))
+    for row, first in enumerate("xyz"):
+        for column, second in enumerate("xyz"[row:], row):
+            value = _number(body, f"inertia/i{first}{second}", float(row == column), where)
+            moments[row, column] = moments[column, row] = value
+    own = np.linalg.inv(place)
+    return Link(
+        name,
+        place,
+        _number(body, "mass", 1.0, where),
+        within[:3, 3],
+        turn @ moments @ turn.T,
+        {one: (own @ frames.place(one))[:3, 3] for one in frames.on.get(name, ())},
+    )
+
+
+def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> Connection:
+    name, kind = str(joint.get("name")), str(joint.get("type"))
+    where = f'{source}: joint "{name}"'
+    if kind not in _KINDS:
+        raise InputError(f'{where}: type "{kind}" cannot be modelled; use {", ".join(_KINDS)}')
+    parent, child = (frames.link((joint.findtext(end) or "").strip()) for end in ("parent", "child"))
+    place = frames.place(child)
+    within = np.linalg.inv(place) @ frames.place(name)
+    beside = np.eye(4) if parent == WORLD else frames.place(parent)
+    origin = np.linalg.inv(beside) @ place
+    axis = joint.find("axis")
+    if axis is None or kind == "fixed":
+        return Connection(name, "fixed", parent, child, origin, within[:3, 3], np.array([0.0, 0.0, 1.0]))
+    xyz = axis.find("xyz")
+    said = None if xyz is None else xyz.get("expressed_in")
+    of_model = axis.findtext("use_parent_model_frame", str(of_model)).strip().lower() in ("true", "1")
+    frame = within if not said and not of_model else np.linalg.inv(place) @ frames.place(said or _MODEL)
+    along = frame[:3, :3] @ numbers("0 0 1" if xyz is None else xyz.text, 3, f"{where}: axis")
+    lower, upper = (
+        _number(axis, f"limit/{end}", end_of, where) for end, end_of in (("lower", -np.inf), ("upper", np.inf))
+    )
+    effort = _number(axis, "limit/effort", np.inf, where)
+    return Connection(
+        name,
+        _KINDS[kind],
+        parent,
+        child,
+        origin,
+        within[:3, 3],
+        along,
+        (lower, upper) if kind != "continuous" and -_NO_LIMIT < lower <= upper < _NO_LIMIT else (-np.inf, np.inf),
+        effort if 0 < effort < _NO_LIMIT else np.inf,
+        {number: _number(axis, f"dynamics/{word}", 0.0, where) for number, word in _READ.items()},
+    )
+
+
+def _number(element: Element, path: str, otherwise: float, where: str) -> float:
+    text = (element.findtext(path) or "").strip()
+    if text.lower().lstrip("+-") in ("inf", "infinity"):
+        return float(text)
+    return numbers(text, 1, f"{where}: {path}")[0] if text else otherwise
+
+
+def _check_words(root: Element, source: str) -> None:
+    """Raise InputError where an element with numbers has one that SDF does not know: it would be lost unseen."""
+    for name, word in _unknown(root):
+        raise InputError(f"{source}: <{name}> has <{word}>, which SDF does not know; it has {', '.join(_KNOWN[name])}")
+
+
+def _unknown(root: Element) -> Iterator[tuple[str, str]]:
+    for name, known in _KNOWN.items():
+        for element in root.iter(name):
+            yield from ((name, one.tag) for one in element if one.tag not in known and ":" not in one.tag)

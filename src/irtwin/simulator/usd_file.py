@@ -1,0 +1,356 @@
+"""A model in USD, as Isaac Sim and Newton have it: read into MuJoCo, and changed by a layer over it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from irtwin.errors import InputError
+from irtwin.input_file import read_input, real_path
+from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
+from irtwin.simulator.model_file import ModelFile, Tag
+
+if TYPE_CHECKING:
+    import mujoco
+
+ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
+_MOST = 200_000_000  # bytes; meshes are within
+_KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed"}
+_AXES = {"revolute": "angular", "prismatic": "linear"}
+_DEGREES = 180 / np.pi
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An attribute that holds a joint's number, "*" its axis, and the schema that has it; whether it is per degree."""
+
+    attribute: str
+    schema: str
+    per_degree: bool = False
+
+    def named(self, kind: str) -> tuple[str, str]:
+        """Return attribute and schema of a kind of joint."""
+        return self.attribute.replace("*", _AXES[kind]), self.schema.replace("*", _AXES[kind])
+
+
+_DRIVE = "PhysicsDriveAPI:*"
+_PLACES = {  # by what MJCF calls them: Newton's, PhysX's, then others that are read
+    "armature": (
+        _Place("newton:armature", "NewtonJointAPI"),
+        _Place("physxJointAxis:*:armature", "PhysxJointAxisAPI:*"),
+        _Place("mjc:armature", "MjcJointAPI"),
+        _Place("physxJoint:armature", "PhysxJointAPI"),
+    ),
+    "damping": (
+        _Place("newton:damping", "NewtonJointAPI", True),
+        _Place("physxJointAxis:*:viscousFrictionCoefficient", "PhysxJointAxisAPI:*", True),
+        _Place("mjc:damping", "MjcJointAPI"),
+    ),
+    "frictionloss": (
+        _Place("newton:friction", "NewtonJointAPI"),
+        _Place("physxJointAxis:*:dynamicFrictionEffort", "PhysxJointAxisAPI:*"),
+        _Place("physxJointAxis:*:staticFrictionEffort", "PhysxJointAxisAPI:*"),
+        _Place("mjc:frictionloss", "MjcJointAPI"),
+    ),
+    "kp": (_Place("drive:*:physics:stiffness", _DRIVE, True),),
+    "kv": (_Place("drive:*:physics:damping", _DRIVE, True),),
+    "forcerange": (_Place("drive:*:physics:maxForce", _DRIVE),),
+}
+_FIRST_OF_OTHERS = "mjc:", "physxJoint:"  # where nobody said a number it is not put there
+
+
+class UsdFile(ModelFile):
+    """A USD file; its tags are its joints, and their drives of stiffness."""
+
+    @cached_property
+    def stage(self) -> Any:
+        """The stage."""
+        from pxr import Usd
+
+        return Usd.Stage.Open(str(self.path))
+
+    def holds(self, number: str) -> bool:
+        """Return whether it has a place for a number, by what MJCF calls it."""
+        return number in _PLACES
+
+    def check_written(self, out: Path) -> None:
+        """Raise InputError where a layer over it would not find it, or be of another kind than its name says."""
+        if out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
+            raise InputError(f"{out}: is to be a layer over {self.path}; give a file beside that, and with its ending")
+
+    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
+        """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes."""
+        from pxr import Sdf
+
+        if not changes:
+            return self.content
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder, self.path.name)
+            layer = Sdf.Layer.CreateNew(str(place))
+            root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
+            for key in set(own.ListInfoKeys()) - {
+                "subLayers",
+                "subLayerOffsets",
+                "customLayerData",
+                "comment",
+                "documentation",
+            }:
+                root.SetInfo(key, own.GetInfo(key))
+            layer.subLayerPaths.append(f"./{self.path.name}")
+            for tag, said in changes.items():
+                for number, value in said.items():
+                    if value is not None:  # of a range the end, as drives have no least
+                        self._put(layer, tag.attributes["path"], number, float(str(value).split()[-1]))
+            layer.Save()
+            return place.read_bytes()
+
+    def spec(self) -> mujoco.MjSpec:
+        """Return MuJoCo's specification of it. Raises InputError where it cannot be told, ValueError if no tree."""
+        bodies = _bodies(self)
+        connections = [one for prim in _joints(self.stage) if (one := _connection(self, prim)) is not None]
+        moved = {one.child for one in connections if one.parent != WORLD or one.kind != "fixed"}
+        links = [_link(self, prim, str(prim.GetPath()) in moved) for prim in bodies]
+        return assembled(links, connections, _gravity(self))
+
+    @cached_property
+    def units(self) -> tuple[float, float]:
+        """Return a unit of length, m, and of mass, kg."""
+        from pxr import UsdGeom, UsdPhysics
+
+        return UsdGeom.GetStageMetersPerUnit(self.stage), UsdPhysics.GetStageKilogramsPerUnit(self.stage)
+
+    def _put(self, layer: Any, path: str, number: str, value: float) -> None:
+        from pxr import Sdf
+
+        prim, over = self.stage.GetPrimAtPath(path), Sdf.CreatePrimInLayer(layer, path)
+        kind = _KINDS[prim.GetTypeName()]
+        said = [one for one in _PLACES[number] if prim.GetAttribute(one.named(kind)[0]).HasAuthoredValue()]
+        for one in said or [one for one in _PLACES[number] if not one.attribute.startswith(_FIRST_OF_OTHERS)]:
+            name, schema = one.named(kind)
+            if schema not in prim.GetAppliedSchemas():
+                listed = over.GetInfo("apiSchemas").prependedItems if over.HasInfo("apiSchemas") else []
+                over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=list({*listed, schema})))
+            own = prim.GetAttribute(name)
+            attribute = Sdf.AttributeSpec(over, name, own.GetTypeName() if own else Sdf.ValueTypeNames.Float)
+            attribute.default = value / self.unit(number, kind, one.per_degree)
+
+    def unit(self, number: str, kind: str, per_degree: bool) -> float:
+        """Return what a joint's number of one is in SI units of a radian."""
+        length, mass = self.units
+        of_torque = number in ("frictionloss", "forcerange")
+        if kind == "prismatic":
+            return mass * length if of_torque else mass
+        return mass * length**2 * (_DEGREES if per_degree else 1.0)
+
+
+def read_usd(path: Path) -> UsdFile:
+    """Read a USD file, and look at those that it names.
+
+    Raises InputError where one cannot be read, is larger than 200 MB, missing, or outside the folder; where `pxr` is
+    not installed.
+    """
+    try:
+        from pxr import Tf
+    except ModuleNotFoundError as error:
+        raise InputError(f"{path}: reading USD needs its package; install irtwin[usd]") from error
+    content = read_input(path, _MOST)
+    if path.suffix.lower() == ".usdz":
+        raise InputError(f"{path}: is a package; unpack it, as `unzip` does, and give the USD file that is in it")
+    try:
+        _check_inside(path, path.parent, set())
+        file = UsdFile(path, content, ())
+        return UsdFile(path, content, tuple(_tags(file.stage)))
+    except Tf.ErrorException as error:
+        raise InputError(f"{path}: is no USD that can be read ({_reason(error)})") from error
+
+
+def _reason(error: Exception) -> str:
+    return str(error.args[0]).strip().splitlines()[-1].strip() if error.args else "no reason is given"
+
+
+def _check_inside(path: Path, folder: Path, seen: set[Path]) -> None:
+    from pxr import Sdf
+
+    seen.add(path)
+    for named in Sdf.Layer.FindOrOpen(str(path)).GetCompositionAssetDependencies():
+        place = path.parent / named
+        real = real_path(place)
+        if real is None or not real.is_relative_to(folder.resolve()):
+            raise InputError(f"{path}: names {named}, which is outside the folder of the model; move it there")
+        if not real.is_file():
+            raise InputError(f"{path}: names {named}, which is missing; put it there")
+        if real not in seen:
+            read_input(real, _MOST)
+            _check_inside(real, folder, seen)
+
+
+def _joints(stage: Any) -> Iterator[Any]:
+    from pxr import UsdPhysics
+
+    for prim in stage.Traverse():
+        closes = prim.GetAttribute("physics:excludeFromArticulation").Get()
+        if prim.IsA(UsdPhysics.Joint) and not closes and prim.GetAttribute("physics:jointEnabled").Get() is not False:
+            yield prim
+
+
+def _tags(stage: Any) -> Iterator[Tag]:
+    for prim in _joints(stage):
+        said = {"name": _name(prim), "joint": _name(prim), "path": str(prim.GetPath())}
+        yield Tag("joint", said, 0, 0)
+        yield Tag("position", said, 0, 0)
+
+
+def _name(prim: Any) -> str:
+    return str(prim.GetDisplayName() or prim.GetName())
+
+
+def _bodies(file: UsdFile) -> list[Any]:
+    from pxr import UsdPhysics
+
+    return [prim for prim in file.stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+
+
+def _world(file: UsdFile, prim: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a prim is in the world, (4, 4), m, and by what (3,) its own lengths are stretched to be m."""
+    from pxr import Usd, UsdGeom
+
+    length, _ = file.units
+    place = np.array(UsdGeom.XformCache(Usd.TimeCode.Default()).GetLocalToWorldTransform(prim)).T
+    stretch = np.linalg.norm(place[:3, :3], axis=0)
+    place[:3, :3] /= stretch
+    place[:3, 3] *= length
+    return place, stretch * length
+
+
+def _frame(position: Any, turn: Any, stretch: np.ndarray) -> np.ndarray:
+    found, quaternion = np.eye(4), np.array([*turn.GetImaginary(), turn.GetReal()])
+    if quaternion.any():
+        found[:3, :3] = scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix()
+    found[:3, 3] = np.array(position) * stretch
+    return found
+
+
+def _end(file: UsdFile, prim: Any, end: int) -> tuple[str, np.ndarray]:
+    """Return the body that an end of a joint is fixed to, and the joint's frame (4, 4) in it."""
+    from pxr import UsdPhysics
+
+    targets = prim.GetRelationship(f"physics:body{end}").GetTargets()
+    target = file.stage.GetPrimAtPath(targets[0]) if targets else file.stage.GetPseudoRoot()
+    if not target:
+        raise InputError(f'{file.path}: joint "{_name(prim)}" names {targets[0]}, which is missing')
+    body = target
+    while not body.IsPseudoRoot() and not body.HasAPI(UsdPhysics.RigidBodyAPI):
+        body = body.GetParent()
+    place, stretch = _world(file, target) if targets else (np.eye(4), np.full(3, file.units[0]))
+    position, turn = (prim.GetAttribute(f"physics:local{what}{end}").Get() for what in ("Pos", "Rot"))
+    frame = place @ _frame(position, turn, stretch)
+    if body.IsPseudoRoot():
+        return WORLD, frame
+    return str(body.GetPath()), np.linalg.inv(_world(file, body)[0]) @ frame
+
+
+def _connection(file: UsdFile, prim: Any) -> Connection | None:
+    (parent, above), (child, below) = _end(file, prim, 0), _end(file, prim, 1)
+    kind = _KINDS.get(prim.GetTypeName())
+    if kind is None:
+        raise InputError(
+            f'{file.path}: joint "{_name(prim)}" is a {prim.GetTypeName()}, which cannot be modelled; '
+            f"use {', '.join(_KINDS)}"
+        )
+    turned = child == WORLD
+    if turned:
+        (parent, above), (child, below) = (child, below), (parent, above)
+    origin = above @ np.linalg.inv(below)
+    if child == WORLD or kind == "fixed":
+        fixed = Connection(_name(prim), "fixed", parent, child, origin, below[:3, 3], below[:3, 2])
+        return None if child == WORLD else fixed
+    along = prim.GetAttribute("physics:axis").Get()
+    if along not in tuple("XYZ"):
+        raise InputError(f'{file.path}: joint "{_name(prim)}" moves along {along}; give X, Y or Z as its physics:axis')
+    axis = below[:3, "XYZ".index(along)]
+    unit = 1 / _DEGREES if kind == "revolute" else file.units[0]
+    lower, upper = (unit * prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper"))
+    servo, effort = _servo(file, prim, kind)
+    return Connection(
+        _name(prim),
+        kind,
+        parent,
+        child,
+        origin,
+        below[:3, 3],
+        -axis if turned else axis,
+        (lower, upper),
+        effort,
+        {number: _number(file, prim, kind, number) for number in ("armature", "damping", "frictionloss")},
+        servo,
+    )
+
+
+def _number(file: UsdFile, prim: Any, kind: str, number: str) -> float:
+    for one in _PLACES[number]:
+        attribute = prim.GetAttribute(one.named(kind)[0])
+        if attribute.HasAuthoredValue():
+            return float(attribute.Get()) * file.unit(number, kind, one.per_degree)
+    return 0.0
+
+
+def _servo(file: UsdFile, prim: Any, kind: str) -> tuple[tuple[float, float] | None, float]:
+    """Return the gains of a drive that pulls to a position, None where the joint has none, and the most it gives."""
+    of = f"drive:{_AXES[kind]}:physics"
+    stiffness, damping, most = (_number(file, prim, kind, number) for number in ("kp", "kv", "forcerange"))
+    limit = most if prim.GetAttribute(f"{of}:maxForce").HasAuthoredValue() else np.inf
+    is_force = prim.GetAttribute(f"{of}:type").Get() in (None, "force")
+    return ((stiffness, damping) if stiffness > 0 and is_force else None), limit
+
+
+def _link(file: UsdFile, prim: Any, moves: bool) -> Link:
+    from pxr import UsdPhysics
+
+    place, stretch = _world(file, prim)
+    name, has_mass = str(prim.GetPath()), prim.HasAPI(UsdPhysics.MassAPI)
+    own = UsdPhysics.MassAPI(prim)
+    mass, centre, moments = (
+        get().Get() for get in (own.GetMassAttr, own.GetCenterOfMassAttr, own.GetDiagonalInertiaAttr)
+    )
+    if not has_mass or not mass or not any(moments) or not np.isfinite(centre).all():
+        if moves and (mass or _has_shapes(prim)):
+            raise InputError(
+                f"{file.path}: {name} takes its mass from its shapes; give it physics:mass, physics:centerOfMass and "
+                "physics:diagonalInertia"
+            )
+        return Link(name, place)
+    length, unit = file.units
+    turn = _frame((0, 0, 0), own.GetPrincipalAxesAttr().Get(), stretch)[:3, :3]
+    inertia = turn * np.array(moments) @ turn.T * unit * length**2
+    return Link(name, place, mass * unit, np.array(centre) * stretch, inertia)
+
+
+def _has_shapes(body: Any) -> bool:
+    from pxr import Usd, UsdPhysics
+
+    prims = iter(Usd.PrimRange(body))
+    for prim in prims:
+        if prim != body and prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            prims.PruneChildren()
+        elif prim.HasAPI(UsdPhysics.CollisionAPI):
+            return True
+    return False
+
+
+def _gravity(file: UsdFile) -> np.ndarray:
+    from pxr import UsdGeom, UsdPhysics
+
+    length, _ = file.units
+    scene = next((prim for prim in file.stage.Traverse() if prim.IsA(UsdPhysics.Scene)), None)
+    along = np.zeros(3) if scene is None else np.array(UsdPhysics.Scene(scene).GetGravityDirectionAttr().Get())
+    most = -np.inf if scene is None else UsdPhysics.Scene(scene).GetGravityMagnitudeAttr().Get()
+    if not along.any():
+        along = -np.eye(3)["XYZ".index(UsdGeom.GetStageUpAxis(file.stage))]
+    return along / np.linalg.norm(along) * (9.81 if most < 0 else most * length)
