@@ -39,6 +39,7 @@ def diagnose(
     *,
     twin: Twin | Path | str | None = None,
     simulator: Path | str | None = None,
+    joints: Sequence[str] = (),
     withhold: Sequence[str] = (),
     cutoff: float | None = None,
     seed: int = 0,
@@ -57,14 +58,15 @@ def diagnose(
 
     `twin`, or the file of one, is what the gap is held against, in place of what the data set says of it: its effects
     in their shapes, and its numbers as the prior. `simulator` is the file of a model, MJCF, URDF, SDF or USD: what it
-    says of the observed motions is held against the robot, as runs of a simulator are; commands of runs are played
-    through its servos (channel "position"), and their torque is held against them. `withhold` takes effects out of the
-    twin and leaves them in the catalogue. `cutoff`, Hz, is the filter's, in place of what the data set says. With a
-    `workspace` the diagnosis is kept there, in the graph too, so that `adopt` can make its twin the robot's. Files to
-    write, each whole or not at all: `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the
-    causes added, `motion_file` the motion of the next experiment, where one is designed, `sysid_file` a Python script
-    that fits what differs by `mujoco.sysid`, `simulator_file` the simulator's model with the numbers that the robot
-    has, and beside it as many `draws` of what these could be, FILE-1 and so on.
+    says of the observed motions is held against the robot, as runs of a simulator are, its `joints` named in the
+    robot's order where it calls them otherwise; commands of runs are played through its servos (channel "position"),
+    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue.
+    `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is kept there,
+    in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at all:
+    `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
+    motion of the next experiment, where one is designed, `sysid_file` a Python script that fits what differs by
+    `mujoco.sysid`, `simulator_file` the simulator's model with the numbers that the robot has, and beside it as many
+    `draws` of what these could be, FILE-1 and so on.
     The `document` of what is returned says the same, typed. Raises InputError on bad input, before anything is written.
     """
     announce = clocked(announce)
@@ -77,7 +79,7 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
-    model = None if simulator is None else read_model(Path(simulator), data_set.robot)
+    model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
     if model is not None and files.simulator is not None:
         model.file.check_written(files.simulator)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}

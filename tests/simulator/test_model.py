@@ -50,6 +50,36 @@ def test_a_model_of_other_joints_is_refused(tmp_path):
         read_model(file, ROBOT)
 
 
+@pytest.mark.parametrize(("number", "value"), [("armature", "-1.0"), ("damping", "nan"), ("frictionloss", "-0.5")])
+@pytest.mark.filterwarnings("ignore:Inertia matrix")
+def test_numbers_that_no_joint_has_are_refused(tmp_path, number, value):
+    file = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+    file.write_text(file.read_text().replace('<joint name="joint_2"', f'<joint {number}="{value}" name="joint_2"'))
+    with pytest.raises(InputError, match=rf"arm\.xml: {number} of joint joint_2 is {value}; give zero or more"):
+        read_model(file, ROBOT)
+
+
+def test_joints_of_other_names_are_said_in_the_robots_order(tmp_path):
+    file = mujoco_models.write(tmp_path / "arm.xml", ROBOT, **NUMBERS)
+    names = ["pan", "lift", "elbow", "wrist"]
+    text = file.read_text()
+    for old, new in zip(ROBOT.joint_names, names, strict=True):
+        text = text.replace(f'"{old}"', f'"{new}"')
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"its joints are pan, lift, elbow, wrist: give .* calls them \(--joints\)"):
+        read_model(file, ROBOT)
+    model = read_model(file, ROBOT, names)
+    assert model.numbers("joint_2") == {name: pytest.approx(values[1]) for name, values in NUMBERS.items()}
+    tag, attribute = model.file.number(model.called["joint_2"], "damping")
+    assert (tag.attributes["name"], attribute) == ("lift", "damping")
+    for wrong, said in ((names[:3], "pan, lift, elbow are to be 4 names"), ([*names[:3], "pan"], "are to be 4 names")):
+        with pytest.raises(InputError, match=said):
+            read_model(file, ROBOT, wrong)
+    file.write_text(text.replace('name="lift"', 'name="lift" type="slide"'))
+    with pytest.raises(InputError, match="joint lift slides where the robot's turns, or the other way round"):
+        read_model(file, ROBOT, names)
+
+
 def test_a_urdf_is_a_model_without_its_pictures(tmp_path):
     text = ROBOT.urdf
     picture = '<visual><geometry><mesh filename="package://arm/none.stl"/></geometry></visual></link>'

@@ -74,7 +74,9 @@ def fitted(data, model, read, folder, robot, capsys):
     near = chosen(own, **{name: tuple(1.2 * one for one in some) for name, some in robot.items()})
     place = folder / "fit.py"
     folder.mkdir()
-    place.write_bytes(written(free(near), ["servo_dead_band of lift"], model, data, place, own.model.gains))
+    place.write_bytes(
+        written(free(near), ["servo_dead_band of lift"], model, data, place, own.model.gains, own.model.joints)
+    )
     spec = importlib.util.spec_from_file_location("fit", place)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

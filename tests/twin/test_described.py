@@ -154,3 +154,9 @@ def test_what_a_format_has_no_place_for_is_said(tmp_path: Path) -> None:
         "irtwin: SDF has no place for rotor_inertia, torque_offset\n"
     )
     assert (tmp_path / "arm.sdf").read_text() == text_of(twin, "sdf")
+    said = irtwin("export", "--usd", tmp_path / "arm.usda", "--twin", tmp_path / "twin.json")
+    assert said.err.splitlines()[0].startswith("irtwin: USD has rigid_body (inertia), rotor_inertia (armature), coul")
+    assert (tmp_path / "arm.usda").read_text() == text_of(twin, "usd")
+    said = irtwin("export", "--usd", tmp_path / "arm.usdc", "--twin", tmp_path / "twin.json")
+    assert (said.status, said.out) == (2, "")
+    assert said.err.endswith("arm.usdc: USD is written as text; name the file arm.usda\n")

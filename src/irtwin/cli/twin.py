@@ -159,6 +159,11 @@ def demo(
     "commands are played through it where it has servos. Needs irtwin[mujoco], and irtwin[usd] for USD.",
 )
 @click.option(
+    "--joints",
+    metavar="NAME,NAME",
+    help="What that model calls the robot's joints, in the robot's order, where it calls them otherwise.",
+)
+@click.option(
     "--save-simulator",
     "simulator_file",
     type=FILE,
@@ -191,7 +196,12 @@ def demo(
     click.option("--workspace", type=FOLDER, help="Also store the diagnosis there."), database_option, graph_option
 )
 def diagnose(
-    dataset: Path, simulator: Path | None, simulator_file: Path | None, location: Location | None, **asked: Any
+    dataset: Path,
+    simulator: Path | None,
+    joints: str | None,
+    simulator_file: Path | None,
+    location: Location | None,
+    **asked: Any,
 ) -> None:
     """Find where a twin, or a simulator, and its robot differ, and why.
 
@@ -211,7 +221,11 @@ def diagnose(
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
-    for option, file in (("--save-simulator writes", simulator_file), ("--save-sysid fits", asked["sysid_file"])):
+    for option, file in (
+        ("--joints names those of", joints),
+        ("--save-simulator writes", simulator_file),
+        ("--save-sysid fits", asked["sysid_file"]),
+    ):
         if file and not simulator:
             raise click.UsageError(f"{option} the model of --simulator: give that too")
     if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
@@ -219,7 +233,13 @@ def diagnose(
     if asked["draws"] and not simulator_file:
         raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
     diagnosis = judge(
-        dataset, simulator=simulator, simulator_file=simulator_file, workspace=location, announce=announce, **asked
+        dataset,
+        simulator=simulator,
+        joints=joints.split(",") if joints else (),
+        simulator_file=simulator_file,
+        workspace=location,
+        announce=announce,
+        **asked,
     )
     click.echo(line(diagnosis.document, diagnosis.against))
     for said in (*refused(diagnosis.document), *summary.filtered(diagnosis.document)):

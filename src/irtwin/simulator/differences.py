@@ -27,7 +27,7 @@ def written(model: Model, document: Document, off: Mapping[Key, float] | None = 
     """
     changed: dict[Tag, dict[str, float]] = {}
     for (effect, joint, name), robot in _numbers(document).items():
-        tag, attribute = model.file.number(joint, catalogue()[effect].changed_in_mjcf[name])
+        tag, attribute = model.file.number(model.called[joint], catalogue()[effect].changed_in_mjcf[name])
         number = robot + (off or {}).get((effect, joint, name), 0.0)
         changed.setdefault(tag, {})[attribute] = max(number, 0.0)
     return model.file.changed(changed)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _SECOND = " beside its servo"
 _APART = 1e-3  # m, frames that are at one place
+_SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
 
 
@@ -43,19 +44,25 @@ class Flange:
 
 @dataclass(frozen=True)
 class Model:
-    """A compiled model whose `joints` (n,) are the robot's, in its order, by the places of their coordinates.
+    """A compiled model of a robot, by the places of the joints' coordinates in the robot's order.
 
+    `called`: what it calls each joint, by the robot's name of it.
     `others` are joints of the model that the robot lacks: a gripper's, a free body's. They stay where they begin.
     """
 
     file: ModelFile
     compiled: mujoco.MjModel
-    joints: tuple[str, ...]
+    called: Mapping[str, str]
     positions: np.ndarray  # (n,) in qpos
     speeds: np.ndarray  # (n,) in qvel
     others: tuple[str, ...]
     delays: np.ndarray  # (number of actuators,), s; the compiled model has none
     gains: Gains  # of joints whose servos are not the file's
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints' names in the model, in the robot's order."""
+        return tuple(self.called.values())
 
     @property
     def name(self) -> str:
@@ -99,42 +106,59 @@ class Model:
         return np.asarray(found + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
     def numbers(self, joint: str) -> Mapping[str, float]:
-        """Return the joint's numbers as the model has them, by what MJCF calls them; those that its file can hold."""
-        place = self.speeds[self.joints.index(joint)]
+        """Return a joint of the robot's numbers as the model has them, by what MJCF calls them; those that it holds."""
+        place = self.speeds[list(self.called).index(joint)]
         held = [name for name in NUMBERS if self.file.holds(name)]
         return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in held}
 
 
-def read_model(path: Path, robot: Robot) -> Model:
+def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
     """Read a model of the robot. A joint without a position servo has one by its controller's gains, if these are told.
 
+    `joints`: what the model calls the robot's joints, in their order; none where it calls them as the robot does.
     Raises InputError where the file is no model, a mesh that gives a body its inertia is missing, or the robot's joints
-    are not among the model's.
+    are not among the model's, move otherwise, or have numbers that no joint has.
     """
+    if joints and not len(joints) == len(set(joints)) == len(robot.joints):
+        raise InputError(
+            f"joints: {', '.join(joints)} are to be {len(robot.joints)} names, one for each of the robot's"
+        )
+    called = dict(zip(robot.joint_names, joints or robot.joint_names, strict=True))
     file = read_model_file(path)
-    told = {one.name: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
+    told = {called[one.name]: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
     compiled, delays, gains = _compiled(file, told)
-    places, others = joints_of(compiled, robot.joint_names, str(path))
-    return Model(
-        file,
-        compiled,
-        tuple(robot.joint_names),
-        compiled.jnt_qposadr[places],
-        compiled.jnt_dofadr[places],
-        others,
-        delays,
-        gains,
+    places, others = joints_of(compiled, tuple(called.values()), str(path), ", or say what it calls them (--joints)")
+    model = Model(
+        file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gains
     )
+    _check_joints(model, robot)
+    return model
 
 
-def joints_of(compiled: mujoco.MjModel, names: Sequence[str], source: str) -> tuple[list[int], tuple[str, ...]]:
-    """Return the places of joints by name, and the names of others. Raises InputError where one is lacking."""
-    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= 2}
+def _check_joints(model: Model, robot: Robot) -> None:
+    """Raise InputError where a joint moves otherwise than the robot's, or has a number that none can have."""
+    for one, name, dof in zip(robot.joints, model.joints, model.speeds, strict=True):
+        if (model.compiled.jnt_type[model.compiled.dof_jntid[dof]] == _SLIDES) != (one.unit == "m"):
+            raise InputError(f"{model.file.path}: joint {name} slides where the robot's turns, or the other way round")
+        for number in NUMBERS:
+            value = float(getattr(model.compiled, f"dof_{number}")[dof])
+            if not 0 <= value < np.inf:
+                raise InputError(f"{model.file.path}: {number} of joint {name} is {value}; give zero or more")
+
+
+def joints_of(
+    compiled: mujoco.MjModel, names: Sequence[str], source: str, otherwise: str = ""
+) -> tuple[list[int], tuple[str, ...]]:
+    """Return the places of joints by name, and the names of others.
+
+    Raises InputError where one is lacking, with what else can be done.
+    """
+    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= _SLIDES}
     lacking = [name for name in names if name not in own]
     if lacking:
         raise InputError(
             f"{source}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: give a model "
-            "whose joints have the names of the robot's"
+            f"whose joints have the names of the robot's{otherwise}"
         )
     return [own[name] for name in names], tuple(name for name in own if name not in names)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ def script(chosen: DifferingNumbers, document: Document, logs: Path, out: Path) 
     """Return the script that fits what a diagnosis says differs to `logs`, a data set, to be written to `out`."""
     lacking = [f"{one.effect} of {', '.join(one.joints)}" for one in not_held(document)]
     model = chosen.fit.servos.model
-    return written(free(chosen), lacking, model.file.path, logs, out, model.gains)
+    return written(free(chosen), lacking, model.file.path, logs, out, model.gains, model.joints)
 
 
 def written(
@@ -40,15 +40,17 @@ def written(
     logs: Path,
     out: Path,
     gains: Mapping[str, tuple[float, float]] | None = None,
+    joints: Sequence[str] = (),
 ) -> bytes:
     """Return the script that frees some numbers of a model; it names files from where it is.
 
-    gains: of the controllers of joints that have no servo in the model.
+    gains: of the controllers of joints that have no servo in the model; joints: the robot's as the model calls them.
     """
     files = [os.path.relpath(one.absolute(), out.absolute().parent) for one in (model, logs)]
     told = {
         "MODEL, LOGS, FITTED": ", ".join(map(repr, [*files, f"{out.stem}-fitted.xml"])),
         "GAINS": repr(dict(gains or {})),
+        "JOINTS": repr(tuple(joints)),
         "FREE": _lines(some),
         "LACKS": _lines(lacking),
     }

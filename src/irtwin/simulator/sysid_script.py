@@ -27,6 +27,8 @@ from irtwin.simulator.model import drop_pictures
 MODEL, LOGS, FITTED = "model.xml", "my_robot", "fitted.xml"
 # joint, and the gains of its controller, kp and kd, where the model has no servo of its own
 GAINS: Mapping[str, tuple[float, float]] = {}
+# what the model calls the robot's joints, in their order; none where it calls them as the robot does
+JOINTS: Sequence[str] = ()
 # joint or body, number, the model's, the robot's, and bounds
 FREE: Sequence[tuple[str, str, list[float], list[float], list[float], list[float]]] = ()
 # what the robot has and no number of the model can say
@@ -106,7 +108,7 @@ def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
 
 def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> tuple[sysid.ModelSequences, list[np.ndarray]]:
     """Return stretches of the observed runs, and the speeds (N, nu) that are commanded in each."""
-    model, joints = spec.compile(), data_set.robot.joint_names
+    model, joints = spec.compile(), JOINTS or data_set.robot.joint_names
     places = [model.jnt_qposadr[model.joint(one).id] for one in joints]
     speeds = [model.jnt_dofadr[model.joint(one).id] for one in joints]
     drives = [next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(one).id) for one in joints]
@@ -201,7 +203,7 @@ def main() -> None:
     for line in LACKS:
         print(f"The model cannot say: {line}")
     data_set, free = read_data_set(here / LOGS, commanded=True), parameters()
-    sequences, speeds = stretches(data_set, specification(here / MODEL, data_set.robot.joint_names))
+    sequences, speeds = stretches(data_set, specification(here / MODEL, JOINTS or data_set.robot.joint_names))
     residual = sysid.build_residual_fn(
         models_sequences=[sequences], custom_rollout=partial(played_late, speeds=speeds), modify_residual=difference
     )
