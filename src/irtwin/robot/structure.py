@@ -46,6 +46,13 @@ class Body:
     com: Three | None
     inertia: tuple[float, ...] | None
 
+    @property
+    def spatial(self) -> pin.Inertia:
+        """Its spatial inertia; zero where it has none."""
+        xx, yy, zz, xy, xz, yz = self.inertia or (0.0,) * 6
+        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return pin.Inertia(self.mass or 0.0, np.array(self.com or (0.0,) * 3), moments)
+
 
 @dataclass(frozen=True)
 class Connection:

@@ -40,7 +40,7 @@ def usd_text(robot: Robot, armature: Mapping[str, float]) -> str:
         {base: np.eye(4)},
         {base: np.eye(4)},
     )  # links, of each; in the world; in these
-    bodies: dict[str, list[str]] = {base: _place(np.eye(4))}
+    bodies: dict[str, list[str]] = {base: [*_place(np.eye(4)), *_mass(structure.bodies[0].spatial)]}
     fixed = _prim("PhysicsFixedJoint", "world_to_base", [f"rel physics:body1 = </{whole}/{names[base]}>"])
     connections = [fixed]
     for one in structure.connections:
@@ -90,6 +90,8 @@ def _place(transform: np.ndarray) -> list[str]:
 
 
 def _mass(body: pin.Inertia) -> list[str]:
+    if not body.mass:
+        return []
     moments, axes = np.linalg.eigh(body.inertia)
     axes[:, 2] *= np.linalg.det(axes)
     return [

@@ -63,6 +63,7 @@ _PLACES = {  # by what MJCF calls them: Newton's, PhysX's, then others that are 
     "kv": (_Place("drive:*:physics:damping", _DRIVE, True),),
     "forcerange": (_Place("drive:*:physics:maxForce", _DRIVE),),
 }
+_OF_LAYER = {"subLayers", "subLayerOffsets", "customLayerData", "comment", "documentation"}  # not of the stage
 _FIRST_OF_OTHERS = "mjc:", "physxJoint:"  # where nobody said a number it is not put there
 
 
@@ -95,13 +96,7 @@ class UsdFile(ModelFile):
             place = Path(folder, self.path.name)
             layer = Sdf.Layer.CreateNew(str(place))
             root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
-            for key in set(own.ListInfoKeys()) - {
-                "subLayers",
-                "subLayerOffsets",
-                "customLayerData",
-                "comment",
-                "documentation",
-            }:
+            for key in set(own.ListInfoKeys()) - _OF_LAYER:
                 root.SetInfo(key, own.GetInfo(key))
             layer.subLayerPaths.append(f"./{self.path.name}")
             for tag, said in changes.items():
@@ -134,9 +129,9 @@ class UsdFile(ModelFile):
         said = [one for one in _PLACES[number] if prim.GetAttribute(one.named(kind)[0]).HasAuthoredValue()]
         for one in said or [one for one in _PLACES[number] if not one.attribute.startswith(_FIRST_OF_OTHERS)]:
             name, schema = one.named(kind)
-            if schema not in prim.GetAppliedSchemas():
-                listed = over.GetInfo("apiSchemas").prependedItems if over.HasInfo("apiSchemas") else []
-                over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=list({*listed, schema})))
+            listed = over.GetInfo("apiSchemas").prependedItems if over.HasInfo("apiSchemas") else []
+            if schema not in (*prim.GetAppliedSchemas(), *listed):
+                over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=[*listed, schema]))
             own = prim.GetAttribute(name)
             attribute = Sdf.AttributeSpec(over, name, own.GetTypeName() if own else Sdf.ValueTypeNames.Float)
             attribute.default = value / self.unit(number, kind, one.per_degree)

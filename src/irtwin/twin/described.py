@@ -108,7 +108,5 @@ def _fixed(robot: Robot, structure: Structure, joint: int, moved: str) -> dict[s
     for link in structure.bodies:
         frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
         if frame.parentJoint == joint and link.name != moved and link.mass:
-            xx, yy, zz, xy, xz, yz = link.inertia or (0.0,) * 6
-            moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            inertias[link.name] = frame.placement.act(pin.Inertia(link.mass, np.array(link.com), moments))
+            inertias[link.name] = frame.placement.act(link.spatial)
     return inertias
