@@ -151,6 +151,11 @@ class Fit:
         """Play numbers (k, n) of the chart by the whole model."""
         return self._left(at, self._whole(at))
 
+    def all_rolled(self, many: Sequence[np.ndarray]) -> list[Played]:
+        """Play several numbers of the chart by the whole model."""
+        found = play(self.servos, [self.servos.of_chart(at) for at in many], self.stretches)
+        return [self._left(at, moved) for at, moved in zip(many, found, strict=True)]
+
     def _whole(self, at: np.ndarray) -> list[np.ndarray]:
         asked = at.tobytes()
         if asked not in self.known:

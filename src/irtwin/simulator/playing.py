@@ -19,6 +19,7 @@ from irtwin.simulator.choice import DifferingNumbers, choose
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import PlayedStretch, each, play
+from irtwin.simulator.refined import refined
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
@@ -81,6 +82,8 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
         stretches = _stretches(runs, _BRIEF)
     step = max(_STEP, model.compiled.opt.timestep)
     chosen = choose(unjudged(alone(own, stretches, step)))
+    if chosen.differs[NAMES.index("torque_limit")].any():  # where one is reached, an arm gives way as a whole
+        chosen = refined(chosen)
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
