@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -178,3 +179,9 @@ def test_packages_and_files_of_something_else_are_refused(tmp_path):
         read(tmp_path, "PXR-USDC and nothing more", name="arm.usdc")
     with pytest.raises(InputError, match=r"none\.usd: cannot be read \(No such file"):
         read_model(tmp_path / "none.usd", ONE)
+
+
+def test_without_its_package_it_is_said_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    with pytest.raises(InputError, match=r"arm\.usda: reading USD needs its package; install irtwin\[usd\]"):
+        read(tmp_path)
