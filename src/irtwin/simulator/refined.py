@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -28,12 +27,12 @@ def refined(chosen: DifferingNumbers) -> DifferingNumbers:
     """
     fit, best, own = chosen.fit, chosen.fit.rolled(chosen.played.at), chosen.fit.servos.chart(chosen.fit.servos.numbers)
     places = [(int(row), int(joint)) for row, joint in np.argwhere(chosen.differs) if row in SMOOTH]
-    none = np.zeros((0, 0)), np.zeros((len(fit.stretches), 0))
+    none = np.zeros((len(fit.stretches), 0, 0)), np.zeros((len(fit.stretches), 0))
     normal, each = none
     while places:
         best = _solved(fit, best, places)
         normal, each = _equations(fit, best, places)
-        variance = np.diag(np.linalg.inv(normal))
+        variance = np.diag(np.linalg.inv(normal.sum(axis=0)))
         off = np.array([(best.at - own)[place] for place in places])
         loss = off**2 / variance / 2 - np.log(len(NAMES)) - np.log(_of(LIKELY, places) ** 2 / variance) / 2
         weakest = int(np.argmin(loss))
@@ -48,7 +47,7 @@ def refined(chosen: DifferingNumbers) -> DifferingNumbers:
 def _solved(fit: Fit, best: Played, places: Sequence[Place]) -> Played:
     for number in range(_PASSES):
         normal, each = _equations(fit, best, places)
-        steps = [_step(normal, each.sum(axis=0), damping, places) for damping in _DAMPINGS]
+        steps = [_step(normal.sum(axis=0), each.sum(axis=0), damping, places) for damping in _DAMPINGS]
         tried = fit.all_rolled([_moved(best.at, places, share * step) for step in steps for share in _SHARES])
         before, best = _cost(fit, best), min((best, *tried), key=lambda one: _cost(fit, one))
         tell_step(f"  numbers by the whole model, pass {number + 1} of {_PASSES} at most")
@@ -69,7 +68,7 @@ def _about(
     chosen: DifferingNumbers, best: Played, places: Sequence[Place], normal: np.ndarray, each: np.ndarray
 ) -> DifferingNumbers:
     """Return the numbers, of which some differ, with what these equations say of them."""
-    inverse, count = np.linalg.inv(normal), len(each)
+    inverse, count = np.linalg.inv(normal.sum(axis=0)), len(each)
     between = inverse @ (each.T @ each) @ inverse * count / max(count - len(places), 1)
     servos, differs = chosen.fit.servos, chosen.differs.copy()
     ends = servos.chart(chosen.interval)
@@ -81,24 +80,32 @@ def _about(
     fit = chosen.fit.about(best.at)
     played = fit.played(best.at)
     slopes = fit.slopes(played)
-    slopes = replace(slopes, right=slopes.right - slopes.right.mean(axis=0))  # all together ask for no step
+    slopes.normal[:], slopes.right[:] = 0.0, 0.0  # what single joints say is not what the whole does
+    for one, (row, joint) in enumerate(places):
+        slopes.right[:, joint, SMOOTH.index(row)] = each[:, one] + _prior(fit, best, places)[one] / count
+        for other, (beside, at) in enumerate(places):
+            if at == joint:
+                slopes.normal[:, joint, SMOOTH.index(row), SMOOTH.index(beside)] = normal[:, one, other]
     interval = np.array([servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
     odds = np.where(differs, chosen.odds, -np.inf)
     return DifferingNumbers(fit, played, slopes, differs, odds, interval)
 
 
 def _equations(fit: Fit, best: Played, places: Sequence[Place]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations (D, D) of a step of numbers, and each stretch's right side (p, D)."""
+    """Return each stretch's normal equations (p, D, D) of a step of numbers, and right side (p, D)."""
     steps, likely = _NEAR * _of(STEP, places), _of(LIKELY, places)
     moved = fit.all_rolled([_moved(best.at, [place], [step]) for place, step in zip(places, steps, strict=True)])
-    prior = np.array([fit.away(best.at)[place] for place in places]) / likely
-    normal, right = np.diag(likely**-2.0), []
+    normal, right, count = [], [], len(fit.stretches)
     for place, left in enumerate(best.remainders):
         columns = np.stack([left - one.remainders[place] for one in moved], axis=-1) / steps
         weight = fit.certainty / (len(left) * (best.squares[place] + fit.floor**2))
-        normal += np.einsum("tcnd,tcne,cn->de", columns, columns, weight, optimize=True)
+        normal.append(np.einsum("tcnd,tcne,cn->de", columns, columns, weight, optimize=True))
         right.append(np.einsum("tcnd,tcn,cn->d", columns, left, weight, optimize=True))
-    return normal, np.array(right) - prior / len(right)
+    return np.array(normal) + np.diag(likely**-2.0) / count, np.array(right) - _prior(fit, best, places) / count
+
+
+def _prior(fit: Fit, best: Played, places: Sequence[Place]) -> np.ndarray:
+    return np.asarray([fit.away(best.at)[place] for place in places] / _of(LIKELY, places))
 
 
 def _step(normal: np.ndarray, right: np.ndarray, damping: float, places: Sequence[Place]) -> np.ndarray:
