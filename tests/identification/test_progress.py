@@ -23,7 +23,7 @@ def said(every, monkeypatch):
 
 
 def test_long_work_says_how_far_it_has_come(monkeypatch):
-    assert said(0.0, monkeypatch) == [f"  run {number} of 2, 0 % of it" for number in (1, 2)]
+    assert said(0.0, monkeypatch) == [f"  reading run {number} of 2" for number in (1, 2)]
 
 
 def test_what_is_done_and_what_is_left_is_told_where_both_are_known(monkeypatch):

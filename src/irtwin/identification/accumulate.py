@@ -130,7 +130,7 @@ def accumulate_any(
 
     def asked(motion: Motion) -> Rows:
         share = 100 * motion.start // len((motion.whole or motion).time)
-        tell_step(f"  run {place[motion.run]} of {len(motions)}, {share} % of it")
+        tell_step(f"  reading run {place[motion.run]} of {len(motions)}" + (f", {share} % of it" if share else ""))
         return equations(motion)
 
     def grown(some: Sequence[tuple[Motion, int, int]]) -> list[Block]:
