@@ -190,12 +190,13 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "nowhere"], "dataset.toml: not found"),
+        (["run", "nowhere"], "nowhere: there is no such file or folder; name a data set"),
         (["query", "robots", "--workspace", "nowhere"], "no workspace here"),
         (["export", "--owl", "x.owl", "--workspace", "nowhere"], "no workspace here"),
         (["robot", "excite", "nowhere.urdf", "--seconds", "5", "--out", "x.csv"], "nowhere.urdf: cannot be read"),
         (["graph", "map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
-        (["frobnicate"], "No such command"),
+        (["frobnicate"], "there is no command and no file `frobnicate`; `irtwin --help` lists the commands\n"),
+        (["diagnos", "set"], "did you mean `irtwin diagnose`?"),
         (["adopt", "Arm"], "irtwin: `irtwin adopt` is now `irtwin improve ROBOT`\n"),
         (["restore", "kept.zip"], "irtwin: `irtwin restore` is now `irtwin workspace restore`\n"),
         (["run", "robots", "--workers", "2"], "--workers goes with --out"),

@@ -90,6 +90,7 @@ def _check_system() -> None:
         "case-study": "demo --case-study",
         "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
         "excite": "robot excite",
+        "slow": "optimise",
         **{name: f"graph {name}" for name in graph.graph.commands},
         **{name: f"workspace {name}" for name in upkeep.workspace.commands},
     },

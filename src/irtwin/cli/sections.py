@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +43,16 @@ class Sections(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is asked for: of a file's name, one that says what the file is for.
 
-        Raises InputError for a name that a command had before.
+        Raises InputError for a name that a command had before, and for one that is none.
         """
         if now := self._moved.get(args[0]):
             raise InputError(f"`irtwin {args[0]}` is now `irtwin {now}`")
-        if args[0] not in self.commands and (path := Path(args[0])).exists():
+        if args[0] in self.commands:
+            return super().resolve_command(context, args)
+        if (path := Path(args[0])).exists():
             return None, click.Command("file", callback=lambda: _tell(path)), args[1:]
-        return super().resolve_command(context, args)
+        near = "".join(f"did you mean `irtwin {one}`? " for one in get_close_matches(args[0], self.commands, 1))
+        raise InputError(f"there is no command and no file `{args[0]}`; {near}`irtwin --help` lists the commands")
 
 
 def _tell(path: Path) -> None:
