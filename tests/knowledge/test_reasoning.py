@@ -69,6 +69,8 @@ ACTIONS = {
         ("irt:saves_at", f"id:robot/{robot}"),
         ("irt:called_for_by", f"id:robot/{robot}"),
         ("irt:applies_Remedy", "https://w3id.org/irtwin/remedy/switch_off_while_waiting"),
+        ("irt:waits_for", "provider:verification"),  # until somebody says when it was done
+        ("irt:lacks", "irt:Done_On"),
     )
 }
 REASON = "the twin misses the energy of this run by 12 %, more than 10 %; identify it again"
