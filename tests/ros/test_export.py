@@ -130,7 +130,7 @@ def test_of_several_robots_one_has_to_be_named(tmp_path: Path) -> None:
 def test_one_form_is_asked_for(workspace: Path, tmp_path: Path) -> None:
     said = irtwin("export", "--workspace", workspace)
     assert said.status == 2
-    assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --aas, --mcap, --bag." in said.err
+    assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas, --mcap, --bag." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--twin", tmp_path / "twin.json")
     assert said.status == 2
     assert "--twin goes with --urdf, --mjcf or --sdf." in said.err
@@ -174,7 +174,7 @@ def test_what_is_wrong_with_a_run_is_told(with_runs: Path, tmp_path: Path) -> No
         (("--mcap", tmp_path / "run", "--run", "again"), "--mcap writes a file whose name ends in .mcap."),
         (
             ("--mcap", out, "--bag", tmp_path / "b", "--run", "again"),
-            "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --aas, --mcap, --bag.",
+            "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas, --mcap, --bag.",
         ),
     ):
         said = irtwin("export", *given, "--workspace", with_runs)
