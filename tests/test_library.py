@@ -94,7 +94,7 @@ def test_paths_as_text_are_read_and_written(demo, tmp_path):
     assert irtwin.read_data_set(str(demo)).robot.name == "KUKA_KR6_R700"
     with pytest.raises(irtwin.errors.InputError, match="cannot be read"):
         irtwin.read_urdf("none.urdf")
-    with pytest.raises(irtwin.errors.InputError, match="not found"):
+    with pytest.raises(irtwin.errors.InputError, match="no such file or folder"):
         irtwin.diagnose("none", json_file=str(tmp_path / "gap.json"), report=str(tmp_path / "gap.html"))
 
 
