@@ -91,6 +91,7 @@ def test_a_flagged_twin_says_what_to_log_next(flagged: tuple[Path, list[str], li
     assert any('irtwin improve "arm_2" LOG --workspace' in line for line in words)
 
 
+@pytest.mark.nightly
 def test_the_motion_is_that_of_the_programme_that_a_diagnosis_designed(
     flagged: tuple[Path, list[str], list[str]], tmp_path: Path
 ) -> None:

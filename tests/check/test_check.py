@@ -73,7 +73,7 @@ def test_a_healthy_log_has_no_fault():
     assert found(healthy()) == set()
 
 
-@pytest.mark.parametrize("joint", range(4))
+@pytest.mark.parametrize("joint", [0, *(pytest.param(joint, marks=pytest.mark.nightly) for joint in (1, 2)), 3])
 @pytest.mark.parametrize(
     ("field", "change", "fault", "prefix"),
     [

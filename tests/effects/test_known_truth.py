@@ -352,7 +352,10 @@ def measured(case, seed):
     return replace(motion, torque=shown, power=power + case.noise * rng.standard_normal(len(power)))
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=[pytest.mark.nightly] * (str(case) == "backlash"), id=str(case)) for case in CASES],
+)
 def test_truth_is_found_predicted_booked_and_saved(case, tmp_path):
     motions = [measured(case, seed) for seed in range(2)]
     twin = identify(ROBOT, motions, (*BASELINE, "copper_loss", case.effect))

@@ -60,14 +60,19 @@ REFUSED = {
 _LONG = (
     *("a row far below.xlsx", "a long shared string in many cells.xlsx", "many columns described.xlsx"),
     *("a list of many values in one row.parquet", "40 million rows.parquet", "many messages that pack well.mcap"),
-    *("a chunk that is named 50000 times.mcap", "chunks that take turns.bag", "a table without end.db3"),
-    *("an index that is named 50000 times.bag", "many topics before each message.bag", "a chunk of zeros.bag"),
+    *("a chunk that is named 50000 times.mcap", "a table without end.db3", "a chunk of zeros.bag"),
     *("many row groups.parquet",),
+)
+_LONGER = (
+    "chunks that take turns.bag",
+    "an index that is named 50000 times.bag",
+    "many topics before each message.bag",
 )
 
 
 def _cases(names: list[str]) -> list[object]:
-    return [pytest.param(name, marks=[pytest.mark.slow] if name in _LONG else [], id=name) for name in names]
+    marks = {**dict.fromkeys(_LONG, pytest.mark.slow), **dict.fromkeys(_LONGER, pytest.mark.nightly)}
+    return [pytest.param(name, marks=[marks[name]] if name in marks else [], id=name) for name in names]
 
 
 @pytest.mark.parametrize("name", _cases(sorted(FILES)))

@@ -148,6 +148,7 @@ def test_least_energy_costs_no_more_than_the_slowed_motion(folder):
     assert (np.abs(least.motion.dq) <= 3.0).all()
 
 
+@pytest.mark.nightly
 def test_least_energy_along_a_line_changes_its_timing_alone():
     twin, start = twin_of(SIX), np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
     goal = flange_placement(SIX, start)

@@ -84,6 +84,7 @@ def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
     page.context.close()
 
 
+@pytest.mark.nightly
 def test_the_page_of_the_ontology(browser: Any, tmp_path: Path) -> None:
     write_page(tmp_path / "ontology.html")
     page = opened(browser, tmp_path / "ontology.html", 1440, "light")

@@ -33,7 +33,6 @@ def test_equal_models_have_no_number_that_differs(arm):
 
 
 @pytest.mark.nightly
-@pytest.mark.nightly
 def test_a_limit_of_torque_and_a_dead_band_are_found(arm):
     true = servo_arm.changed(arm[2], torque_limit=(0.8, arm[2].numbers[7, 1]), dead_band=(0.0, 0.02))
     found = chosen(arm, true)

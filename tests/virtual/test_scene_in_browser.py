@@ -136,6 +136,7 @@ def test_a_joint_beyond_its_limits_is_marked(browser: Any, tmp_path: Path) -> No
     assert page.evaluate(outside) == [False, True]
 
 
+@pytest.mark.nightly
 def test_joints_that_slide_stand_right_and_a_curve_of_each_follows_the_time(browser: Any, tmp_path: Path) -> None:
     robot = bare(kind="prismatic")
     page, complaints = open_page(browser, tmp_path, robot)
@@ -183,6 +184,7 @@ def test_links_take_the_colour_of_torque_or_power(browser: Any, tmp_path: Path) 
     assert complaints == []
 
 
+@pytest.mark.nightly
 def test_meshes_are_drawn_in_their_colour(browser: Any, tmp_path: Path) -> None:
     robot = mesh_robots.robot()
     copies, _ = mesh_copies(mesh_robots.write(tmp_path / "data"))
