@@ -133,7 +133,7 @@ def test_one_form_is_asked_for(workspace: Path, tmp_path: Path) -> None:
     assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas, --mcap, --bag." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--twin", tmp_path / "twin.json")
     assert said.status == 2
-    assert "--twin goes with --urdf, --mjcf or --sdf." in said.err
+    assert "--twin goes with --urdf, --mjcf, --sdf or --usd." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--robot", "KUKA_KR6_R700", "--workspace", workspace)
     assert said.status == 2
     assert "--owl writes the whole graph; leave --robot out." in said.err
