@@ -32,6 +32,15 @@ def said(verdict: str, *findings: ToldFinding, where: str = "", closes: str | No
 LITTLE = {"matters": False, "share": 0.0004}
 
 
+def test_of_many_joints_it_is_said_how_many() -> None:
+    sure = {"members": ((("hysteresis", 0.97),),)}
+    told = said("attributed", finding(joints=tuple(f"joint_{k}" for k in range(7)), **sure))
+    assert told.startswith("Friction of 7 joints differs from the twin’s: hysteresis (97 % sure).")
+    assert "joint_0, joint_1, joint_2 and joint_3" in said(
+        "attributed", finding(joints=tuple(f"joint_{k}" for k in range(4)), **sure)
+    )
+
+
 def test_the_family_is_said_before_its_effects() -> None:
     assert said("ambiguous", finding(), closes=" It closes.") == (
         "Friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction (55 %) or position-dependent "

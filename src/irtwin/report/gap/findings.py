@@ -9,6 +9,7 @@ from irtwin.document.document import LIKELY
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
+_SPELT_OUT = 4  # joints of one of them; of more it says how many
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
 
@@ -34,8 +35,9 @@ class ToldFinding:
 
     @property
     def place(self) -> str:
-        """Family and joints: "friction of joint_2"."""
-        return f"{self.family} of {wording.listed(self.joints)}" if self.joints else self.family
+        """Family and joints: "friction of joint_2"; of many joints how many, which tables beside it name."""
+        joints = wording.listed(self.joints) if len(self.joints) <= _SPELT_OUT else f"{len(self.joints)} joints"
+        return f"{self.family} of {joints}" if self.joints else self.family
 
     @property
     def claim(self) -> str:
