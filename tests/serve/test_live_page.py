@@ -94,7 +94,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
         wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
         wait_for(lambda: page.inner_text("#stream") == "flowing")
         wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
-        assert page.evaluate("irtwinLive.time") == pytest.approx(time.time(), abs=5)
+        assert page.evaluate("irtwinLive.time") == pytest.approx(time.time(), abs=60)  # of now, not of the log's day
         _, said = live.communicate(timeout=120)
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
