@@ -90,11 +90,12 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     log = next((folder / "data").rglob("*.parquet"))
     command = [sys.executable, "-m", "irtwin", "live", "--replay", log, "--robot", "Arm"]
     command += ["--workspace", folder / "workspace"]
+    begun = time.time()
     with subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True) as live:
         wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
         wait_for(lambda: page.inner_text("#stream") == "flowing")
         wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
-        assert page.evaluate("irtwinLive.time") == pytest.approx(time.time(), abs=60)  # of now, not of the log's day
+        assert begun < page.evaluate("irtwinLive.time") < time.time() + 1  # of this replay, however late it is drawn
         _, said = live.communicate(timeout=120)
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
