@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jinja2
+import pytest
 from tests.trusting import trust_all
 
+from irtwin.report.plant import page
 from irtwin.report.templates import written
 from irtwin.resources import resources_of
 
@@ -18,3 +21,15 @@ def test_a_template_that_changed_is_compiled_again(tmp_path: Path) -> None:
         trust_all(tmp_path)
         for _ in range(2):
             assert written(resources_of(tmp_path), "energy/mine.html.jinja", joules=2000) == expected
+
+
+def test_pages_of_a_plant_are_compiled_before_anybody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    page.compile_templates("http://example.org/id/")
+
+    def compiled(*_: object, **__: object) -> None:
+        raise AssertionError("a page would wait for this")
+
+    monkeypatch.setattr(jinja2.Environment, "compile", compiled)
+    templates = page._templates("http://example.org/id/")
+    for name in ("page", "frame", "robot/page", "run/page", "comparison/page", "individual/page"):
+        assert templates.get_template(f"plant/{name}.html.jinja").root_render_func

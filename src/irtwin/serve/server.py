@@ -28,6 +28,7 @@ from irtwin.input_file import read_text
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, ID
 from irtwin.location import Location
+from irtwin.report.plant.page import compile_templates
 from irtwin.resources import Resources
 from irtwin.serve import individuals, ontology, page
 from irtwin.serve.asking import Asking
@@ -190,7 +191,7 @@ def application(
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         try:
-            await pool.open()
+            await asyncio.gather(pool.open(), asyncio.to_thread(compile_templates, base))
             async with _opcua(asking, resources, host, opcua):
                 opened()
                 catching_up = asyncio.create_task(catch_up(asking, location))

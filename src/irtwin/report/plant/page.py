@@ -57,6 +57,14 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: A
     )
 
 
+def compile_templates(base: str) -> None:
+    """Compile the templates of all pages, so that who asks for the first does not wait for it."""
+    templates = _templates(base)
+    for name in templates.list_templates(extensions=["jinja"]):
+        if name.startswith(("plant/", "layout/")):
+            templates.get_template(name)
+
+
 @cache
 def _templates(base: str) -> jinja2.Environment:
     of = links.links(base)
