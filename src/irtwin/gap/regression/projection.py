@@ -42,7 +42,7 @@ class Projection:
         self._inner = np.array(inner)  # (P, K, K)
         self._factor = factored(self._inner.sum(axis=0), system.prior())
         self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
-        self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: products with all, and in each part
+        self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: with all (A,), in each part (A, P)
         self.products: list[tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = []
         self._squares: dict[tuple[int, ...], tuple[float, float]] = {}  # of variants: what is left, and all
         self._project(variants)
@@ -107,23 +107,24 @@ class Projection:
             across = self._across(part)
             left = across[at] - self._imitated[at] @ inner
             products -= self._imitated[at] @ across.T + left @ self._imitated.T
-        self._rows |= {k: (whole[place], own[:, place]) for place, k in enumerate(new)}
+        self._rows |= {k: (whole[place], np.ascontiguousarray(own[:, place].T)) for place, k in enumerate(new)}
 
     def beside(self, chosen: Sequence[int]) -> Beside:
         """Take `chosen` columns off as well, and what noise of positions seems to explain off the measurement."""
         self.prepare(chosen)
         at, rows = self.at(chosen), [self._rows[k] for k in chosen]
         whole = np.array([of_all for of_all, _ in rows]).reshape(-1, len(self._asked))
-        parts = np.array([each for _, each in rows]).reshape(-1, len(self._moments), len(self._asked)).swapaxes(0, 1)
+        parts = tuple(each for _, each in rows)
+        measured = np.array([each[-1] for each in parts]).reshape(-1, len(self._moments)).T
         factor = factored(whole[:, at]) if len(at) else None
         imitated = whole if factor is None else solved(factor, whole)  # (c, A)
         shaken = self._shaken(at, imitated[:, -1])
         if shaken is not None:
             of_all, of_parts = self.less_noise(at, shaken)
             whole[:, -1] += of_all
-            parts[..., -1] += of_parts
+            measured = measured + of_parts
             imitated = whole if factor is None else solved(factor, whole)
-        return Beside(self, at, whole, parts, imitated, shaken)
+        return Beside(self, at, whole, parts, measured, imitated, shaken)
 
     def _shaken(self, at: np.ndarray, imitated: np.ndarray) -> Shaken | None:
         """Return what noise of positions seems to explain beside columns at places `at` (c,); None where it is unknown.
@@ -163,13 +164,15 @@ class Shaken(NamedTuple):
 class Beside:
     """What the twin's terms and c columns, at places `at`, leave.
 
-    whole, imitated (c, A): products of these columns with all, and how they imitate all; parts (P, c, A).
+    whole, imitated (c, A): products of these columns with all, and how they imitate all; `parts`: of each column, its
+    products in each part (A, P); measured (P, c): those with the measurement.
     """
 
     projection: Projection
     at: np.ndarray
     whole: np.ndarray
-    parts: np.ndarray
+    parts: tuple[np.ndarray, ...]
+    measured: np.ndarray
     imitated: np.ndarray
     shaken: Shaken | None
 
@@ -200,12 +203,14 @@ class Beside:
         In each part beside these columns, of the `products` (P, V, k, k + 1) that `batches` gives.
         """
         weights = np.einsum("cvi,vi->cv", self.imitated[:, columns], values)
-        across = np.einsum("pcvi,vi->pcv", self.parts.take(columns, axis=2), values)
-        inner = self.parts[..., self.at] @ weights
         squares = np.einsum("pvij,vi,vj->pv", products[..., :-1], values, values)
-        squares -= np.einsum("cv,pcv->pv", weights, 2 * across - inner)
-        measured = np.einsum("pvi,vi->pv", products[..., -1], values) - self.parts[..., -1] @ weights
-        return squares, measured - np.einsum("c,pcv->pv", self.imitated[:, -1], across - inner)
+        measured = np.einsum("pvi,vi->pv", products[..., -1], values) - self.measured @ weights
+        for own, weight, imitated in zip(self.parts, weights, self.imitated[:, -1], strict=True):
+            across = np.einsum("vip,vi->pv", own.take(columns, axis=0), values)
+            inner = own.take(self.at, axis=0).T @ weights
+            squares -= weight * (2 * across - inner)
+            measured -= imitated * (across - inner)
+        return squares, measured
 
 
 def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
