@@ -1,15 +1,14 @@
 """What reasoning and validation of a fleet cost: python bench/fleet_reasoning.py FOLDER [ROBOTS] [RUNS] [whole]
 
-FOLDER is to be new. Each step runs in a process of its own. It prints its seconds of the processor, those of the
-processes that it shared its work with, the seconds that went by, and the most memory that each held, its imports among
-it; "five rows" are five energies of one robot, changed in the database. With `whole` the graph is then reasoned over as
+FOLDER is to be new. Each step runs in a process of its own. It prints its seconds of the processor, the seconds that
+went by, and the most memory that it held, its imports among it; "five rows" are five energies of one robot, changed in
+the database. With `whole` the graph is then reasoned over as
 one part, and what follows is compared triple by triple: some 0.5 ms and 2 kB a triple.
 """
 
 from __future__ import annotations
 
 import os
-import resource
 import sqlite3
 import subprocess
 import sys
@@ -37,24 +36,16 @@ T = TypeVar("T")
 
 def timed(what: str, do: Callable[[], T]) -> T:
     """Do something and say what it took."""
-    began, own, others = time.perf_counter(), time.process_time(), _of_workers()
+    began, own = time.perf_counter(), time.process_time()
     found = do()
-    wall, own, others = time.perf_counter() - began, time.process_time() - own, _of_workers() - others
+    wall, own = time.perf_counter() - began, time.process_time() - own
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     most = next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
-    largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     print(
-        f"{what}: {own:.1f} s and {others:.1f} s of workers, {wall:.1f} s by the clock at load "
-        f"{os.getloadavg()[0]:.1f}; "
-        f"{most / 2**20:.2f} GB, the largest worker {largest / 2**20:.2f} GB",
+        f"{what}: {own:.1f} s, {wall:.1f} s by the clock at load {os.getloadavg()[0]:.1f}; {most / 2**20:.2f} GB",
         flush=True,
     )
     return found
-
-
-def _of_workers() -> float:
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
 
 
 def step(place: Path, what: str) -> None:

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import closing
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from itertools import chain
-from typing import Any
 
-from pyoxigraph import Literal, Quad, RdfFormat, Triple, parse, serialize
+from pyoxigraph import Literal, Quad, Triple
 
-from irtwin.knowledge import each_part, parts
+from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.owl_rl.beside import Beside, Equality
@@ -26,25 +24,7 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
 
-MOST_WAITING = 50_000  # quads that wait to be written; while they are, workers go on
-
-
-@dataclass(frozen=True)
-class PartChange:
-    """What changes with the conclusions of some parts: quads that go and come, and notes that stood before.
-
-    `minted` are nodes that are not of the parts, which only their conclusions speak of.
-    """
-
-    removed: set[Quad]
-    added: set[Quad]
-    noted: set[Quad]
-    minted: set[Name]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Go to another process as N-Quads: to pickle each term takes ten times as long."""
-        quads = (serialize(some, format=RdfFormat.N_QUADS) for some in (self.removed, self.added, self.noted))
-        return _read, (*quads, self.minted)
+MOST_WAITING = 50_000  # quads that wait to be written
 
 
 @dataclass
@@ -58,14 +38,15 @@ class Changes:
     new: Counter[str] = field(default_factory=Counter)
     noted: set[Quad] = field(default_factory=set)
 
-    def take(self, change: PartChange) -> None:
-        """Let some quads be in the place of others, and know of notes that stood before; write when there are many."""
-        if has_blank_node(change.removed | change.added):
+    def take(self, region: Region, concluded: set[Quad]) -> None:
+        """Let a part's conclusions be in the place of what was concluded of it; write when there are many."""
+        removed, added = region.concluded - concluded, concluded - region.concluded
+        if has_blank_node(removed | added):
             raise Joined("a node without a name")
-        self.removed |= change.removed
-        self.added |= change.added
-        self.new.update(map(graph_of, change.added))
-        self.noted.update(change.noted, (quad for quad in change.added if graph_of(quad) == GRAPH_REASONED))
+        self.removed |= removed
+        self.added |= added
+        self.new.update(map(graph_of, added))
+        self.noted.update(quad for quad in region.concluded | added if graph_of(quad) == GRAPH_REASONED)
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
 
@@ -83,32 +64,22 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | 
     if ontology.schema.unfit is not None:
         raise Joined(ontology.schema.unfit)
     changes, minted = Changes(graph, seeds is None), set[Name]()
-    if seeds is None:
-        found = each_part.of_each(graph, ontology, changes_of)
-    else:
-        found = each_part.of_these(ontology, parts.some(graph, ontology, seeds), changes_of)
-    with closing(found):
-        for change in found:
-            if not minted.isdisjoint(change.minted) or any(graph.about(node) for node in change.minted):
+    regions = parts.every(graph, ontology) if seeds is None else parts.some(graph, ontology, seeds)
+    for some in parts.together(regions):
+        for region, conclusions in _conclude(ontology, some):
+            concluded = conclusions.quads()
+            own = _minted(ontology, region, concluded - region.concluded)
+            if not minted.isdisjoint(own) or any(graph.about(node) for node in own):
                 raise Joined("what rules conclude of several robots, and the ontology does not name")
-            minted |= change.minted
-            changes.take(change)
+            minted |= own
+            changes.take(region, concluded)
     return changes
 
 
-def _read(removed: bytes, added: bytes, noted: bytes, minted: set[Name]) -> PartChange:
-    gone, come, before = (set(parse(some, format=RdfFormat.N_QUADS)) for some in (removed, added, noted))
-    return PartChange(gone, come, before, minted)
-
-
-def changes_of(ontology: Ontology, regions: list[Region]) -> Iterator[PartChange]:
-    """Yield what changes with the conclusions of some parts. Raises Joined where they bear on others."""
-    for region, concluded in _conclude(ontology, regions):
-        removed, added = region.concluded, concluded.quads()
-        removed, added = removed - added, added - removed  # what was concluded before speaks of the region's nodes
-        nodes = {node for quad in added if graph_of(quad) != GRAPH_REASONED for node in ontology.nodes(quad.triple)}
-        noted = {quad for quad in region.concluded if graph_of(quad) == GRAPH_REASONED}
-        yield PartChange(removed, added, noted, nodes - region.nodes)
+def _minted(ontology: Ontology, region: Region, added: Iterable[Quad]) -> set[Name]:
+    """Return the nodes that are not of a part, which only its new conclusions speak of."""
+    of_nodes = (quad.triple for quad in added if graph_of(quad) != GRAPH_REASONED)
+    return {node for triple in of_nodes for node in ontology.nodes(triple)} - region.nodes
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -188,48 +189,28 @@ def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
     return recent
 
 
-class Seen:
-    """What was read of a graph, part by part: counts of the quads, and hashes of the nodes, 8 bytes each."""
-
-    def __init__(self) -> None:
-        self._hashes = [np.empty(0, np.int64)]
-        self._read = Counter[str]()
-
-    def note(self, region: Region) -> None:
-        """Note a part that was read."""
-        self._hashes.append(_hashes(region.nodes))
-        self._read.update(region.read)
-
-    def add(self, other: Seen) -> None:
-        """Note what another has noted, in this process or in another."""
-        self._hashes += other._hashes
-        self._read.update(other._read)
-
-    def all_of(self, kind: str, count: int) -> bool:
-        """Whether that many quads of a kind of graph were read."""
-        return count <= self._read[kind]
-
-    def unseen(self, nodes: Collection[Name]) -> set[Name]:
-        """Return those nodes that were not read."""
-        known = np.isin(_hashes(nodes), np.concatenate(self._hashes))
-        return {node for node, is_known in zip(nodes, known, strict=True) if not is_known}
-
-
 def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
     """Return the robots of a graph, by name."""
     return sorted(graph.subjects(TYPE, _ROBOT) - ontology.terms, key=str)
 
 
-def left(graph: KnowledgeGraph, ontology: Ontology, held: Counter[str], seen: Seen) -> Iterator[Region | None]:
-    """Yield the parts of a graph that were not seen, where it held that many quads of each kind; None as `around`."""
-    nodes = set[Name]()
-    for quad in _unread(graph, held, seen):
-        some_nodes = ontology.nodes(quad.triple)
-        if not some_nodes and is_asserted(quad):
+def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
+    """Yield the ontology alone, as a part without nodes, and all parts, robots first; None as `around`."""
+    unread, hashes = held(graph), [np.empty(0, np.int64)]  # of nodes 8 bytes each, for a fleet has millions
+    for region in chain([of_ontology(graph, ontology)], some(graph, ontology, robots_of(graph, ontology))):
+        if region is not None:
+            hashes.append(_hashes(region.nodes))
+            unread -= region.read
+        yield region
+    left = set[Name]()
+    for quad in _of_kinds(graph, unread.keys()):
+        nodes = ontology.nodes(quad.triple)
+        if not nodes and is_asserted(quad):
             yield None
             return
-        nodes.update(some_nodes)
-    yield from some(graph, ontology, seen.unseen(nodes))
+        left.update(nodes)
+    known = np.isin(_hashes(left), np.concatenate(hashes))
+    yield from some(graph, ontology, [node for node, is_known in zip(left, known, strict=True) if not is_known])
 
 
 def held(graph: KnowledgeGraph) -> Counter[str]:
@@ -284,9 +265,8 @@ def of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
     return region
 
 
-def _unread(graph: KnowledgeGraph, held: Counter[str], seen: Seen) -> Iterator[Quad]:
-    """Yield the quads of those graphs that parts left something of."""
-    kinds = {kind for kind, count in held.items() if not seen.all_of(kind, count)}
+def _of_kinds(graph: KnowledgeGraph, kinds: Collection[str]) -> Iterator[Quad]:
+    """Yield the quads of the named graphs of some kinds."""
     for name in graph.graphs() if kinds else ():
         if _kind(name) in kinds:
             yield from graph.quads_in(name)

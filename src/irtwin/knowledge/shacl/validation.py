@@ -7,9 +7,9 @@ are read as SHACL reads them: by the types that are said, and `rdfs:subClassOf` 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import chain
 
 import pyshacl
@@ -17,7 +17,7 @@ import rdflib
 from pyoxigraph import BlankNode, NamedNode, Quad, RdfFormat, Store, Triple, parse, serialize
 from rdflib.namespace import SH
 
-from irtwin.knowledge import each_part, parts
+from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import content_name
 from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.parts import Joined, Ontology, Region
@@ -95,27 +95,22 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad] | No
 
     Raises Joined where all is to be checked.
     """
-    if changed is None:
-        report, checked = _empty(), each_part.of_each(graph, ontology, _results)
-    else:
-        report = _as_rdflib(graph.triples(GRAPH_VALIDATION))
-        regions = parts.some(graph, ontology, nodes_of(changed), asserted=True)
-        checked = each_part.of_these(ontology, regions, partial(_results_anew, report))
+    report = _empty() if changed is None else _as_rdflib(graph.triples(GRAPH_VALIDATION))
+    regions = (
+        parts.every(graph, ontology)
+        if changed is None
+        else parts.some(graph, ontology, nodes_of(changed), asserted=True)
+    )
     (head,) = report.subjects(rdflib.RDF.type, SH.ValidationReport)
-    with closing(checked):
-        for result, of_robot in checked:
+    for some in parts.together(regions):
+        for result in _about(report, parts.one(some).nodes):  # of before
+            report -= report.cbd(result)
+            report.remove((None, SH.result, result))
+        for result, of_robot in _results(ontology, some):
             report += of_robot
             report.add((head, SH.result, result))
     report.set((head, SH.conforms, rdflib.Literal((head, SH.result, None) not in report)))
     return report
-
-
-def _results_anew(report: rdflib.Graph, ontology: Ontology, regions: list[Region]) -> Results:
-    """Yield what is found in some parts, and take what the report said of them out of it."""
-    for result in _about(report, parts.one(regions).nodes):
-        report -= report.cbd(result)
-        report.remove((None, SH.result, result))
-    yield from _results(ontology, regions)
 
 
 def _results(ontology: Ontology, regions: list[Region]) -> Results:
