@@ -127,17 +127,11 @@ class _Run:
         return self._no_longer_made(gone - added), added - gone
 
     def _no_longer_made(self, candidates: set[Quad]) -> set[Quad]:
-        subjects: dict[NamedNode, set[str]] = {}
-        for quad in candidates:
-            subjects.setdefault(quad.predicate, set()).add(str(quad.subject))
+        subjects = _hashes({str(quad.subject) for quad in candidates})
         for number, statement in enumerate(self.statements):
-            may_have = subjects.keys() if statement.predicates is None else statement.predicates & subjects.keys()
-            begin = f"<{statement.begins}" if statement.begins else ""
-            asked = {it for predicate in may_have for it in subjects[predicate] if it.startswith(begin)}
-            if asked:
-                entries = self.remembered.entries(number)
-                for row in self.remembered.rows(entries[np.isin(entries["subject"], _hashes(asked))]):
-                    candidates.difference_update(statement.quads(row))
+            entries = self.remembered.entries(number)
+            for row in self.remembered.rows(entries[np.isin(entries["subject"], subjects)]):
+                candidates.difference_update(statement.quads(row))
         return candidates
 
 

@@ -20,7 +20,7 @@ from irtwin.knowledge.mapping.document import (
 )
 from irtwin.knowledge.mapping.identifiers import Identifier, quoted
 from irtwin.knowledge.mapping.source import TableSource, describe
-from irtwin.knowledge.mapping.terms import Row, RowColumn, TermMaker, absolute, term_maker
+from irtwin.knowledge.mapping.terms import Row, RowColumn, TermMaker, term_maker
 
 GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
@@ -43,8 +43,7 @@ class Statement:
     """A query, and the makers of the terms that each of its rows becomes.
 
     table: the name of the one table that it reads, empty for a query of the document's or a join;
-    columns: what its rows hold of that table, in order;
-    predicates: those that its quads can have, None where rows say them; begins: how its subjects' IRIs begin.
+    columns: what its rows hold of that table, in order.
     """
 
     where: str
@@ -54,8 +53,6 @@ class Statement:
     subject: TermMaker
     graphs: GraphMaker
     properties: tuple[PlannedProperty, ...]
-    predicates: frozenset[NamedNode] | None
-    begins: str
 
     def quads(self, row: Row) -> list[Quad]:
         """Return what a row becomes (W3C R2RML, section 11.1). Raises InputError where it does not fit."""
@@ -165,7 +162,6 @@ class _Select:
 def _plain(select: _Select, triples_map: TriplesMap, document: MappingDocument) -> Statement:
     """The statement of a logical table alone: classes, and all objects that need no join."""
     rdf_type = select.maker(_constant(_RDF_TYPE))
-    predicates = [_constant(_RDF_TYPE)] if triples_map.classes else []
     properties = [PlannedProperty((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
     for item in triples_map.properties:
         objects = [
@@ -175,8 +171,7 @@ def _plain(select: _Select, triples_map: TriplesMap, document: MappingDocument) 
         ]
         if objects:
             properties.append(_property(select, triples_map, item, select.makers(objects)))
-            predicates += item.predicates
-    return _statement(select, triples_map, properties, predicates)
+    return _statement(select, triples_map, properties)
 
 
 def _joined(
@@ -185,7 +180,7 @@ def _joined(
     """The statement of one join: the parent's subjects as objects."""
     select.join(join)
     planned = _property(select, triples_map, item, (select.maker(parent, "parent"),))
-    return _statement(select, triples_map, [planned], item.predicates)
+    return _statement(select, triples_map, [planned])
 
 
 def _property(
@@ -195,11 +190,8 @@ def _property(
     return PlannedProperty(select.makers(item.predicates), objects, graphs)
 
 
-def _statement(
-    select: _Select, triples_map: TriplesMap, properties: Sequence[PlannedProperty], predicates: Iterable[TermMap]
-) -> Statement:
+def _statement(select: _Select, triples_map: TriplesMap, properties: Sequence[PlannedProperty]) -> Statement:
     subject, graphs = select.maker(triples_map.subject), select.graphs(triples_map.graphs)
-    constants = {term_map.constant for term_map in predicates}
     return Statement(
         where=triples_map.where,
         sql=select.sql,
@@ -208,17 +200,7 @@ def _statement(
         subject=subject,
         graphs=graphs,
         properties=tuple(properties),
-        predicates=frozenset(name for name in constants if isinstance(name, NamedNode))
-        if None not in constants
-        else None,
-        begins=_beginning(triples_map.subject, select.base_iri),
     )
-
-
-def _beginning(subject: TermMap, base_iri: str) -> str:
-    """Return how all IRIs that a subject map makes begin, as far as it says."""
-    first, *_ = absolute(subject.template, base_iri) or ("",)
-    return first if isinstance(first, str) and subject.term_type is TermType.IRI else ""
 
 
 def _constant(name: NamedNode) -> TermMap:
