@@ -7,7 +7,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from sqlalchemy import select
-from tests import rows
 from tests.providers.test_records import data_set, run
 
 from irtwin.errors import InputError
@@ -59,15 +58,6 @@ def test_a_name_that_looks_the_same_is_refused(tmp_path, name):
         check_name(workspace, "One arm 2")
         with pytest.raises(InputError, match='differs from "One arm" there in upper and lower case'):
             check_name(workspace, name)
-
-
-@pytest.mark.parametrize("name", ["One arm", "One_arm"])
-def test_an_identifier_of_an_earlier_version_is_told(tmp_path, name):
-    with Workspace(tmp_path) as workspace:
-        workspace.ingest(rows.robot(robot_id="One_arm", name="One arm"), [], [], {})
-        with pytest.raises(InputError, match=r'has the identifier One_arm of an earlier irtwin.*drop "One arm"'):
-            check_name(workspace, name)
-        assert find_robot(workspace, "One arm") == "One_arm"
 
 
 def test_a_robot_is_found_by_its_name(tmp_path):

@@ -71,15 +71,9 @@ def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = 
 
 
 def check_name(workspace: Workspace, name: str) -> None:
-    """Raise InputError where a robot of this name would be taken for another of the workspace, or be there twice."""
+    """Raise InputError where a robot of this name would be taken for another of the workspace."""
     for robot_id, known in _names(workspace).items():
-        same = unicodedata.normalize("NFC", known) == unicodedata.normalize("NFC", name)
-        if (robot_id == identifier(name)) != same:
-            raise InputError(
-                f'{workspace.folder}: robot "{known}" has the identifier {robot_id} of an earlier irtwin, which does '
-                f'not tell it from others; remove it with `irtwin workspace drop "{known}"` and run its data set again'
-            )
-        if not same and _folded(known) == _folded(name):
+        if robot_id != identifier(name) and _folded(known) == _folded(name):
             raise InputError(
                 f'{workspace.folder}: robot "{name}" differs from "{known}" there in upper and lower case or in the '
                 f"form of letters alone; use the same spelling for the same robot, another name for another"
