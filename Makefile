@@ -44,11 +44,11 @@ lint: $(VENV)/test
 	$(BIN)/lint-imports
 
 # docs/ as a site with a search, in build/guide; it opens without a server.
-guide: $(VENV)/test
+guide: $(VENV)/demo
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
-# dist/irtwin-VERSION-py3-none-any.whl: tests/system/test_wheel.py tries it in an environment of its own.
-wheel: $(VENV)/demo
+# dist/irtwin-VERSION-py3-none-any.whl, which holds the guide: tests/system/test_wheel.py tries it in an environment of its own.
+wheel: guide
 	$(BIN)/python -m hatchling build -t wheel
 
 # The ontology before Protégé's OWL API: prints what breaks OWL 2 DL, and which modules the catalogue led to.

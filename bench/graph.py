@@ -2,7 +2,7 @@
 
 python bench/graph.py FOLDER [ROBOTS] [RUNS]      JENA_JARS names a folder with Jena's jars; prints GRAPH.md's table
 
-The graph is that of a workspace: a fleet's rows, mapped, reasoned over and validated as `graph reason` does. Each
+The graph is that of a workspace: a fleet's rows, mapped, reasoned over and validated as `workspace reason` does. Each
 store works alone in a process of its own, on the same triples. Each answer is held against ours, row by row.
 """
 

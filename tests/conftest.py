@@ -105,6 +105,21 @@ def plant_place(made_once: MadeOnce) -> Path:
     return made_once("plant", fill)
 
 
+@pytest.fixture(scope="session")
+def guide(made_once: MadeOnce) -> Path:
+    """The guide, where `make guide` has it, so that a wheel built then holds it."""
+    root = Path(__file__).parents[1]
+
+    def build(folder: Path) -> None:
+        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet"]
+        environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+        built = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
+        assert built.returncode == 0, built.stderr
+
+    made_once("guide", build)
+    return root / "build" / "guide"
+
+
 def _server_programs() -> Path | None:
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/pg_ctl"))
     path = shutil.which("pg_ctl")

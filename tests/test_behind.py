@@ -140,13 +140,13 @@ def test_who_asks_is_warned(before: Path, tmp_path: Path) -> None:
     folder = tmp_path / "workspace"
     shutil.copytree(before, folder)
     broken_off(folder, "B")
-    with pytest.warns(GraphBehind, match=r"behind the database, .*; `irtwin graph reason --workspace \S+` catches up"):
+    with pytest.warns(GraphBehind, match=r"behind the database, .*; `irtwin workspace reason --workspace \S+` catches"):
         ask("ASK {}", folder)
     (fault,) = status(folder).faults
     assert "behind the database" in fault
     done = data_sets.irtwin("query", "ASK {}", "--workspace", folder)
     assert done.status == 0 and done.err.startswith(f"irtwin: {folder}: the graph is behind the database")
-    assert data_sets.irtwin("graph", "reason", "--workspace", folder, "--quiet").status == 0
+    assert data_sets.irtwin("workspace", "reason", "--workspace", folder, "--quiet").status == 0
     assert not status(folder).faults and not data_sets.irtwin("query", "ASK {}", "--workspace", folder).err
 
 

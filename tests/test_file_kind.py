@@ -25,7 +25,7 @@ DATA_SET = '[robot]\nname = "Arm"\n[[run]]\nfile = "a.csv"\nrole = "reference"\n
         ("model.xml", "<!-- x --><mujoco/>", "a model of MuJoCo", "irtwin diagnose DATASET --simulator "),
         ("twin.json", "{}", "a twin, if `--save-twin` wrote it", "irtwin predict "),
         ("kept.zip", "", "an archive, if `irtwin workspace backup` wrote it", "irtwin workspace restore "),
-        ("robot.ttl", "", "a graph", "irtwin graph reason "),
+        ("robot.ttl", "", "a graph", "irtwin workspace reason "),
         ("set/dataset.toml", DATA_SET, "a data set of Arm, 2 runs (1 reference, 1 observed)", "irtwin check "),
         ("set/dataset.toml", "run = 1", "a data set of a robot, 0 runs", "irtwin check "),
         ("set/irtwin.db", "", "a workspace", "irtwin workspace status --workspace "),

@@ -76,7 +76,7 @@ def test_names_neither_break_the_line_nor_steer_the_terminal(tmp_path):
         ["robot", "excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--rate"],
         ["robot", "excite", "robot.urdf", "--out", "out.csv", "--seconds", "5", "--box", "0", "0", "0", "1", "1"],
         ["serve", "--timeout"],
-        ["graph", "map", "m.ttl", "--database", "sqlite://", "--out", "out.nq", "--timeout"],
+        ["workspace", "map", "m.ttl", "--database", "sqlite://", "--out", "out.nq", "--timeout"],
     ],
     ids=lambda words: " ".join(words[:1] + words[-3:]),
 )

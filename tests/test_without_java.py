@@ -41,6 +41,6 @@ def test_the_main_job_draws_all_conclusions_and_hermit_is_refused(place: Path) -
     assert "concluded by SHACL rules" in page
     assert "Java" not in page
 
-    by_hermit = irtwin(place, "graph", "reason", "--engine", "hermit")
+    by_hermit = irtwin(place, "workspace", "reason", "--engine", "hermit")
     assert (by_hermit.returncode, len(by_hermit.stderr.splitlines())) == (2, 2), by_hermit.stderr
     assert "irtwin: HermiT needs Java 25 or newer and finds none" in by_hermit.stderr

@@ -98,7 +98,7 @@ def in_words(standing: str, workspace: Path) -> str:
         return f"{workspace}: the graph is being updated just now: answers may lack something; ask again in a moment"
     return (
         f"{workspace}: the graph is behind the database, as a command was broken off or failed: answers may lack "
-        f"something, or hold what is over; `irtwin graph reason --workspace {workspace}` catches up"
+        f"something, or hold what is over; `irtwin workspace reason --workspace {workspace}` catches up"
     )
 
 

@@ -58,7 +58,7 @@ def file_kind(path: Path) -> FileKind:
         command = f"irtwin workspace restore {shown} --workspace NEW"
         return _kind("an archive, if `irtwin workspace backup` wrote it", (command, "makes a workspace of it"))
     if suffix in _GRAPHS:
-        command = f"irtwin graph reason {shown} --out FILE"
+        command = f"irtwin workspace reason {shown} --out FILE"
         return _kind("a graph", (command, "draws all conclusions from it, by OWL 2 RL"))
     raise InputError(
         f"{path}: neither a data set, a workspace, a log ({', '.join(_LOGS)}), a robot (.urdf), a model of MuJoCo "

@@ -122,6 +122,14 @@ def folder(name: str) -> Path:
     return installed if installed.is_dir() else _PACKAGE.parents[1] / name
 
 
+def guide() -> Path:
+    """Return the first page of the guide: in the wheel, or where a checkout builds it. Raises InputError if neither."""
+    for page in (_PACKAGE / "guide" / "index.html", _PACKAGE.parents[1] / "build" / "guide" / "index.html"):
+        if page.is_file():
+            return page
+    raise InputError(f"{page}: not found; this is a checkout, where `make guide` builds the guide")
+
+
 def resources_of(workspace: Path | None = None) -> Resources:
     """Return the files that hold for a workspace; without one, those that ship and those of installed packages.
 

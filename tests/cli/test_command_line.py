@@ -194,11 +194,12 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
         (["query", "robots", "--workspace", "nowhere"], "no workspace here"),
         (["export", "--owl", "x.owl", "--workspace", "nowhere"], "no workspace here"),
         (["robot", "excite", "nowhere.urdf", "--seconds", "5", "--out", "x.csv"], "nowhere.urdf: cannot be read"),
-        (["graph", "map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
+        (["workspace", "map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
         (["frobnicate"], "there is no command and no file `frobnicate`; `irtwin --help` lists the commands\n"),
         (["diagnos", "set"], "did you mean `irtwin diagnose`?"),
         (["adopt", "Arm"], "irtwin: `irtwin adopt` is now `irtwin improve ROBOT`\n"),
         (["restore", "kept.zip"], "irtwin: `irtwin restore` is now `irtwin workspace restore`\n"),
+        (["graph", "docs"], "is now `irtwin workspace reason` and `map`, and `irtwin docs --ontology FILE`\n"),
         (["run", "robots", "--workers", "2"], "--workers goes with --out"),
         (["diagnose", "robots", "--out", "o", "--json", "x"], "--json is for one data set, and does not go with --out"),
         (["improve", "Arm", "--repair"], "--repair says how LOG was made, and goes with it"),
@@ -223,7 +224,7 @@ def test_queries_cannot_reach_other_servers(workspace):
 def test_the_map_command_writes_quads(workspace, tmp_path):
     mapping = Path(__file__).parents[2] / "mappings/robot.r2rml.ttl"
     out = tmp_path / "robot.nq"
-    done = irtwin("graph", "map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
+    done = irtwin("workspace", "map", mapping, "--database", f"sqlite:///{workspace}/irtwin.db", "--out", out)
     assert done.status == 0, done.err
     assert "https://w3id.org/irtwin#IR_Name" in out.read_text()
 
@@ -236,7 +237,7 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
         "WITH RECURSIVE t(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM t) SELECT n FROM t WHERE n < 0" ] ."""
     )
     known = ["--database", "sqlite:///x.db", "--out", "x.nq", "--timeout", "0.5"]
-    done = process("graph", "map", "x.ttl", *known, folder=tmp_path)
+    done = process("workspace", "map", "x.ttl", *known, folder=tmp_path)
     assert (done.returncode, "its SQL has not ended after 0.5 s" in done.stderr) == (2, True), done.stderr
     assert not (tmp_path / "x.nq").exists()
 
@@ -277,9 +278,9 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
 
 
 def test_reason_says_what_goes_together(tmp_path):
-    done = irtwin("graph", "reason", tmp_path / "in.ttl")
+    done = irtwin("workspace", "reason", tmp_path / "in.ttl")
     assert (done.status, "Missing option '--out'" in done.err) == (2, True), done.err
-    done = irtwin("graph", "reason", "--out", tmp_path / "out.ttl")
+    done = irtwin("workspace", "reason", "--out", tmp_path / "out.ttl")
     assert (done.status, "SOURCE and --out go together" in done.err) == (2, True), done.err
 
 

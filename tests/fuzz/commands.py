@@ -173,10 +173,18 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "export": (["export", "--owl", out["all.owl"], *here], [out["all.owl"]]),
         "live": (["live", *here], []),
         "map": (
-            ["graph", "map", MAPPING, "--database", f"sqlite:///{workspace / 'irtwin.db'}", "--out", out["robot.nq"]],
+            [
+                "workspace",
+                "map",
+                MAPPING,
+                "--database",
+                f"sqlite:///{workspace / 'irtwin.db'}",
+                "--out",
+                out["robot.nq"],
+            ],
             [out["robot.nq"]],
         ),
-        "reason": (["graph", "reason", out["all.owl"], "--out", out["closed.ttl"]], [out["closed.ttl"]]),
+        "reason": (["workspace", "reason", out["all.owl"], "--out", out["closed.ttl"]], [out["closed.ttl"]]),
         "explain": (["explain", "?", "irt:Energy_Consumption", *here], []),
         "backup": (["workspace", "backup", out["kept.zip"], *here], [out["kept.zip"]]),
         "restore": (
@@ -192,10 +200,10 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "query json": (["query", "SELECT * { ?s ?p ?o } LIMIT 20", "--format", "json", *here], []),
         "questions": (["query", *here], []),
         "docs": (
-            ["graph", "docs", "--out", out["docs.html"], "--questions", out["asked.html"], *here],
+            ["docs", "--ontology", out["docs.html"], "--questions", out["asked.html"], *here],
             [out["docs.html"]],
         ),
-        "reason into workspace": (["graph", "reason", *here], []),
+        "reason into workspace": (["workspace", "reason", *here], []),
         "optimise": (["optimise", _robot(folder), run.stem, "--cycle", "20", *here], []),
         "plan into workspace": (["plan", _robot(folder), *_ends(case), "--search", "2", *here], []),
         "alarms follow": (["alarms", "--follow", *here], []),

@@ -135,7 +135,7 @@ def concluded(workspace: Path) -> set[Quad]:
 def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(workspace: Path) -> None:
     before = concluded(workspace)
     run = second_payload(workspace)
-    done = irtwin("graph", "reason", "--workspace", workspace)
+    done = irtwin("workspace", "reason", "--workspace", workspace)
     assert done.status == 3
     assert done.err.splitlines()[-1].startswith(f"irtwin: {workspace}: statements contradict each other (OWL 2 RL rule")
     lost = before - concluded(workspace)
@@ -153,7 +153,7 @@ def test_two_payloads_of_a_run_cost_no_other_conclusion_and_are_told_everywhere(
 def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> None:
     before = concluded(workspace)
     second_payload(workspace)
-    assert irtwin("graph", "reason", "--workspace", workspace).status == 3
+    assert irtwin("workspace", "reason", "--workspace", workspace).status == 3
     with Workspace.existing(workspace) as place, rewriting(place) as graph:
         graph.change(set(graph.quads_in(MINE)), ())
         assert reason(graph).set_aside == ()

@@ -25,7 +25,7 @@ def read(path: Path, form: RdfFormat = RdfFormat.TURTLE) -> set[Triple]:
 def test_file_holds_what_was_given_and_what_follows(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.ttl"
     source.write_text(GIVEN)
-    outcome = CliRunner().invoke(cli, ["graph", "reason", str(source), "--out", str(out)])
+    outcome = CliRunner().invoke(cli, ["workspace", "reason", str(source), "--out", str(out)])
     assert outcome.exit_code == 0
     kept = [str(one) for one in read(out)]
     assert '"01"' in str([one for one in kept if "/at" in one])
@@ -45,7 +45,7 @@ def test_suffix_tells_the_format(tmp_path: Path, suffix: str) -> None:
 def test_contradiction_is_told_by_status_3(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.ttl"
     source.write_text(WRONG)
-    outcome = CliRunner().invoke(cli, ["graph", "reason", str(source), "--out", str(out)])
+    outcome = CliRunner().invoke(cli, ["workspace", "reason", str(source), "--out", str(out)])
     assert outcome.exit_code == 3
     assert "cax-dw" in outcome.output
     assert "https://example.org/a" in outcome.output
@@ -97,7 +97,7 @@ def test_classification_by_hermit(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL)
     assert (
-        CliRunner().invoke(cli, ["graph", "reason", str(source), "--out", str(out), "--engine", "hermit"]).exit_code
+        CliRunner().invoke(cli, ["workspace", "reason", str(source), "--out", str(out), "--engine", "hermit"]).exit_code
         == 0
     )
     assert "<https://example.org/C> <http://www.w3.org/2000/01/rdf-schema#subClassOf> <https://example.org/E>" in (
@@ -117,7 +117,7 @@ def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
 def test_clash_that_only_dl_sees_names_its_statements(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
     source.write_text(DL + "ex:D rdfs:subClassOf owl:Nothing .")
-    outcome = CliRunner().invoke(cli, ["graph", "reason", str(source), "--out", str(out), "--engine", "hermit"])
+    outcome = CliRunner().invoke(cli, ["workspace", "reason", str(source), "--out", str(out), "--engine", "hermit"])
     assert outcome.exit_code == 3
     assert "These statements cannot all be true" in outcome.output
     assert "some D" in outcome.output

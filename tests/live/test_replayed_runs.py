@@ -31,7 +31,7 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
     live = irtwin("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
     assert live.status == 0, live.err
     assert totals(workspace) == before
-    assert irtwin("graph", "reason", "--workspace", workspace).status == 0
+    assert irtwin("workspace", "reason", "--workspace", workspace).status == 0
     assert totals(workspace) == before
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
         (run,) = graph.query(

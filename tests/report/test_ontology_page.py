@@ -105,7 +105,7 @@ def test_the_tree_has_what_is_below_within_what_is_above(text: str) -> None:
 @pytest.mark.slow
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     out = tmp_path / "ontology.html"
-    assert CliRunner().invoke(cli, ["graph", "docs", "--out", str(out)]).exit_code == 0
+    assert CliRunner().invoke(cli, ["docs", "--ontology", str(out)]).exit_code == 0
     assert "industrial robots and the energy they use" in out.read_text(encoding="utf-8")
 
 
@@ -128,8 +128,6 @@ def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
     assert "shifts.ttl of workspace" in text
     assert "Made &lt;by&gt; night." in text
-    done = CliRunner().invoke(
-        cli, ["graph", "docs", "--workspace", str(tmp_path), "--out", str(tmp_path / "page.html")]
-    )
+    done = CliRunner().invoke(cli, ["docs", "--workspace", str(tmp_path), "--ontology", str(tmp_path / "page.html")])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "page.html").read_text() == text

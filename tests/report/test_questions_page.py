@@ -16,7 +16,7 @@ from irtwin.resources import shipped
 
 def test_each_question_has_its_place_its_words_and_its_query(tmp_path: Path) -> None:
     out = tmp_path / "questions.html"
-    done = CliRunner().invoke(cli, ["graph", "docs", "--out", str(tmp_path / "o.html"), "--questions", str(out)])
+    done = CliRunner().invoke(cli, ["docs", "--ontology", str(tmp_path / "o.html"), "--questions", str(out)])
     assert (done.exit_code, done.output.split()) == (0, [str(tmp_path / "o.html"), str(out)])
     text = out.read_text(encoding="utf-8")
     questions = named_questions()

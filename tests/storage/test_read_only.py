@@ -78,7 +78,7 @@ def test_commands_on_a_workspace_of_another_user(tmp_path: Path) -> None:
         "alarms",
     ]
     reading.append(f"export --owl {out}/graph.owl")
-    writing = ["graph reason", "workspace drop A", "workspace repair", "improve A", "demo"]
+    writing = ["workspace reason", "workspace drop A", "workspace repair", "improve A", "demo"]
     said = without_rights(COMMANDS, *(f"{command} --workspace {folder}" for command in reading + writing))
     for line in said[: len(reading)]:
         assert line.startswith("0 ") and line.endswith(" False"), line

@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.system]
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(guide: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("dist")
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(command, cwd=SOURCE, check=True, capture_output=True)
@@ -105,6 +105,13 @@ def test_the_wheel_holds_what_the_source_does(wheel: Path) -> None:
                 place = file.relative_to(SOURCE / "src" if name.startswith("src") else SOURCE)
                 assert str(place if name.startswith("src") else "irtwin" / place) in inside
     assert not any(name.startswith(("tests", "bench", "docs")) for name in inside)
+
+
+def test_the_guide_is_in_the_wheel(program: Path, tmp_path: Path) -> None:
+    told = irtwin(program, "docs", folder=tmp_path)
+    page = program.parents[1] / SITE / "irtwin/guide/index.html"
+    assert (told.stdout, told.stderr, page.is_file()) == (f"{page}\n", "", True)
+    assert not list(page.parent.rglob("*.map"))
 
 
 @pytest.mark.nightly

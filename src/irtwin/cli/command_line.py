@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from irtwin import __version__
-from irtwin.cli import alarms, bring, graph, motion, robot, service, twin, upkeep
+from irtwin.cli import alarms, bring, docs, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
 from irtwin.cli.sections import Sections
 from irtwin.errors import GraphBehind, InputError
@@ -80,9 +80,10 @@ def _check_system() -> None:
         "Build the twin": (twin.demo, twin.run, twin.improve),
         "Find the gap": (twin.diagnose,),
         "Plan and save": (motion.plan, motion.predict, motion.optimise),
-        "Ask": (graph.query, graph.explain, graph.export, graph.graph),
+        "Ask": (graph.query, graph.explain, graph.export),
         "Watch": (service.serve, service.live, alarms.alarms),
         "Keep": (upkeep.workspace,),
+        "Learn": (docs.docs,),
     },
     moved={
         "init": "import --robot ROBOT --out FOLDER",
@@ -91,7 +92,7 @@ def _check_system() -> None:
         "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
         "excite": "robot excite",
         "slow": "optimise",
-        **{name: f"graph {name}" for name in graph.graph.commands},
+        "graph": "workspace reason` and `map`, and `irtwin docs --ontology FILE",
         **{name: f"workspace {name}" for name in upkeep.workspace.commands},
     },
     context_settings={"help_option_names": ["-h", "--help"]},

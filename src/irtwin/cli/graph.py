@@ -1,4 +1,4 @@
-"""Commands on the graph: ask, explain, export, and the group of those that few need."""
+"""Commands on the graph: ask, explain, export; below `workspace`, those that few need."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from irtwin.cli.options import FILE, FOLDER, PLACE, Number, announce, located, located_graph, say, tell_contradictions
+from irtwin.cli.upkeep import workspace
 from irtwin.location import Location
 
 
@@ -99,12 +100,7 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
         sys.exit(2)
 
 
-@click.group()
-def graph() -> None:
-    """Work on the graph: draw its conclusions again, document its ontology, map a database."""
-
-
-@graph.command()
+@workspace.command()
 @click.argument("source", type=PLACE, required=False)
 @click.option("--out", type=FILE, help="RDF file to write, with SOURCE.")
 @click.option(
@@ -124,8 +120,8 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
     statements that contradict each other, all else is, and the exit status is 3 too.
 
     \b
-    Example: irtwin graph reason --workspace plant
-    Example: irtwin graph reason robots.ttl --out all.ttl
+    Example: irtwin workspace reason --workspace plant
+    Example: irtwin workspace reason robots.ttl --out all.ttl
 
     \b
     native  OWL 2 RL by the rules that ship. Takes under 1 s for 10,000 triples.
@@ -266,7 +262,7 @@ def _export_run(form: str, out: Path, location: Location, run: str, robot: str |
     export_bag(out, location, run, robot)
 
 
-@graph.command("map")
+@workspace.command("map")
 @click.argument("mapping", type=PLACE)
 @click.option("--database", metavar="URL", required=True, help="SQLAlchemy URL of the database to map.")
 @click.option("--out", type=FILE, required=True, help="N-Quads file to write.")
@@ -278,50 +274,8 @@ def map_database(mapping: Path, database: str, out: Path, timeout: float, base: 
     Works with any R2RML document and any database that SQLAlchemy supports.
 
     \b
-    Example: irtwin graph map plant.r2rml.ttl --database sqlite:///plant.db --out plant.nq
+    Example: irtwin workspace map plant.r2rml.ttl --database sqlite:///plant.db --out plant.nq
     """
     from irtwin.knowledge.mapping import map_to_file
 
     map_to_file(mapping, database, out, base, timeout)
-
-
-@graph.command()
-@click.option(
-    "--out",
-    type=FILE,
-    default=Path("irtwin-ontology.html"),
-    show_default=True,
-    help="HTML file to write.",
-)
-@click.option(
-    "--workspace",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
-    help="Folder whose ontology/ and questions/ are documented too; its graph answers the questions.",
-)
-@click.option(
-    "--questions",
-    type=FILE,
-    help="HTML file to write the competency questions to: what the graph can be asked by name.",
-)
-def docs(out: Path, workspace: Path | None, questions: Path | None) -> None:
-    """Write the ontology's documentation as one HTML page, with what installed packages add.
-
-    \b
-    Example: irtwin graph docs --workspace plant --questions questions.html
-    """
-    from irtwin import asking
-    from irtwin.report.ontology import questions_page
-    from irtwin.report.ontology.page import write_page
-    from irtwin.resources import resources_of
-
-    known = resources_of() if workspace is None else asking.checked(workspace)
-    write_page(out, known)
-    click.echo(out)
-    if questions is None:
-        return
-    if workspace is None:
-        questions_page.write_page(questions, known)
-    else:
-        with asking.open_graph(Location(workspace)) as graph:
-            questions_page.write_page(questions, known, graph)
-    click.echo(questions)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
+import webbrowser
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import wraps
@@ -189,3 +191,12 @@ def add_speech(command: click.Command) -> None:
 
 def _set(context: click.Context, option: click.Parameter, value: bool) -> None:
     setattr(speech, str(option.name), value)
+
+
+no_open_option = click.option("--no-open", is_flag=True, help="Do not show the page in a browser.")
+
+
+def show_page(page: Path) -> None:
+    """Open a page in the browser, where a person at a desktop asked for it."""
+    if sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        webbrowser.open(page.resolve().as_uri())

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +20,12 @@ from irtwin.cli.options import (
     graph_option,
     located,
     locating,
+    no_open_option,
     payload_com_option,
     payload_mass_option,
     refuse,
     say,
+    show_page,
     tell_contradictions,
 )
 from irtwin.location import Location
@@ -92,7 +92,7 @@ def check(dataset: Path, out: Path | None, repair: bool) -> None:
 @click.command()
 @located
 @base_option
-@click.option("--no-open", is_flag=True, help="Do not show the page in a browser.")
+@no_open_option
 @click.option(
     "--case-study", is_flag=True, help="Plan, price, measure and show a motion instead, as the seed paper does."
 )
@@ -135,8 +135,8 @@ def demo(
         announce(f"The example data set is in {data_set}. Use it as a template for your own.")
         page, question = run_all(data_set, location, announce=announce, **asked), "energy_per_joint"
     click.echo(f"\nOpen the page in a browser: {page.resolve()}")
-    if not no_open and sys.stdout.isatty() and {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
-        webbrowser.open(page.resolve().as_uri())
+    if not no_open:
+        show_page(page)
     click.echo(f"Ask the graph:              irtwin query {question} --workspace {location.folder}")
 
 

@@ -14,7 +14,7 @@ from irtwin.location import Location
 
 @click.group()
 def workspace() -> None:
-    """Look after a workspace: how it stands, what it may do, backups, robots to remove."""
+    """Look after a workspace: how it stands, what it may do, backups, robots to remove, its conclusions."""
 
 
 @workspace.command()

@@ -14,12 +14,12 @@ from irtwin.serve.protocol import Refusal
 
 LOOK = 5.0  # s between two looks
 LONGEST = 600.0  # s between two tries, where they fail
-_CONTRADICTIONS = 3  # the exit status of `irtwin graph reason` that has concluded all but what contradicts itself
+_CONTRADICTIONS = 3  # the exit status of `irtwin workspace reason` that has concluded all but what contradicts itself
 _log = logging.getLogger(__name__)
 
 
 async def catch_up(asking: Asking, location: Location) -> None:
-    """Look how the graph stands, again and again; have `irtwin graph reason` catch up where nobody is at work on it.
+    """Look again and again how the graph stands; have `irtwin workspace reason` catch up where nobody is at work on it.
 
     What fails is said once, and tried again ever more seldom.
     """
@@ -42,7 +42,7 @@ async def _caught_up(location: Location) -> str:
     places = {"IRTWIN_DATABASE": location.database, "IRTWIN_GRAPH": location.graph_url}  # a URL may hold a password
     environment = {name: value for name, value in {**os.environ, **places}.items() if value is not None}
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "irtwin", "graph", "reason", "--quiet", "--workspace", str(location.folder)),
+        *(sys.executable, "-m", "irtwin", "workspace", "reason", "--quiet", "--workspace", str(location.folder)),
         stdout=asyncio.subprocess.DEVNULL,
         stderr=asyncio.subprocess.PIPE,
         env=environment,
@@ -57,4 +57,4 @@ async def _caught_up(location: Location) -> str:
     if process.returncode in (0, _CONTRADICTIONS):
         return ""
     last = lines.decode(errors="replace").strip().rpartition("\n")[2]
-    return last.removeprefix("irtwin: ") or f"`irtwin graph reason` ended with status {process.returncode}"
+    return last.removeprefix("irtwin: ") or f"`irtwin workspace reason` ended with status {process.returncode}"

@@ -189,7 +189,8 @@ def _late(connection: Connection) -> bool:
 def _endless(connection: Connection, where: str) -> InputError:
     seconds = connection.info["seconds"]
     return InputError(
-        f"{where}: its SQL has not ended after {seconds:g} s; correct it, or give `graph map` more time with --timeout"
+        f"{where}: its SQL has not ended after {seconds:g} s; correct it, or give `irtwin workspace map` more time "
+        "with --timeout"
     )
 
 
