@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL ?= $(BIN)/python -m pip install
+INSTALL ?= $(BIN)/python -m pip install --no-compile
 
 .PHONY: demo test suite compiled nightly check fuzz lint mappings guide wheel ontology lock clean
 
@@ -43,7 +43,7 @@ lint: $(VENV)/test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# docs/ as a site with a search, in build/guide; it opens without a server.
+# docs/ as a site with a search, in build/guide; it opens without a server. The notebooks are run for their results.
 guide: $(VENV)/demo
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 

@@ -3,7 +3,9 @@
 As a library: `read_data_set` reads a data set, `identify` fits a `Twin` to it, `predict` says what the twin expects of
 a run, `diagnose` says where twin and robot differ and why, a `Diagnosis` whose `document` is what JSON, graph and page
 say; `read_urdf` gives a `Robot`, `catalogue` the effects.
-With a workspace: `run`, `adopt`, `ask`, `export`; a `Location` names one whose database or graph is kept elsewhere.
+`import_logs` makes a data set of logs in other formats, and `check_log` says what is wrong with one.
+With a workspace: `run`, `adopt`, `ask`, `explain`, `export`, `optimise`; a `Location` names one whose
+database or graph is kept elsewhere.
 """
 
 from __future__ import annotations
@@ -21,9 +23,13 @@ __all__ = [
     "adopt",
     "ask",
     "catalogue",
+    "check_log",
     "diagnose",
+    "explain",
     "export",
     "identify",
+    "import_logs",
+    "optimise",
     "predict",
     "read_data_set",
     "read_urdf",
@@ -31,12 +37,14 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from irtwin.asking import ask, export
+    from irtwin.asking import ask, explain, export
+    from irtwin.bring.bring import import_logs
     from irtwin.diagnosing import diagnose
     from irtwin.effects.catalogue import catalogue
     from irtwin.gap.diagnosis import Diagnosis
     from irtwin.location import Location
-    from irtwin.modelling import identify, predict
+    from irtwin.modelling import check_log, identify, predict
+    from irtwin.plans import optimise
     from irtwin.robot.description import Robot
     from irtwin.robot.urdf import read_urdf
     from irtwin.signals.log import DataSet, read_data_set
@@ -52,9 +60,13 @@ _MODULES = {
     "adopt": "workflow",
     "ask": "asking",
     "catalogue": "effects.catalogue",
+    "check_log": "modelling",
     "diagnose": "diagnosing",
+    "explain": "asking",
     "export": "asking",
     "identify": "modelling",
+    "import_logs": "bring.bring",
+    "optimise": "plans",
     "predict": "modelling",
     "read_data_set": "signals.log",
     "read_urdf": "robot.urdf",

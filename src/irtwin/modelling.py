@@ -96,14 +96,14 @@ def predict(
     return expect(twin, run_file, out, payload_mass=payload_mass, payload_com=payload_com).table
 
 
-def check_log(folder: Path, *, repair: bool = False, json_file: Path | None = None) -> Checked:
+def check_log(folder: Path | str, *, repair: bool = False, json_file: Path | str | None = None) -> Checked:
     """Read a data set and check its logs; write what was found. Raises InputError on what cannot be read."""
     if json_file is not None:
-        check_place(json_file)
+        check_place(Path(json_file))
     result = check(read_data_set(folder, repair=repair, commanded=True))
     if json_file is not None:
         document = {"findings": [finding.to_json() for finding in result.findings]}
-        write(json_file, (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
+        write(Path(json_file), (json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode())
     return result
 
 

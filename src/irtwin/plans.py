@@ -11,7 +11,7 @@ from sqlalchemy import select
 
 from irtwin import modelling
 from irtwin.errors import InputError
-from irtwin.location import Location
+from irtwin.location import WORKSPACE, Location
 from irtwin.modelling import Announce, Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.plan import Plan, Task
@@ -140,22 +140,24 @@ class Timings:
 def optimise(
     robot: str,
     run: str,
-    location: Location,
+    workspace: Location | Path | str = WORKSPACE,
     *,
-    name: str,
+    name: str | None = None,
     cycle: float | None = None,
     least_pause: float | None = None,
-    out: Path | None = None,
+    out: Path | str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Timings, Kept]:
-    """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run `name`.
+    """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run.
 
-    `cycle`: how long it may take, s, as long as the run if None; `least_pause`: see `CycleTimes`; `out`: a file of the
-    motion, as of `plan`. Raises InputError, and keeps nothing, where there is no such run or name, the run has no whole
-    move, the robot cannot be so fast, or its twin knows no power.
+    `name`: of the planned run, RUN_optimised if None; `cycle`: how long it may take, s, as long as the run if None;
+    `least_pause`: see `CycleTimes`; `out`: a file of the motion, as of `plan`. Raises InputError, and keeps nothing,
+    where there is no such run or name, the run has no whole move, the robot cannot be so fast, or its twin knows no
+    power.
     """
+    location, name = Location.of(workspace), name or f"{run}_optimised"
     if out is not None:
-        modelling.check_plan_file(out)
+        modelling.check_plan_file(Path(out))
     with Workspace.existing(location) as place:
         robot_id = find_robot(place, robot)
         run_id = find_run(place, robot_id, run, MEASURED_RUN).run_id
@@ -186,7 +188,7 @@ def optimise(
 
     timings, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_motion(timings.best.motion, timings.robot, out)
+        modelling.write_motion(timings.best.motion, timings.robot, Path(out))
     return timings, kept
 
 

@@ -16,7 +16,6 @@ from tests import small_fleet
 
 from irtwin import asking, resources
 from irtwin.knowledge.explain.explain import explain
-from irtwin.knowledge.explain.explanation import to_text
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import ask, named_questions
 from irtwin.knowledge.reasoning import reason
@@ -86,7 +85,7 @@ def test_each_question_has_the_same_answer(two: tuple[Filled, Filled]) -> None:
     "triple", ["id:run/Arm_A.fit_1 irt:Energy_Consumption", "id:robot/Arm_A/information irt:IR_Name"]
 )
 def test_an_explanation_is_the_same(two: tuple[Filled, Filled], triple: str) -> None:
-    here, there = ([to_text(one) for one in explain(it.graph, triple)] for it in two)
+    here, there = ([str(one) for one in explain(it.graph, triple)] for it in two)
     assert there == here and "id:" in there[0]
 
 

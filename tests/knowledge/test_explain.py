@@ -11,7 +11,7 @@ from pyoxigraph import BlankNode, Quad
 from irtwin.errors import InputError
 from irtwin.knowledge.explain import explain as explaining
 from irtwin.knowledge.explain.explain import explain
-from irtwin.knowledge.explain.explanation import Explanation, to_json, to_text
+from irtwin.knowledge.explain.explanation import Explanation, to_json
 from irtwin.knowledge.owl_rl.closure import show
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -118,7 +118,7 @@ def test_class_expressions_and_lists_are_walked() -> None:
 
 def test_written_as_outline_and_as_json(reasoned: KnowledgeGraph) -> None:
     found = only(reasoned, "id:robot/Arm_A irt:has_Joint id:joint/Arm_A/j1")
-    text = to_text(found)
+    text = str(found)
     assert text.splitlines()[:3] == [
         "id:robot/Arm_A irt:has_Joint id:joint/Arm_A/j1",
         "    by OWL 2 RL, rule prp-inv1",

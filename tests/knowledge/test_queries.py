@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+import re
 from datetime import UTC, datetime
 
 import pytest
@@ -42,6 +43,15 @@ def test_json_has_null_for_what_is_not_there() -> None:
         {"name": 'a "b",c', "value": 1.5, "time": "2026-03-02T00:00:00+00:00", "nothing": None},
         {"name": "ü", "value": None, "time": None, "nothing": None},
     ]
+
+
+def test_a_notebook_shows_a_table() -> None:
+    shown = AnswerTable(
+        ("name", "value"), ({"name": "<a>", "value": 1.23456}, {"name": None, "value": 2})
+    )._repr_html_()
+    head, first, second = re.findall(r"<tr>(.*?)</tr>", shown)
+    assert head == "<th>name</th><th>value</th>"
+    assert (first, second) == ("<td>&lt;a&gt;</td><td>1.235</td>", "<td></td><td>2</td>")
 
 
 def test_csv_reads_back() -> None:

@@ -9,7 +9,6 @@ from tests import plants
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
-from irtwin.knowledge.explain.explanation import to_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import term
 
@@ -66,12 +65,12 @@ def test_without_an_interval_of_standby_there_is_none_of_the_saving(graph: Knowl
 
 def test_a_cost_is_explained_down_to_the_tariff(graph: KnowledgeGraph) -> None:
     (found,) = explain(graph, "id:run/Arm_A.fit_1 irt:Energy_Cost ?")
-    said = to_text(found)
+    said = str(found)
     assert 'by the rule "cost of energy", in SHACL' in said
     assert 'tariff:electricity irt:Energy_Price "0.2"^^xsd:double' in said and "file plant.toml" in said
     assert 'irt:Energy_Consumption "1000"^^xsd:double' in said
     (found,) = explain(graph, "id:robot/Arm_A irt:Yearly_Saving ?")
-    assert "tariff:electricity irt:Operating_Hours" in to_text(found)
+    assert "tariff:electricity irt:Operating_Hours" in str(found)
 
 
 def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:

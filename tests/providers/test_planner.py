@@ -7,7 +7,6 @@ import pytest
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
-from irtwin.knowledge.explain.explanation import to_text
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers import planner, provider
@@ -70,7 +69,7 @@ def test_what_waits_says_what_it_lacks_and_why(graph):
     reason(graph)
     assert waiting(graph) == {("B.1", "energy", "has_Twin")}
     (why,) = explain(graph, "id:B.1 irt:lacks irt:has_Twin")
-    assert "provider:energy irt:requires irt:has_Twin" in to_text(why)
+    assert "provider:energy irt:requires irt:has_Twin" in str(why)
     assert {name: ends(some) for name, some in ready(graph).items()} == {"energy": ["A.2"], "identification": ["B"]}
 
 

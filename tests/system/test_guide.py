@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import os
 import re
 import subprocess
@@ -12,6 +14,14 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = ("first-log", "simulator", "energy", "ask", "cheaper-motion")
+TRUE = {  # of docs/notebooks/crane.py
+    ("rigid_body", "lift"): 12,
+    ("coulomb_friction", "turn"): 6,
+    ("coulomb_friction", "lift"): 20,
+    ("viscous_friction", "turn"): 9,
+    ("viscous_friction", "lift"): 80,
+    ("standby_power", "robot"): 90,
+}
 
 pytestmark = [pytest.mark.slow, pytest.mark.system]
 
@@ -23,6 +33,29 @@ def test_it_has_a_reference_of_commands_and_python(guide: Path) -> None:
     assert 'id="irtwin.modelling.identify"' in (guide / "reference" / "python.html").read_text(encoding="utf-8")
     for name in TUTORIALS:
         assert (guide / "tutorials" / f"{name}.html").is_file()
+
+
+def test_its_notebooks_show_what_is_true_of_their_robot(guide: Path) -> None:
+    shown = {page.stem: text_of(page) for page in sorted((guide / "notebooks").glob("*.html"))}
+    assert list(shown) == ["1_first_log", "2_simulator", "3_energy", "4_ask", "5_cheaper_motion"]
+    numbers = re.findall(r"^(\w+) +(\w+) +([\d.]+) .* to [\d.]+$", shown["1_first_log"], re.M)
+    assert {(effect, joint): float(number) for effect, joint, number in numbers} == pytest.approx(TRUE, rel=0.01)
+    assert "viscous_friction turn" in shown["2_simulator"] and "Fv: -9.0" in shown["2_simulator"]
+    assert "<td>standby power</td>" in shown["3_energy"] and "sha256" in shown["4_ask"]
+    saved = re.search(r"(\d+)[\d.]* \+- [\d.]+ J less", shown["5_cheaper_motion"])
+    assert saved is not None and int(saved[1]) > 100
+    assert all((guide / "notebooks" / f"{name}.ipynb").is_file() for name in shown)
+
+
+def text_of(page: Path) -> str:
+    """What stands on a page, tables aside without its tags."""
+    return html.unescape(re.sub(r"</?(?!td)[a-z][^>]*>", "", page.read_text(encoding="utf-8")))
+
+
+def test_notebooks_keep_no_results() -> None:
+    for notebook in (ROOT / "docs" / "notebooks").glob("*.ipynb"):
+        for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+            assert not cell.get("outputs") and not cell.get("execution_count"), notebook.name
 
 
 @pytest.mark.nightly

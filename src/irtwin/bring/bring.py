@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -26,7 +27,7 @@ from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
-from irtwin.signals.log import read_data_set
+from irtwin.signals.log import DataSet, read_data_set
 from irtwin.signals.sampling import interval
 from irtwin.storage.files import working_folder
 
@@ -122,6 +123,17 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         LogsAlike(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms
     )
     return Brought(shown, tuple(line for form in forms for line in form.said))
+
+
+def import_logs(files: Sequence[Path | str], out: Path | str, robot: Path | str | None = None, **said: Any) -> DataSet:
+    """Bring logs in other formats into a new data set, a run a file, and return it.
+
+    robot: a URDF file, a data set, or a robot's name; None: logs of a meter. said: fields of `Options`, such as
+    `power_at="mains"` or `maps=("pos_*=q:deg",)`. Raises InputError where a log cannot be used or a column's meaning
+    cannot be told, with what to say; nothing is written then.
+    """
+    bring([Path(file) for file in files], Path(out), None if robot is None else str(robot), Options(**said))
+    return read_data_set(out)
 
 
 def init(out: Path, robot: str | None, name: str | None) -> None:

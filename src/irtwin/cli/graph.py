@@ -79,7 +79,7 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
     import json
 
     from irtwin import asking
-    from irtwin.knowledge.explain.explanation import to_json, to_text
+    from irtwin.knowledge.explain.explanation import to_json
     from irtwin.knowledge.explain.verify import WHOLE
     from irtwin.knowledge.explain.verify import verify as verified
 
@@ -90,7 +90,7 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
         told = {"explanations": said, "files": [asdict(each) for each in files]} if verify else said
         click.echo(json.dumps(told, indent=2, ensure_ascii=False))
     else:
-        click.echo("\n\n".join(map(to_text, explanations)))
+        click.echo("\n\n".join(map(str, explanations)))
         for line in ["", *map(str, files)] if verify else ():
             click.echo(line)
     if any(each.is_wrong for each in files):

@@ -205,9 +205,7 @@ def optimise(robot: str, run: str, out: Path | None, location: Location, name: s
     """
     from irtwin import plans
 
-    timings, kept = plans.optimise(
-        robot, run, location, name=name or f"{run}_optimised", out=out, announce=say, **asked
-    )
+    timings, kept = plans.optimise(robot, run, location, name=name, out=out, announce=say, **asked)
     for line in _curve_lines(timings):
         click.echo(line)
     saved = _cycle_text(timings.best) + f" than {run}{_year(timings, timings.best.saved)}"

@@ -23,10 +23,9 @@ class Explanation:
     checksum: str | None = None
     folder: str | None = None
 
-
-def to_text(explanation: Explanation) -> str:
-    """Write an explanation as an indented outline."""
-    return "\n".join(_lines(explanation, ""))
+    def __str__(self) -> str:
+        """Return it as an indented outline."""
+        return "\n".join(_lines(self, ""))
 
 
 def to_json(explanation: Explanation) -> dict[str, Any]:

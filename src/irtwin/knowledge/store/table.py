@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
@@ -43,6 +44,20 @@ class AnswerTable(Sequence[Row]):
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.rows)
+
+    def _repr_html_(self) -> str:
+        """Return it as a table, which notebooks show."""
+        told = [[_shown(row[column]) for column in self.columns] for row in self.rows]
+        lines = [_line("th", self.columns), *(_line("td", row) for row in told)]
+        return f"<table>{''.join(lines)}</table>"
+
+
+def _shown(value: Any) -> str:
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _line(tag: str, cells: Iterable[str]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
 
 
 def table_of(answer: QuerySolutions | QueryBoolean | QueryTriples, faults: Collection[str] = ()) -> AnswerTable:
