@@ -19,8 +19,9 @@ def check_effects(graph: KnowledgeGraph) -> None:
     described = {str(row["effect"]).removeprefix(EFFECT) for row in graph.query(_DESCRIBED)}
     if alone := sorted(catalogue().keys() - described):
         raise InputError(
-            f'ontology/effects.ttl: lacks the effect "{alone[0]}", which is installed; without it, answers would lose '
-            f"its energy: describe <{EFFECT}{alone[0]}> as an irt:Effect with label and channel"
+            f'the ontology lacks the effect "{alone[0]}", which is installed; without it, answers would lose its '
+            f"energy: describe <{EFFECT}{alone[0]}> as an irt:Effect with label and channel, in "
+            f"ontology/{alone[0]}.ttl of the package that brings it, or of the workspace"
         )
     if alone := sorted(described - catalogue().keys()):
         raise InputError(

@@ -1,4 +1,4 @@
-"""A hook of MkDocs: each notebook below docs/notebooks is run when the guide is built, and a page with its results."""
+"""A hook of MkDocs: notebooks, run when the guide is built, are pages with their results; CONTRIBUTING.md is one."""
 
 import ast
 import contextlib
@@ -15,7 +15,7 @@ from mkdocs.structure.files import File, Files
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages. One notebook goes on where the one before ended, in the order of their names."""
+    """Add these pages. One notebook goes on where the one before ended, in the order of their names."""
     notebooks = Path(config.docs_dir) / "notebooks"
     sys.path.insert(0, str(notebooks))
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
@@ -23,6 +23,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             text = "\n\n".join(parts(notebook))
             files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=text))
     sys.path.remove(str(notebooks))
+    contributing = Path(config.docs_dir, "..", "CONTRIBUTING.md").read_text(encoding="utf-8").replace("](docs/", "](")
+    files.append(File.generated(config, "CONTRIBUTING.md", content=contributing))
     return files
 
 
