@@ -8,7 +8,7 @@ from irtwin.report.gap.verdict import sentence
 from irtwin.report.questions import Answer, PageQuestion
 
 
-def answers(scope, simulated=False, referenced=True):
+def answers(scope, simulated=False, referenced=True, parameters=()):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
@@ -24,8 +24,12 @@ def answers(scope, simulated=False, referenced=True):
             {"finding": "f1", "cause": "c1", "effect": "x/external_contact", "label": None, "confidence": 0.2},
         ],
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
+        "cause_parameters": parameters,
     }
-    names = ("diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances")
+    names = (
+        "diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances",
+        "cause_parameters",
+    )  # fmt: skip
     return {name: Answer(PageQuestion(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
 
 
@@ -44,4 +48,17 @@ def test_a_finding_is_set_against_the_runs_that_lack_it(scope, simulated, refere
     assert said == (
         f"Load {claim} (90 % sure): payload (70 %) or external contact (20 %). Adding this to the twin closes 50 % of "
         "the gap on held-out runs."
+    )
+
+
+def test_numbers_of_the_simulator_are_said_the_farthest_first():
+    numbers = [("k", None, None), ("Fv", 19.2, 8.71), ("Fc", 7.55, 5.89), ("mu", 0.0, 0.04), ("Ia", 2.0, 2.1)]
+    parameters = [
+        {"cause": "c1", "name": name, "joint": "j1", "simulator": simulator, "robot": robot, "unit": "N m"}
+        for name, simulator, robot in numbers
+    ]
+    said = sentence(answers("changed", simulated=True, parameters=parameters)).replace("\N{NO-BREAK SPACE}", " ")
+    assert said.endswith(
+        " The robot has other numbers than the simulator: mu of j1 0.0400 N m in place of 0, Fv of j1 8.71 N m in "
+        "place of 19.2, Fc of j1 5.89 N m in place of 7.55, and 1 more."
     )

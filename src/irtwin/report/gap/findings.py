@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,8 @@ _NAMED = 3  # findings that a sentence names; the rest are counted
 _SPELT_OUT = 4  # joints of one of them; of more it says how many
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
+OtherNumber = tuple[str, str | None, float, float, str]
+"""A number of a simulator's model that the robot has otherwise: name, joint, the model's, the robot's, unit."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,23 @@ def _closes(one: ToldFinding, count: int) -> str:
     of = "gap in" if one.of.startswith("the gap") else "mean square of"
     share = f"{wording.part(one.share)} of the {of} {one.channel} on held-out runs"
     return f" {what} closes {share} {within(one.interval)}."
+
+
+def other_numbers(differing: Sequence[OtherNumber]) -> str:
+    """Say which numbers of the simulator's model the robot has otherwise, the farthest first; may be empty."""
+
+    def apart(one: OtherNumber) -> float:
+        _, _, model, robot, _ = one
+        return abs(math.log(robot / model)) if robot / (model or math.inf) > 0 else math.inf
+
+    told = [
+        f"{name}{f' of {joint}' if joint else ''} {wording.quantity(robot, '' if unit == '1' else unit).rstrip()}"
+        f" in place of {wording.number(model)}"
+        for name, joint, model, robot, unit in sorted(differing, key=apart, reverse=True)[:_NAMED]
+    ]
+    rest = len(differing) - len(told)
+    more = f", and {rest} more" if rest else ""
+    return f" The robot has other numbers than the simulator: {', '.join(told)}{more}." if told else ""
 
 
 def within(interval: Sequence[float]) -> str:

@@ -26,7 +26,14 @@ def line(diagnosis: Document, against: str | None) -> str:
         against,
         None if tracking is None else misses(tracking.before),
     )
-    return f"{diagnosis.verdict}: {sentence}".replace("\N{NO-BREAK SPACE}", " ")
+    named = {cause for finding in diagnosis.findings if finding.matters for cause in finding.causes}
+    numbers = findings.other_numbers([
+        (one.name, one.joint, one.simulator, one.robot, one.unit)
+        for cause in diagnosis.causes
+        for one in cause.parameters
+        if cause.id in named and one.simulator is not None and one.robot is not None
+    ])  # fmt: skip
+    return f"{diagnosis.verdict}: {sentence}{numbers}".replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _told(one: Finding, against: str | None) -> findings.ToldFinding:

@@ -18,7 +18,12 @@ def sentence(answers: Answers) -> str:
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
     played = judged["tracking_error"] is not None
-    return findings.sentence(
+    numbers = findings.other_numbers([
+        (one["name"], one["joint"], one["simulator"], one["robot"], one["unit"])
+        for one in answers["cause_parameters"].rows
+        if one["simulator"] is not None and matters(one["cause"], answers)
+    ])  # fmt: skip
+    said = findings.sentence(
         wording.local_name(judged["verdict"]),
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
@@ -31,6 +36,7 @@ def sentence(answers: Answers) -> str:
         _against(judged),
         misses(judged["tracking_error"]) if played else None,
     )  # fmt: skip
+    return said + numbers
 
 
 def told(answers: Answers) -> list[ToldFinding]:
