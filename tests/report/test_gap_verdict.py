@@ -8,7 +8,7 @@ from irtwin.report.gap.verdict import sentence
 from irtwin.report.questions import Answer, PageQuestion
 
 
-def answers(scope, simulated=False, referenced=True, parameters=()):
+def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
@@ -24,11 +24,12 @@ def answers(scope, simulated=False, referenced=True, parameters=()):
             {"finding": "f1", "cause": "c1", "effect": "x/external_contact", "label": None, "confidence": 0.2},
         ],
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
+        "causes": [{"cause": "c1", "confidence": sure}],
         "cause_parameters": parameters,
     }
     names = (
         "diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances",
-        "cause_parameters",
+        "causes", "cause_parameters",
     )  # fmt: skip
     return {name: Answer(PageQuestion(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
 
@@ -62,3 +63,5 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
         " The robot has other numbers than the simulator: mu of j1 0.0400 N m in place of 0, Fv of j1 8.71 N m in "
         "place of 19.2, Fc of j1 5.89 N m in place of 7.55, and 1 more."
     )
+    guessed = sentence(answers("changed", simulated=True, parameters=parameters, sure=0.3))
+    assert "other numbers" not in guessed

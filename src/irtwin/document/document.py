@@ -443,6 +443,12 @@ class Document:
         if len({finding.id for finding in self.findings}) < len(self.findings):
             raise InputError("diagnosis.findings: two have one id; give each an id of its own")
 
+    @property
+    def mattering(self) -> tuple[Cause, ...]:
+        """The causes of findings that matter, in their order."""
+        told = {cause for finding in self.findings if finding.matters for cause in finding.causes}
+        return tuple(cause for cause in self.causes if cause.id in told)
+
     def to_json(self) -> dict[str, Any]:
         """Return the document as JSON, in the form of `schema()`."""
         written: dict[str, Any] = form.to_json(self)

@@ -26,12 +26,11 @@ def line(diagnosis: Document, against: str | None) -> str:
         against,
         None if tracking is None else misses(tracking.before),
     )
-    named = {cause for finding in diagnosis.findings if finding.matters for cause in finding.causes}
     numbers = findings.other_numbers([
         (one.name, one.joint, one.simulator, one.robot, one.unit)
-        for cause in diagnosis.causes
+        for cause in diagnosis.mattering
         for one in cause.parameters
-        if cause.id in named and one.simulator is not None and one.robot is not None
+        if cause.likely and one.simulator is not None and one.robot is not None
     ])  # fmt: skip
     return f"{diagnosis.verdict}: {sentence}{numbers}".replace("\N{NO-BREAK SPACE}", " ")
 

@@ -74,8 +74,7 @@ def causes(diagnosis: Document) -> AnswerTable:
 
 
 def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
-    told = {cause for finding in diagnosis.findings if finding.matters for cause in finding.causes}
-    for cause in (one for one in diagnosis.causes if one.id in told):
+    for cause in diagnosis.mattering:
         name = cause.effect.replace("_", " ")
         first: Row = {
             "cause": name if cause.likely else f"perhaps {name}",

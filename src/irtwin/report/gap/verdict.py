@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from irtwin.document.document import LIKELY
 from irtwin.report import wording
 from irtwin.report.gap import findings
 from irtwin.report.gap.findings import ToldFinding
@@ -18,10 +19,11 @@ def sentence(answers: Answers) -> str:
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
     played = judged["tracking_error"] is not None
+    likely = {one["cause"] for one in answers["causes"].rows if one["confidence"] >= LIKELY}
     numbers = findings.other_numbers([
         (one["name"], one["joint"], one["simulator"], one["robot"], one["unit"])
         for one in answers["cause_parameters"].rows
-        if one["simulator"] is not None and matters(one["cause"], answers)
+        if one["simulator"] is not None and one["cause"] in likely and matters(one["cause"], answers)
     ])  # fmt: skip
     said = findings.sentence(
         wording.local_name(judged["verdict"]),
