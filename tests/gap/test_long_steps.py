@@ -9,7 +9,7 @@ from irtwin.identification import progress
 
 ROBOT = arm(3)
 STEPS = {
-    "case": "friction near zero speed, joint",
+    "case": "friction near zero speed of each joint",
     "twin": "the twin without",
     "remainders": "what is left of",
     "contacts": "contacts in",
@@ -17,7 +17,7 @@ STEPS = {
     "ripples": "ripples of",
     "places of effects": "places of",
     "trials": "hypotheses tried for the next cause",
-    "judged": "how far the gap closes, group",
+    "judged": "how far the gap closes without a group",
     "shares": "causes leave",
     "estimate": "coefficients, weighed",
     "residual": "torque that is left of",

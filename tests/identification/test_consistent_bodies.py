@@ -25,7 +25,7 @@ OWN = np.arange(20).reshape(2, 10)
 def estimate(values: np.ndarray, sure: np.ndarray) -> Estimate:
     """Values that are known each by itself, to a standard deviation of `sure`."""
     equations = np.column_stack([np.diag(1 / sure), values / sure])
-    return Estimate(values, np.diag(sure**2), np.ones(2), 10, equations)
+    return Estimate(values, np.diag(sure**2), np.ones(2), 10, equations, np.ones((10, 2)))
 
 
 def described() -> np.ndarray:

@@ -32,6 +32,21 @@ def test_a_twin_that_fits_has_none():
     assert doubts(fitted()) == ()
 
 
+def test_a_contact_is_said_with_its_run_time_and_joint_and_moves_no_number():
+    motions = [measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed) for seed in (1, 2)]
+    plain = identify(ROBOT, motions)
+    push = 20.0 * ((motions[1].time > 4.0) & (motions[1].time < 5.0))
+    pushed = identify(ROBOT, [motions[0], replace(motions[1], torque=motions[1].torque + np.outer(push, [0, 1]))])
+    (said,) = doubts(replace(pushed, body_change=None))
+    (stretch,) = pushed.odd_stretches
+    assert stretch.run == motions[1].run and stretch.joints == ("joint_2",)
+    assert stretch.start < 4.2 and stretch.stop > 4.8 and stretch.stop - stretch.start < 2.5
+    assert f"{stretch.run} from {stretch.start:.1f} to {stretch.stop:.1f} s (joint_2)" in said
+    for one, other in zip(plain.parameters, pushed.parameters, strict=True):
+        if one.effect in ("coulomb_friction", "viscous_friction"):
+            assert one.lower <= other.value <= one.upper
+
+
 def test_what_no_consistent_bodies_give_is_said():
     twin = fitted(effects=["rigid_body"])
     assert f"up to {100 * twin.body_change:.2g} % of a joint's (RMS)" in doubts(twin)[0]

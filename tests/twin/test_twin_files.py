@@ -10,6 +10,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
+from irtwin.identification.robust_weights import OddStretch
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.torque_scale import FittedTorqueScale
@@ -43,6 +44,12 @@ def test_a_saved_twin_is_the_same_twin(tmp_path):
     (tmp_path / "again.json").write_text(to_json(again))
     assert (tmp_path / "again.json").read_text() == (tmp_path / "twin.json").read_text()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.json", "twin.json"]
+
+
+def test_a_saved_twin_says_which_stretches_counted_for_little(tmp_path):
+    twin = replace(TWIN, odd_stretches=(OddStretch("run", 1.0, 2.5, ("joint_2",)),))
+    (tmp_path / "twin.json").write_text(to_json(twin))
+    assert load(tmp_path / "twin.json").odd_stretches == twin.odd_stretches
 
 
 def test_a_saved_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path):

@@ -90,6 +90,11 @@ class Block:
         slow = None if self.slow is None else Slow(self.slow.begin[equations], self.slow.rows[equations])
         return replace(self, rows=self.rows[equations], factors=self.factors[equations], slow=slow)
 
+    def weighted(self, weights: np.ndarray) -> Block:
+        """Return the block with each equation's rows counting by its weight, (g,)."""
+        factors = (np.sqrt(weight) * factor for weight, factor in zip(weights, self.factors, strict=True))
+        return replace(self, factors=tuple(factors))
+
     @property
     def apart(self) -> Block:
         """The block with 2 g equations: those of fast rows, then those of slow ones."""

@@ -11,9 +11,10 @@ import scipy
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.progress import tell_step, track
+from irtwin.identification.robust_weights import SETTLED, robust_weights
 from irtwin.identification.uncertainty import covariance
 
-_REWEIGHTINGS = 4
+_REWEIGHTINGS = 20  # at most
 _LEAST_NOISE = 1e-6  # of the measurement's size: exact data still have finite weights,
 _LEAST_SHOWN = 1e-10  # of a column as large as expected: dead data, too
 
@@ -23,7 +24,8 @@ class Estimate:
     """Coefficients `values` (K,) with `covariance` (K, K), and the residual `noise` (g,) of each equation (RMS).
 
     `blocks` is the number of independent blocks behind the covariance. `equations` (K, K + 1): a triangle and a right
-    side of noise one, what data and prior say of the values together, bounds apart.
+    side of noise one, what data and prior say of the values together, bounds apart. `weights` (B, g): by how much each
+    block counted.
     """
 
     values: np.ndarray
@@ -31,6 +33,7 @@ class Estimate:
     noise: np.ndarray
     blocks: int
     equations: np.ndarray
+    weights: np.ndarray
 
     def of(self, places: Sequence[int], noise: np.ndarray | None = None) -> Estimate:
         """Return what is said of coefficients at some places, whatever the others are; `noise`: of equations left."""
@@ -38,7 +41,9 @@ class Estimate:
         turned = triangle(self.equations[:, [*others, *places, -1]])[len(others) :, len(others) :]
         own = np.ix_(places, places)
         left = self.noise if noise is None else noise
-        return Estimate(self.values[list(places)], self.covariance[own], left, self.blocks, turned)
+        return replace(
+            self, values=self.values[list(places)], covariance=self.covariance[own], noise=left, equations=turned
+        )
 
 
 def estimate(
@@ -50,7 +55,8 @@ def estimate(
 ) -> Estimate:
     """Estimate the coefficients of `terms` (K) from g equations a sample.
 
-    Each equation is weighted by its residual's inverse RMS, found by iteration. The prior of each term (mean
+    Each equation is weighted by its residual's inverse RMS, and each of its blocks by how little the fit leaves of it
+    beside others (`robust_weights`), found by iteration. The prior of each term (mean
     `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that they
     show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Where more is known of the
     terms together, `prior_rows` (K, K) say it instead: rows on their deviations, in units of their spread, of noise
@@ -58,8 +64,10 @@ def estimate(
     which equations are of one, each signal by its own. Bounds hold (`lowest`). The covariance is explained in
     `uncertainty`.
     """
-    factors = [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
-    count = np.maximum(sum(block.rows for block in blocks), 1)
+    given, weights = blocks, np.ones((len(blocks), len(pattern)))
+    factors = _of_all(blocks, pattern)
+    rows = np.array([block.rows for block in blocks])
+    count = np.maximum(rows.sum(axis=0), 1)
     expected = np.array([term.expected for term in terms])
     spread = np.array([term.spread for term in terms])
     lowest = np.array([term.lowest for term in terms])
@@ -71,8 +79,13 @@ def estimate(
     noise = np.maximum(size, dead)
     for _ in track(range(_REWEIGHTINGS), f"{len(terms)} coefficients, weighed anew"):
         values, _ = _solve(factors, noise, expected, spread, lowest, prior)
-        residual = np.array([np.linalg.norm(factor @ np.append(values, -1.0)) for factor in factors])
-        noise = np.maximum(residual / np.sqrt(count), least)
+        left, before = _left(given, pattern, values), (weights, noise)
+        noise = np.maximum(np.sqrt((weights * left).sum(axis=0) / count), least)
+        weights = robust_weights(left, rows, noise)
+        blocks = [block.weighted(own) for block, own in zip(given, weights, strict=True)]
+        factors = _of_all(blocks, pattern)
+        if np.allclose(weights, before[0], atol=SETTLED) and np.allclose(noise, before[1], rtol=SETTLED):
+            break
     tell_step(f"  how sure {len(terms)} coefficients are")
     level = noise.copy()
     alike = np.zeros(len(pattern), dtype=int) if signals is None else np.array(signals)
@@ -84,7 +97,20 @@ def estimate(
     values, equations = _solve(factors, level, expected, spread, lowest, prior)
     tell_step(f"  how sure {len(terms)} coefficients are")
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
-    return Estimate(values, sureness, noise, len(blocks), equations)
+    return Estimate(values, sureness, noise, len(blocks), equations, weights)
+
+
+def _of_all(blocks: Sequence[Block], pattern: np.ndarray) -> list[np.ndarray]:
+    """Return each equation's factor over all blocks."""
+    return [combine([block.factors[e] for block in blocks], row) for e, row in enumerate(pattern)]
+
+
+def _left(blocks: Sequence[Block], pattern: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the squares that values (K,) leave of each block and equation, (B, g)."""
+    weights = [np.append(values[used], -1.0) for used in pattern]
+    return np.array(
+        [[np.sum((own @ by) ** 2) for own, by in zip(block.factors, weights, strict=True)] for block in blocks]
+    )
 
 
 def _only(block: Block, equations: np.ndarray) -> Block:

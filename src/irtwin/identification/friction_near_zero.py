@@ -14,10 +14,10 @@ import numpy as np
 from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.friction import SLOW, CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack, side_by_side
-from irtwin.identification.accumulate import Block, Rows, accumulate
-from irtwin.identification.estimators import combine
+from irtwin.identification.accumulate import Block, Rows, accumulate, triangle
 from irtwin.identification.progress import track
 from irtwin.identification.reduced_torque import Column, ReducedTorque, column
+from irtwin.identification.robust_weights import SETTLED, robust_weights
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion
 
@@ -27,6 +27,7 @@ Dry = tuple[Turn | None, float | None]  # how a joint's dry friction turns, None
 _COARSE = [(width, exponent) for width in (1.5e-3, 3e-3, 6e-3, 0.012, 0.024) for exponent in (1.25, 2.0, 4.0, 10.0)]
 _FINER = [(width, exponent) for width in (0.65, 0.8, 1.0, 1.25, 1.5) for exponent in (0.75, 1.0, 1.35)]  # times these
 _WIDEST, _LEAST_EXPONENT = 0.03, 1.25  # a wider turn, or longer tails, are friction that a joint is known by
+_REWEIGHTINGS = 20  # at most
 _NEARLY_ALL = 0.85  # of the ranks: real turns have 0.87 and more, forms of friction that differ elsewhere 0.83 at most
 _NOTHING = 1e-9  # of the largest column: less is not shown
 
@@ -157,15 +158,29 @@ def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
 def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Dry:
     """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always."""
     own = int(pattern[joint].sum()) - len(shapes) - 1
-    factors = [block.factors[joint] for block in blocks if block.rows[joint]]
-    if not factors:
+    seen = [block for block in blocks if block.rows[joint]]
+    if not seen:
         return None, None
-    whole = combine(factors, pattern[joint])[:, np.append(pattern[joint], True)]
-    left, friction = _left(whole, factors, own)
+    factors = _weighted([block.factors[joint] for block in seen], np.array([block.rows[joint] for block in seen]), own)
+    left, friction = _left(triangle(np.concatenate(factors)), factors, own)
     best = int(np.argmin(left.sum(axis=1)))
     if not _everywhere(left[0] - left[best]):
         best = 0
     return shapes[best - 1] if best else None, max(float(friction[best]), 0.0)
+
+
+def _weighted(factors: Sequence[np.ndarray], rows: np.ndarray, own: int) -> list[np.ndarray]:
+    """Return blocks' factors, weighted by how little the first `own` columns and sharp friction leave of each."""
+    known = [factor[:, [*range(own + 1), -1]] for factor in factors]
+    weights = np.ones(len(rows))
+    for _ in range(_REWEIGHTINGS):
+        counting = [np.sqrt(weight) * factor for weight, factor in zip(weights, known, strict=True)]
+        left = _left(triangle(np.concatenate(counting)), known, own)[0][0]
+        noise = np.sqrt((weights * left).sum() / rows.sum())
+        before, weights = weights, robust_weights(left, rows, max(noise, np.finfo(float).tiny))
+        if np.allclose(weights, before, atol=SETTLED):
+            break
+    return [np.sqrt(weight) * factor for weight, factor in zip(weights, factors, strict=True)]
 
 
 def _everywhere(saved: np.ndarray) -> bool:

@@ -7,12 +7,34 @@ from collections.abc import Iterator
 from irtwin.twin.twin import Twin
 
 _CONTRADICTED = 0.01  # of a joint's torque, RMS: by less, consistent bodies are as good as any
+_STRETCHES = 3  # are named
 _OTHER_UNITS = 3.0  # times: phases that are counted or not, and warm windings, make no more of a data sheet's number
 
 
 def doubts(twin: Twin) -> tuple[str, ...]:
     """Return what is to be said of a twin."""
-    return (*_of_motion(twin), *_of_description(twin), *_of_bodies(twin), *_of_data_sheet(twin))
+    return (
+        *_of_stretches(twin),
+        *_of_motion(twin),
+        *_of_description(twin),
+        *_of_bodies(twin),
+        *_of_data_sheet(twin),
+    )
+
+
+def _of_stretches(twin: Twin) -> Iterator[str]:
+    """Yield where runs show something beside the robot's own torque."""
+    told = [
+        f"{one.run} from {one.start:.1f} to {one.stop:.1f} s ({', '.join(one.joints)})"
+        for one in twin.odd_stretches[:_STRETCHES]
+    ]
+    if more := len(twin.odd_stretches) - len(told):
+        told.append(f"and {more} more stretches")
+    if told:
+        yield (
+            "the twin leaves over four times as much torque as elsewhere in "
+            f"{'; '.join(told)}; these count for little: look there for a contact, a load or a channel that dropped out"
+        )
 
 
 def _of_bodies(twin: Twin) -> Iterator[str]:

@@ -17,6 +17,7 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.remainder import Remainder
+from irtwin.identification.robust_weights import OddStretch
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot
@@ -77,6 +78,7 @@ class _Twin:
     quantities: tuple[Parameter, ...] = ()
     remainder: Remainder | None = None
     choices: tuple[Choice, ...] = ()
+    odd_stretches: tuple[OddStretch, ...] = ()
 
 
 def load(path: Path) -> Twin:
@@ -118,6 +120,8 @@ def to_json(twin: Twin) -> str:
         document["remainder"] = asdict(twin.remainder)
     if twin.choices:
         document["choices"] = [asdict(choice) for choice in twin.choices]
+    if twin.odd_stretches:
+        document["odd_stretches"] = [asdict(stretch) for stretch in twin.odd_stretches]
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 

@@ -28,6 +28,7 @@ from irtwin.identification.fits import (
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.remainder import Remainder, of_pauses, remainder
+from irtwin.identification.robust_weights import OddStretch, odd_stretches
 from irtwin.identification.run_scatter import with_run_scatter
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.identification.two_processes import one_blas_thread
@@ -72,9 +73,12 @@ def identify(
     base: tuple[BaseParameter, ...] = ()
     condition: float | None = None
     change: float | None = None
+    odd: tuple[OddStretch, ...] = ()
     if with_torque:
         stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, reduced)[1])
         blocks, torque = fit_torque(stack, with_torque, reduced)
+        counting = [block.weighted(own) for block, own in zip(blocks, torque.weights, strict=True)]
+        odd = odd_stretches(blocks, torque.weights, robot.joint_names)
         powered = bool(with_power) and not stack.fixed.all()
         if powered:
             values = torque.values
@@ -83,12 +87,12 @@ def identify(
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known)
         free, torque = torque, with_consistent_bodies(stack, stack.torque_terms, torque)
-        torque = with_run_scatter(stack, blocks, torque)
+        torque = with_run_scatter(stack, counting, torque)
         found: list[Found] = [(stack.torque_terms, torque)]
         if powered:
             left, power = fit_power(stack, with_power, torque.values)
             found.append((free_terms(stack), power))
-        factors = [combine([block.factors[e] for block in blocks], used) for e, used in enumerate(stack.pattern)]
+        factors = [combine([block.factors[e] for block in counting], used) for e, used in enumerate(stack.pattern)]
         base, condition = _base(stack, factors, torque)
         change = _change(factors, torque.values - free.values)
     else:
@@ -112,6 +116,7 @@ def identify(
         covariance=scipy.linalg.block_diag(*(normal_covariance(it.covariance, it.blocks) for _, it in found)),
         remainder=remaining,
         body_change=change,
+        odd_stretches=odd,
     )
     return replace(twin, remainder=_with_pauses(twin, with_power))
 

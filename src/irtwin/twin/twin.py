@@ -11,6 +11,7 @@ from irtwin.effects.effect import NORMAL, Effect, Term
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.identification.remainder import Remainder
+from irtwin.identification.robust_weights import OddStretch
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -65,7 +66,7 @@ class Twin:
     torque was fitted, or nobody asked. `choices`: which effects were chosen by what data show, where nobody named them.
     `remainder`: what the effects leave of power; None: not known.
     `body_change`: by how much torque differs from the best fit's, as bodies are physically consistent, a share of the
-    joint's for which that is most; None: no torque was fitted.
+    joint's for which that is most; None: no torque was fitted. `odd_stretches`: of the runs, which counted for little.
     """
 
     robot: Robot
@@ -82,6 +83,7 @@ class Twin:
     choices: tuple[Choice, ...] = ()
     remainder: Remainder | None = None
     body_change: float | None = None
+    odd_stretches: tuple[OddStretch, ...] = ()
 
     @property
     def knows_power(self) -> bool:
