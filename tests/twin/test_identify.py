@@ -8,7 +8,8 @@ from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth, wi
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.errors import InputError
-from irtwin.signals.conditioning import condition
+from irtwin.identification.cutoff import cutoff_for
+from irtwin.signals.conditioning import condition, condition_for_fit
 from irtwin.twin.identify import identify
 from irtwin.twin.validate import validate
 
@@ -65,6 +66,23 @@ def test_through_the_whole_chain_from_positions_alone():
     np.testing.assert_allclose(values(twin, "coulomb_friction"), true["Fc"], rtol=0.05, atol=0.05)
     assert twin.cutoff == max(motion.cutoff for motion in motions)
     assert 1 < twin.condition_number < 100
+
+
+def test_noise_of_positions_takes_nothing_off_friction():
+    """Regressors with noise in them come out too small by plain least squares; the cutoff leaves none to speak of."""
+    robot, rng = arm(3), np.random.default_rng(1)
+    runs = []
+    for seed in range(3):
+        motion = measure(robot, swing(robot, seed, seconds=10), noise=0.3, seed=seed)
+        noisy = as_run(replace(motion, q=motion.q + 1e-3 * rng.standard_normal(motion.q.shape)))
+        runs.append(replace(noisy, name=f"run_{seed}"))
+    cutoff = cutoff_for(robot, runs, None).hz
+    twin = identify(robot, [condition_for_fit(run, robot, cutoff) for run in runs])
+    np.testing.assert_allclose(values(twin, "viscous_friction"), truth(robot)["Fv"], rtol=0.01)
+    np.testing.assert_allclose(values(twin, "coulomb_friction"), truth(robot)["Fc"], rtol=0.01)
+    new = swing(robot, 99)
+    error = (twin.torque(new) - measure(robot, new).torque)[np.abs(new.dq) > 1e-3]
+    assert np.sqrt(np.mean(error**2)) < 0.05
 
 
 @pytest.mark.nightly
