@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from irtwin.document.document import OddStretch
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.estimators import estimate
-from irtwin.identification.robust_weights import OddStretch, odd_stretches, robust_weights
+from irtwin.identification.robust_weights import odd_stretches, robust_weights
 
 TERMS = [Term("a", "", spread=100), Term("b", "", spread=100)]
 TRUTH = np.array([10.0, 20.0])
@@ -68,7 +69,7 @@ def test_blocks_in_a_row_are_one_stretch_with_the_joints_that_show_it():
     weights = np.ones((6, 2))
     weights[1, 1] = weights[2, 0] = weights[3, 0] = weights[5, 1] = 0.1
     assert odd_stretches(made, weights, ("a", "b")) == (
-        OddStretch("one", 1.0, 3.0, ("a", "b")),
-        OddStretch("two", 0.0, 1.0, ("a",)),
-        OddStretch("two", 2.0, 3.0, ("b",)),
+        OddStretch(run="one", start=1.0, stop=3.0, joints=("a", "b")),
+        OddStretch(run="two", start=0.0, stop=1.0, joints=("a",)),
+        OddStretch(run="two", start=2.0, stop=3.0, joints=("b",)),
     )

@@ -8,11 +8,11 @@ from irtwin.report.gap.verdict import sentence
 from irtwin.report.questions import Answer, PageQuestion
 
 
-def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9):
+def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9, verdict="ambiguous", odd=()):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
-            {"verdict": "ambiguous", "reason": None, "floor_from": "repeats", "tracking_error": None}
+            {"verdict": verdict, "reason": "unsure", "floor_from": "repeats", "tracking_error": None}
             | {"against_simulator": simulated, "referenced": referenced}
         ],
         "findings": [
@@ -26,10 +26,11 @@ def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9):
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
         "causes": [{"cause": "c1", "confidence": sure}],
         "cause_parameters": parameters,
+        "odd_stretches": odd,
     }
     names = (
         "diagnosis", "findings", "finding_joints", "finding_members", "locations", "closed", "disturbances",
-        "causes", "cause_parameters",
+        "causes", "cause_parameters", "odd_stretches",
     )  # fmt: skip
     return {name: Answer(PageQuestion(name, "", (), ""), tuple(rows.get(name, ()))) for name in names}
 
@@ -65,3 +66,17 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
     )
     guessed = sentence(answers("changed", simulated=True, parameters=parameters, sure=0.3))
     assert "other numbers" not in guessed
+
+
+def test_stretches_that_stand_out_are_said_where_a_gap_is_unexplained():
+    odd = [
+        {"rank": rank, "run": "run_1", "start": float(rank), "end": rank + 0.5, "joint": joint}
+        for rank in (1, 2, 3, 4)
+        for joint in ("j1", "j2")
+    ]
+    said = sentence(answers("missing", verdict="unexplained", odd=odd))
+    assert said.endswith(
+        " Look first at run_1 from 1.0 to 1.5 s (j1, j2); run_1 from 2.0 to 2.5 s (j1, j2); run_1 from 3.0 to 3.5 s "
+        "(j1, j2); and 1 more: there the twin leaves over four times as much torque as elsewhere."
+    )
+    assert "Look first" not in sentence(answers("missing", odd=odd))

@@ -27,6 +27,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.revisions.versions import r0021_tables_of_0_2 as first
 from irtwin.storage.revisions.versions import r0022_no_yardstick as second
 from irtwin.storage.revisions.versions import r0023_saving_verification as third
+from irtwin.storage.revisions.versions import r0024_odd_stretches as fourth
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -179,11 +180,13 @@ def said(place: Workspace) -> list[tuple[object, ...]]:
 def test_a_workspace_of_0_2_loses_what_is_told_no_more(tmp_path: Path) -> None:
     with Workspace(tmp_path) as place, place.engine.begin() as connection:
         connection.execute(text("CREATE TABLE gap_closeable (activity_id VARCHAR, closed FLOAT)"))
-        connection.execute(text(f"DROP TABLE {third.TABLE}"))
+        for table in (third.TABLE, fourth.JOINTS, fourth.TABLE):
+            connection.execute(text(f"DROP TABLE {table}"))
         connection.execute(text(f"UPDATE alembic_version SET version_num = '{second.down_revision}'"))
     with Workspace(tmp_path) as place:
         assert not inspect(place.engine).has_table("gap_closeable")
-        assert inspect(place.engine).has_table(third.TABLE)
+        made = inspect(place.engine)
+        assert all(made.has_table(table) for table in (third.TABLE, fourth.JOINTS, fourth.TABLE))
         with place.engine.connect() as connection:
             assert migration.revision(connection) == migration.newest()
 

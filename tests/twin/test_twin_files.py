@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, measure, swing
 
+from irtwin.document.document import OddStretch
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError
-from irtwin.identification.robust_weights import OddStretch
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 from irtwin.twin.torque_scale import FittedTorqueScale
@@ -47,7 +47,7 @@ def test_a_saved_twin_is_the_same_twin(tmp_path):
 
 
 def test_a_saved_twin_says_which_stretches_counted_for_little(tmp_path):
-    twin = replace(TWIN, odd_stretches=(OddStretch("run", 1.0, 2.5, ("joint_2",)),))
+    twin = replace(TWIN, odd_stretches=(OddStretch(run="run", start=1.0, stop=2.5, joints=("joint_2",)),))
     (tmp_path / "twin.json").write_text(to_json(twin))
     assert load(tmp_path / "twin.json").odd_stretches == twin.odd_stretches
 

@@ -33,6 +33,7 @@ CauseId = Annotated[str, Names("gap_cause/{diagnosis_id}/{}", "cause_id")]
 
 LIKELY = 0.5  # confidence from which a cause or a finding is likely, more so than not; below it is a guess
 FALSE_PLACES = 0.05  # rate of false discoveries up to which a place is sure, as intervals are 95 % ones
+_NAMED = 3  # odd stretches, in words
 LEAST_SHARE = 0.02  # of its channel's excess that a place has, to be worth a line
 
 
@@ -254,6 +255,34 @@ class NotRepeating:
     explained_by: CauseId | None = told("explained_by_Cause")
 
 
+@part("Odd_Stretch", table="gap_odd_stretch", of="odd_stretch_of", ranked=True)
+class OddStretch:
+    """A stretch of a run, s, of which the twin leaves far more of some joints' torque than of the rest of the runs."""
+
+    run: Run = told("odd_in_Run")
+    start: float = told("Stretch_Start")
+    stop: float = told("Stretch_End")
+    joints: tuple[Joint, ...] = told("odd_at_Joint")
+
+    @property
+    @tells(key=True)
+    def stretch_id(self) -> str:
+        """Its name: a run has one stretch that begins then."""
+        return f"{self.run}:{self.start:g}"
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return f"{self.run} from {self.start:.1f} to {self.stop:.1f} s ({', '.join(self.joints)})"
+
+
+def odd(stretches: Sequence[OddStretch]) -> str:
+    """Return the places of stretches in words; of many, how many more there are; nothing where there are none."""
+    more = len(stretches) - _NAMED
+    places = [one.place for one in stretches[:_NAMED]] + ([f"and {more} more"] if more > 0 else [])
+    return "; ".join(places)
+
+
 @part("Untestable_Effect", table="gap_not_testable", of="untestable_in", ranked=True)
 class Untestable:
     """An effect that the data cannot show, and why."""
@@ -411,7 +440,7 @@ class Document:
     `unexplained_because`: why the verdict is `unexplained`. The causes leave much of the gap; only a number that cannot
     be true would close it; runs of one motion differ by what no effect explains; or no cause that matters is likely.
     `simulator`: the model that the runs were held against. Where their commands were played through it, `horizons`: how
-    its tracking error grows.
+    its tracking error grows. `odd_stretches`: those of which the twin with its causes leaves most, if there are any.
     """
 
     verdict: Verdict = told("has_Verdict")
@@ -430,6 +459,7 @@ class Document:
     cutoff: Cutoff | None = told(default=None)
     simulator: str | None = told("Simulator_Model", column="simulator_model", default=None)
     horizons: tuple[Horizon, ...] | None = told(default=None)
+    odd_stretches: tuple[OddStretch, ...] | None = told(default=None)
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

@@ -125,6 +125,7 @@ class Diagnosis:
             torque_scale=None if self.scale is None else writing.torque_scale(self.scale),
             cutoff=self.cutoff,
             simulator=None if self.simulator is None else self.simulator.name,
+            odd_stretches=(self.twin and self.twin.odd_stretches) or None,
         )
 
     @property

@@ -7,26 +7,16 @@ others, as its residual is squared.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 
+from irtwin.document.document import OddStretch
 from irtwin.identification.accumulate import Block
 
 _FREEDOM = 4.0  # degrees of freedom of Student's t, as Lange, Little and Taylor 1989 take where nothing is known
 SETTLED = 0.02  # weights that change by less stay
 _ODD = 0.2  # a block of less weight leaves over 4.6 times as much as others: of nine measured robots six have none
-
-
-@dataclass(frozen=True)
-class OddStretch:
-    """A stretch of a run, s, of which the twin leaves far more of some joints' torque than of the rest."""
-
-    run: str
-    start: float
-    stop: float
-    joints: tuple[str, ...]
 
 
 def robust_weights(squares: np.ndarray, rows: np.ndarray, noise: float | np.ndarray) -> np.ndarray:
@@ -49,5 +39,5 @@ def odd_stretches(blocks: Sequence[Block], weights: np.ndarray, joints: Sequence
             own = list(group)
             at = np.any([which for _, which in own], axis=0)
             named = tuple(name for name, there in zip(joints, at, strict=True) if there)
-            found.append(OddStretch(run, own[0][0].start, own[-1][0].stop, named))
+            found.append(OddStretch(run=run, start=own[0][0].start, stop=own[-1][0].stop, joints=named))
     return tuple(found)

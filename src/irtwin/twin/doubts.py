@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from irtwin.document.document import odd
 from irtwin.twin.twin import Twin
 
 _CONTRADICTED = 0.01  # of a joint's torque, RMS: by less, consistent bodies are as good as any
-_STRETCHES = 3  # are named
 _OTHER_UNITS = 3.0  # times: phases that are counted or not, and warm windings, make no more of a data sheet's number
 
 
@@ -24,16 +24,10 @@ def doubts(twin: Twin) -> tuple[str, ...]:
 
 def _of_stretches(twin: Twin) -> Iterator[str]:
     """Yield where runs show something beside the robot's own torque."""
-    told = [
-        f"{one.run} from {one.start:.1f} to {one.stop:.1f} s ({', '.join(one.joints)})"
-        for one in twin.odd_stretches[:_STRETCHES]
-    ]
-    if more := len(twin.odd_stretches) - len(told):
-        told.append(f"and {more} more stretches")
-    if told:
+    if where := odd(twin.odd_stretches):
         yield (
-            "the twin leaves over four times as much torque as elsewhere in "
-            f"{'; '.join(told)}; these count for little: look there for a contact, a load or a channel that dropped out"
+            f"the twin leaves over four times as much torque as elsewhere in {where}, which counts for little: look "
+            "there for a contact, a load or a channel that dropped out"
         )
 
 

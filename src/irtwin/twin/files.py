@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from irtwin.document import form
+from irtwin.document.document import OddStretch
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.remainder import Remainder
-from irtwin.identification.robust_weights import OddStretch
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
 from irtwin.robot.description import Robot

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from irtwin.document.document import OddStretch
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
 from irtwin.effects.prior import Prior
@@ -28,7 +29,7 @@ from irtwin.identification.fits import (
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
 from irtwin.identification.remainder import Remainder, of_pauses, remainder
-from irtwin.identification.robust_weights import OddStretch, odd_stretches
+from irtwin.identification.robust_weights import odd_stretches
 from irtwin.identification.run_scatter import with_run_scatter
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.identification.two_processes import one_blas_thread

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from irtwin.document.document import OddStretch
 from irtwin.effects.effect import NORMAL, Effect, Term
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.identification.remainder import Remainder
-from irtwin.identification.robust_weights import OddStretch
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion

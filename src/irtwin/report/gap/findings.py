@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.document.document import LIKELY
+from irtwin.document.document import LIKELY, OddStretch, odd
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
@@ -188,6 +188,13 @@ def other_numbers(differing: Sequence[OtherNumber]) -> str:
     rest = len(differing) - len(told)
     more = f", and {rest} more" if rest else ""
     return f" The robot has other numbers than the simulator: {', '.join(told)}{more}." if told else ""
+
+
+def look_at(verdict: str, stretches: Sequence[OddStretch]) -> str:
+    """Say which stretches of runs stand out in a gap that is unexplained; may be empty."""
+    if verdict != "unexplained" or not stretches:
+        return ""
+    return f" Look first at {odd(stretches)}: there the twin leaves over four times as much torque as elsewhere."
 
 
 def within(interval: Sequence[float]) -> str:

@@ -32,7 +32,8 @@ def line(diagnosis: Document, against: str | None) -> str:
         for one in cause.parameters
         if cause.likely and one.simulator is not None and one.robot is not None
     ])  # fmt: skip
-    return f"{diagnosis.verdict}: {sentence}{numbers}".replace("\N{NO-BREAK SPACE}", " ")
+    look = findings.look_at(diagnosis.verdict, diagnosis.odd_stretches or ())
+    return f"{diagnosis.verdict}: {sentence}{numbers}{look}".replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _told(one: Finding, against: str | None) -> findings.ToldFinding:

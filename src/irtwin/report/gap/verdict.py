@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
-from irtwin.document.document import LIKELY
+from irtwin.document.document import LIKELY, OddStretch
 from irtwin.report import wording
 from irtwin.report.gap import findings
 from irtwin.report.gap.findings import ToldFinding
@@ -38,7 +39,15 @@ def sentence(answers: Answers) -> str:
         _against(judged),
         misses(judged["tracking_error"]) if played else None,
     )  # fmt: skip
-    return said + numbers
+    return said + numbers + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
+
+
+def _odd_stretches(answers: Answers) -> list[OddStretch]:
+    rows = groupby(answers["odd_stretches"].rows, key=lambda row: (row["rank"], row["run"], row["start"], row["end"]))
+    return [
+        OddStretch(run=run, start=start, stop=end, joints=tuple(row["joint"] for row in own))
+        for (_, run, start, end), own in rows
+    ]
 
 
 def told(answers: Answers) -> list[ToldFinding]:
