@@ -64,12 +64,13 @@ def test_what_leaves_more_counts_less_whatever_the_unit(sizes, unit):
     np.testing.assert_allclose(robust_weights(squares * unit**2, rows, unit), weights)
 
 
-def test_blocks_in_a_row_are_one_stretch_with_the_joints_that_show_it():
+def test_blocks_in_a_row_are_one_stretch_with_the_joints_that_show_it_the_worst_first():
     made = [Block(run, at, at + 1, np.array([1, 1]), ()) for run in ("one", "two") for at in (0.0, 1.0, 2.0)]
     weights = np.ones((6, 2))
-    weights[1, 1] = weights[2, 0] = weights[3, 0] = weights[5, 1] = 0.1
+    weights[1, 1] = weights[2, 0] = weights[3, 0] = 0.05
+    weights[5, 1] = 0.02
     assert odd_stretches(made, weights, ("a", "b")) == (
+        OddStretch(run="two", start=2.0, stop=3.0, joints=("b",)),
         OddStretch(run="one", start=1.0, stop=3.0, joints=("a", "b")),
         OddStretch(run="two", start=0.0, stop=1.0, joints=("a",)),
-        OddStretch(run="two", start=2.0, stop=3.0, joints=("b",)),
     )

@@ -77,6 +77,6 @@ def test_stretches_that_stand_out_are_said_where_a_gap_is_unexplained():
     said = sentence(answers("missing", verdict="unexplained", odd=odd))
     assert said.endswith(
         " Look first at run_1 from 1.0 to 1.5 s (j1, j2); run_1 from 2.0 to 2.5 s (j1, j2); run_1 from 3.0 to 3.5 s "
-        "(j1, j2); and 1 more: there the twin leaves over four times as much torque as elsewhere."
+        "(j1, j2); and 1 more: there the twin leaves over six times as much torque as elsewhere."
     )
     assert "Look first" not in sentence(answers("missing", odd=odd))

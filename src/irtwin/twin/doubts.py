@@ -26,7 +26,7 @@ def _of_stretches(twin: Twin) -> Iterator[str]:
     """Yield where runs show something beside the robot's own torque."""
     if where := odd(twin.odd_stretches):
         yield (
-            f"the twin leaves over four times as much torque as elsewhere in {where}, which counts for little: look "
+            f"the twin leaves over six times as much torque as elsewhere in {where}, which counts for little: look "
             "there for a contact, a load or a channel that dropped out"
         )
 

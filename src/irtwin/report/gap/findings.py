@@ -194,7 +194,7 @@ def look_at(verdict: str, stretches: Sequence[OddStretch]) -> str:
     """Say which stretches of runs stand out in a gap that is unexplained; may be empty."""
     if verdict != "unexplained" or not stretches:
         return ""
-    return f" Look first at {odd(stretches)}: there the twin leaves over four times as much torque as elsewhere."
+    return f" Look first at {odd(stretches)}: there the twin leaves over six times as much torque as elsewhere."
 
 
 def within(interval: Sequence[float]) -> str:
