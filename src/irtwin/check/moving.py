@@ -14,7 +14,7 @@ from irtwin.signals.samples import FEWEST
 
 _MOST_RUNS = 8
 _MOST_SAMPLES = 40_000  # of a run that are looked at
-_LEAST_RANGE = 0.02  # rad or m: a joint that spans less does not move
+LEAST_RANGE = 0.02  # rad or m: a joint that spans less does not move
 
 
 @dataclass(frozen=True)
@@ -48,4 +48,4 @@ def _beginning(run: Run) -> Run:
 
 
 def _moves(signals: Signals) -> np.ndarray:
-    return np.asarray(np.ptp(signals.q, axis=0) > _LEAST_RANGE)
+    return np.asarray(np.ptp(signals.q, axis=0) > LEAST_RANGE)
