@@ -86,7 +86,7 @@ def expected_seconds(joints: int, seconds: float, iterations: int = 200) -> floa
     """
     grid = len(_rest_of(seconds).grid)
     work = _work(grid, joints)
-    count = min(iterations, iterations * _MOST_WORK / work) + 2 * _STARTS
+    count = min(iterations, iterations * _MOST_WORK / work) + 2 * min(_STARTS, max(iterations, 1))
     return (_PER_POINT * grid * joints + _PER_WORK * work) * count
 
 
@@ -192,7 +192,7 @@ class _Search:
         """Improve `best` step by step."""
         postures = self._postures()
         starts = []
-        for _ in range(_STARTS):
+        for _ in range(min(_STARTS, max(iterations, 1))):
             start = self._start(postures[self._random.integers(len(postures))])
             starts.append((self._consider(start), start.ravel()))
             yield
@@ -340,7 +340,7 @@ class _Search:
         series = self._rest.series(x)
         if at_grid <= self._keep_off or self._workspace.least_clearance(series) <= 0:
             return False
-        return self._body.allows(series) and self._body.barrier(self._motion(x)[0])[0] < math.inf
+        return self._body.allows(series)
 
 
 def descend(cost: Cost, start: np.ndarray, iterations: int, tolerance: float = 1e-4) -> Iterator[np.ndarray]:

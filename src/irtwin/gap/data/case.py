@@ -28,7 +28,7 @@ from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Twin
 
-_LONG = 20_000  # samples: at 12,000 a copy of the process neither wins nor costs (a diagnosis of 9 s)
+_LONG = 12_000  # samples: at 12,000 a copy of the process neither wins nor costs (a diagnosis of 9 s)
 
 
 @dataclass(frozen=True)
