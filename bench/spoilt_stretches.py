@@ -59,7 +59,8 @@ def _between(torque: Torque, begin: float, end: float, other: Torque) -> Torque:
     return np.where(((at >= begin) & (at < end))[:, None], other, torque)
 
 
-def _cut(run: Run, rows: slice, spoil: Callable[[Torque], Torque] | None = None) -> Run:
+def cut(run: Run, rows: slice, spoil: Callable[[Torque], Torque] | None = None) -> Run:
+    """Return some samples of a run, its torque spoilt."""
     signals = run.signals
     own: dict[str, Any] = {one.name: getattr(signals, one.name) for one in fields(signals)}
     own = {name: values[rows] for name, values in own.items() if isinstance(values, np.ndarray)}
@@ -73,8 +74,8 @@ def left(data_set: DataSet, spoil: Callable[[Torque], Torque] | None) -> np.ndar
     cutoff, robot = choose_cutoff(data_set.runs), data_set.robot
     ends = [2 * len(run.signals.time) // 3 for run in data_set.runs]
     pairs = list(zip(data_set.runs, ends, strict=True))
-    fitted = [condition_for_fit(_cut(run, slice(end), spoil), robot, cutoff) for run, end in pairs]
-    judging = [condition(_cut(run, slice(end, None)), robot, cutoff) for run, end in pairs]
+    fitted = [condition_for_fit(cut(run, slice(end), spoil), robot, cutoff) for run, end in pairs]
+    judging = [condition(cut(run, slice(end, None)), robot, cutoff) for run, end in pairs]
     fits = validate(identify(robot, fitted, data_set.effects or BASELINE), judging)
     return np.sqrt(np.mean([fit.torque_rmse**2 for fit in fits if fit.torque_rmse is not None], axis=0))
 
