@@ -17,9 +17,7 @@ _JITTER = 0.3  # of the interval: median deviation of the times between samples
 _HELD = 0.9  # of a column's changes come at one pace, of several samples
 _FLAT = 0.02  # of the samples at the greatest magnitude,
 _ROW = 10  # this many in a row: the signal is cut off there
-_FROZEN = (
-    10.0  # times as long as it stays unchanged otherwise: tiago's torque of 0.02 N m steps does so 7 times as long
-)
+_FROZEN = 10.0  # times as long as it stays otherwise; tiago's torque, in steps of 0.02 N m, stays 7 times as long
 _STEPS = 12  # values over the whole range: too coarse to fit to
 _FEWEST = 200  # samples, for all of these
 

@@ -56,13 +56,12 @@ def estimate(
     """Estimate the coefficients of `terms` (K) from g equations a sample.
 
     Each equation is weighted by its residual's inverse RMS, and each of its blocks by how little the fit leaves of it
-    beside others (`robust_weights`), found by iteration. The prior of each term (mean
-    `expected`, standard deviation `spread`) is one more row: against thousands of samples it decides nothing that they
-    show, and what they do not show stays as expected (Tikhonov's ridge with physical units). Where more is known of the
-    terms together, `prior_rows` (K, K) say it instead: rows on their deviations, in units of their spread, of noise
-    one. As samples depend on each other, they count against it by their design effect only; where `signals` (g,) says
-    which equations are of one, each signal by its own. Bounds hold (`lowest`). The covariance is explained in
-    `uncertainty`.
+    beside others (`robust_weights`), found by iteration. The prior of each term (mean `expected`, standard deviation
+    `spread`) is one more row: against thousands of samples it decides nothing that they show, and what they do not show
+    stays as expected (Tikhonov's ridge with physical units). Where more is known of the terms together, `prior_rows`
+    (K, K) say it instead: rows on their deviations, in units of their spread, of noise one. As samples depend on each
+    other, they count against it by their design effect only; where `signals` (g,) says which equations are of one, each
+    signal by its own. Bounds hold (`lowest`). The covariance is explained in `uncertainty`.
     """
     given, weights = blocks, np.ones((len(blocks), len(pattern)))
     factors = _of_all(blocks, pattern)
@@ -84,7 +83,7 @@ def estimate(
         weights = robust_weights(left, rows, noise)
         blocks = [block.weighted(own) for block, own in zip(given, weights, strict=True)]
         factors = _of_all(blocks, pattern)
-        if np.allclose(weights, before[0], atol=SETTLED) and np.allclose(noise, before[1], rtol=SETTLED):
+        if np.allclose(weights, before[0], atol=SETTLED) and np.allclose(noise, before[1], SETTLED, 0.0):
             break
     tell_step(f"  how sure {len(terms)} coefficients are")
     level = noise.copy()
