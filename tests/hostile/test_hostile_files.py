@@ -7,13 +7,14 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.hostile.hostile_files import FILES
+from tests.hostile import hostile_bags, hostile_parquet, hostile_tables
 from tests.synthetic import arm
 
 from irtwin.bring.recording import read_recording
 from irtwin.errors import InputError
 from irtwin.signals.samples import read_signals
 
+FILES = {**hostile_tables.FILES, **hostile_parquet.FILES, **hostile_bags.FILES}
 ROBOT = arm(1)
 _TOO_MUCH = r"more than the \d+ MB that a file of this size may unpack to; "
 _SHEET = r": xl/worksheets/sheet1\.xml"
