@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -18,6 +15,7 @@ from pyoxigraph import RdfFormat, parse
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from tests.forks import Command
 
 TWO_ROBOTS = Path(__file__).parent / "knowledge/data/two_robots.trig"
 TOKEN = "a-token-for-tests"
@@ -30,7 +28,7 @@ class Server:
 
     url: str
     graph: Path
-    process: subprocess.Popen[str]
+    process: Command
 
     @property
     def sparql(self) -> str:
@@ -56,15 +54,8 @@ class Server:
 
 @contextmanager
 def serving(graph: Path, *arguments: object, token: str | None = TOKEN) -> Iterator[Server]:
-    environment = {name: value for name, value in os.environ.items() if name != "IRTWIN_TOKEN"}
-    if token is not None:
-        environment["IRTWIN_TOKEN"] = token
-    command = [sys.executable, "-m", "irtwin", "serve", "--port", "0", "--workspace", str(graph.parent)]
-    process = subprocess.Popen(
-        [*command, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
-    )
+    process = Command("serve", "--port", 0, "--workspace", graph.parent, *arguments, IRTWIN_TOKEN=token or "")
     try:
-        assert process.stdout is not None and process.stderr is not None
         line = process.stdout.readline()
         found = re.search(r"http://\S+(?=/sparql)", line)
         assert found, (line, process.stderr.read())
@@ -72,7 +63,7 @@ def serving(graph: Path, *arguments: object, token: str | None = TOKEN) -> Itera
     finally:
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=20)
-        assert process.returncode == 0, errors
+        assert process.returncode == (-signal.SIGKILL if process.killed else 0), errors
         assert "Traceback" not in errors, errors
 
 

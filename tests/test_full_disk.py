@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import resource
 import shutil
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tests.data_sets import irtwin
+from tests.forks import Command
 from tests.small_robots import data_set
 
 pytestmark = pytest.mark.slow
@@ -31,16 +31,12 @@ def test_a_full_disk_is_one_line(small_run: Path, tmp_path: Path, command: str, 
     what = data_set(tmp_path / "second", "Second", seed=5) if command == "run" else tmp_path / "kept.zip"
     asked = ("query", "energy_per_run", "--workspace", workspace, "--format", "csv")
     before = irtwin(*asked).out
-    done = subprocess.run(
-        [sys.executable, "-m", "irtwin", *command.split(), str(what), "--workspace", str(workspace)],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size << 10, size << 10)),
-    )
-    assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stderr.splitlines()[-1].startswith("irtwin: ")
+    limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (size << 10, size << 10))
+    done = Command(*command.split(), what, "--workspace", workspace, prepare=limit)
+    _, said = done.communicate()
+    assert done.returncode == 2, said
+    assert "Traceback" not in said
+    assert said.splitlines()[-1].startswith("irtwin: ")
     assert irtwin(*asked).out == before
     assert not (tmp_path / "kept.zip").exists()
     assert {file.name for file in workspace.glob(".*")} <= {".graph.turn"}  # a lock, which is nobody's

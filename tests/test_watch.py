@@ -7,8 +7,6 @@ import json
 import shutil
 import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
 from dataclasses import replace
@@ -23,19 +21,14 @@ from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from tests import rows
-from tests.data_sets import irtwin as in_this_process
+from tests.data_sets import irtwin
+from tests.forks import Command
 from tests.live.controller import Controller, serving
 from tests.live.opcua_robot import ServedRobot
 from tests.synthetic import arm
 from tests.trusting import trust_all
 
 pytestmark = pytest.mark.slow
-
-
-def irtwin(*arguments: object, **options: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command, text=True, **pipes, **options)  # type: ignore[call-overload]
 
 
 def lines(count: int) -> str:
@@ -64,26 +57,25 @@ def test_a_stream_on_standard_input_ends_by_itself_and_is_kept(
     new = request.getfixturevalue("new_postgresql_database") if on_server else None
     database, other = (["--database", new()] if new else [] for _ in range(2))
     workspace = fill(tmp_path / "w", *database[1:])
-    _, said = irtwin("live", "--workspace", workspace, *database).communicate(lines(50) + "junk\njunk\n", timeout=120)
+    _, said = Command("live", "--workspace", workspace, *database).communicate(lines(50) + "junk\njunk\n", timeout=120)
     assert said.count("line refused: a line is not JSON") == 1
     assert "50 samples stored, 2 lines refused" in said
     archive = tmp_path / "kept.zip"
-    kept = in_this_process("workspace", "backup", archive, "--workspace", workspace, *database)
+    kept = irtwin("workspace", "backup", archive, "--workspace", workspace, *database)
     assert (kept.out.strip(), kept.err) == (str(archive), "")
     after = tmp_path / "after"
-    in_this_process("workspace", "restore", archive, "--workspace", after, *other)
+    irtwin("workspace", "restore", archive, "--workspace", after, *other)
     question = "SELECT (series:integral(?run, 'power', 0, 9) AS ?joules) { ?run irt:State_Time ?at }"
     for folder in (workspace, after):
-        asked = in_this_process("query", question, "--format", "json", "--workspace", folder)
+        asked = irtwin("query", question, "--format", "json", "--workspace", folder)
         assert json.loads(asked.out) == [{"joules": pytest.approx(490.0)}], asked.err
-    again = in_this_process("workspace", "restore", archive, "--workspace", after, *other)
+    again = irtwin("workspace", "restore", archive, "--workspace", after, *other)
     assert "already exists" in again.err
     assert again.status == 2
 
 
 def test_a_signal_ends_the_watching_and_nothing_is_lost(workspace: Path) -> None:
-    process = irtwin("live", "--port", "0", "--workspace", workspace)
-    assert process.stderr is not None
+    process = Command("live", "--port", "0", "--workspace", workspace)
     address = process.stderr.readline().split()[-1]
     host, port = address.split(":")
     with socket.create_connection((host, int(port))) as client:
@@ -101,7 +93,7 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
     template.parent.mkdir(parents=True)
     template.write_text("{% if %}", encoding="utf-8")
     trust_all(workspace)
-    refused = in_this_process("live", "--workspace", workspace)
+    refused = irtwin("live", "--workspace", workspace)
     assert refused.status == 2
     assert f"{template}, line 1: " in refused.err
 
@@ -109,7 +101,7 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
 def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None:
     shutil.rmtree(workspace / "live", ignore_errors=True)
     (workspace / "live").touch()
-    done = in_this_process("live", "--workspace", workspace)
+    done = irtwin("live", "--workspace", workspace)
     assert done.status == 2
     assert done.err.splitlines()[-1] == (
         f"irtwin: {workspace}/live: File exists; a file is where a folder has to be, or a folder in place of a file; "
@@ -119,7 +111,7 @@ def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None
 
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     for command in (["live"], ["workspace", "backup", tmp_path / "a.zip"]):
-        refused = in_this_process(*command, "--workspace", tmp_path / "none")
+        refused = irtwin(*command, "--workspace", tmp_path / "none")
         assert "no workspace here" in refused.err
         assert refused.status == 2
     assert not list(tmp_path.iterdir())
@@ -134,8 +126,7 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
         KnowledgeGraph(there.graph_folder).close()
     controller = Controller()
     with serving(controller) as port:
-        process = irtwin("live", "--rtde", f"127.0.0.1:{port}", "--robot", made.name, "--workspace", place)
-        assert process.stderr is not None
+        process = Command("live", "--rtde", f"127.0.0.1:{port}", "--robot", made.name, "--workspace", place)
         assert f"Following 127.0.0.1:{port}: positions, speeds, torques" in process.stderr.readline()
         while controller.sent < 200 and process.poll() is None:
             time.sleep(0.05)
@@ -145,7 +136,7 @@ def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
     stored = int(said.partition(" samples stored")[0].rpartition("\n")[2])
     assert 190 <= stored <= controller.sent
     question = "SELECT (series:mean(?run, 'power', 0, 1) AS ?watts) { ?run irt:State_Time ?at }"
-    asked = in_this_process("query", question, "--format", "json", "--workspace", place)
+    asked = irtwin("query", question, "--format", "json", "--workspace", place)
     (answer,) = json.loads(asked.out)
     assert 96.0 < answer["watts"] < 144.0, asked.err
 
@@ -157,8 +148,7 @@ def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
         KnowledgeGraph(there.graph_folder).close()
     served = ServedRobot()
     served.start()
-    process = irtwin("live", "--opcua", served.address, "--robot", arm(6).name, "--workspace", tmp_path / "w")
-    assert process.stderr is not None
+    process = Command("live", "--opcua", served.address, "--robot", arm(6).name, "--workspace", tmp_path / "w")
     assert f"Following {served.address}: position (deg)" in process.stderr.readline()
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
@@ -189,9 +179,9 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
             "Give one of --port, --replay, --rtde and --opcua.",
         ),
     ):
-        told = in_this_process("live", *given, "--workspace", workspace)
+        told = irtwin("live", *given, "--workspace", workspace)
         assert (told.status, message in told.err) == (2, True), told.err
-    told = in_this_process("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
+    told = irtwin("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
     assert told.status == 2
     assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in told.err
 
@@ -209,14 +199,14 @@ def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
     ],
 )
 def test_options_that_do_not_go_together(tmp_path: Path, options: list[str], said: str) -> None:
-    found = in_this_process("live", "--workspace", tmp_path / "w", *options)
+    found = irtwin("live", "--workspace", tmp_path / "w", *options)
     assert found.status == 2
     assert said in found.err
     assert not list(tmp_path.iterdir())
 
 
 def test_a_log_of_a_robot_that_is_not_there(workspace: Path) -> None:
-    told = in_this_process("live", "--workspace", workspace, "--replay", "log.csv", "--robot", "nobody")
+    told = irtwin("live", "--workspace", workspace, "--replay", "log.csv", "--robot", "nobody")
     assert 'no robot "nobody" here' in told.err
     assert told.status == 2
     assert not list((workspace / "live").iterdir())

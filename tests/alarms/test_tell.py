@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from tests import rows
-from tests.data_sets import irtwin as in_this_process
+from tests.data_sets import irtwin
+from tests.forks import Command
 from tests.trusting import trust_all
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -30,17 +29,15 @@ def workspace(tmp_path: Path) -> Path:
     return tmp_path / "w"
 
 
-Start = Callable[..., subprocess.Popen[bytes]]
+Start = Callable[..., Command]
 
 
 @pytest.fixture
 def start() -> Iterator[Start]:
-    made: list[subprocess.Popen[bytes]] = []
+    made: list[Command] = []
 
-    def started(*arguments: object) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        made.append(subprocess.Popen(command, **pipes))  # type: ignore[call-overload]
+    def started(*arguments: object) -> Command:
+        made.append(Command(*arguments))
         return made[-1]
 
     yield started
@@ -54,24 +51,23 @@ def test_a_robot_that_stands_too_long_is_told_once_and_when_it_is_over(workspace
     trust_all(workspace)
     live = start("live", "--workspace", workspace)
     telling = start("alarms", "--follow", "--workspace", workspace)
-    assert live.stdin and telling.stdout and telling.stderr
     for step in range(40):  # at rest for 390 s
         state = {"robot": rows.ROBOT, "time": 1e9 + 10.0 * step, "position": [0.5, 0], "velocity": [0, 0]}
-        live.stdin.write(json.dumps(state).encode() + b"\n")
+        live.stdin.write(json.dumps(state) + "\n")
     live.stdin.flush()
     raised = json.loads(telling.stdout.readline())
     assert (raised["event"], raised["robot"], raised["rule"]) == ("raised", "KUKA KR6 R700", "idle_alarm")
     assert raised["reason"] == "has been standing still for more than 5 min; can its drives be switched off?"
     assert raised["since"].startswith("2001-09-09T01:46:40") and "irt:Standing_Time" in raised["sparql"]
-    listed = in_this_process("alarms", "--workspace", workspace)
+    listed = irtwin("alarms", "--workspace", workspace)
     assert "standing still" in listed.out and "1 row" in listed.out, listed.err
     live.communicate(timeout=120)  # its stream ends
     cleared = json.loads(telling.stdout.readline())
     assert (cleared["event"], cleared["since"]) == ("cleared", raised["since"])
     os.kill(telling.pid, signal.SIGTERM)
     rest, said = telling.communicate(timeout=120)
-    assert (rest, telling.returncode) == (b"", 0)
-    first, *others = said.decode().splitlines()
+    assert (rest, telling.returncode) == ("", 0)
+    first, *others = said.splitlines()
     assert first == "Telling alarms to standard output, webhook at 127.0.0.1:9; 0 active now"
     assert others[-1] == "2 messages could not be delivered"
 
@@ -84,6 +80,6 @@ def test_what_is_wrong_is_said_before_anything_is_made(tmp_path: Path, workspace
         (["--workspace", workspace, "--follow", "--config", "a.toml"], "a.toml: cannot be read"),
         (["--workspace", workspace, "--robot", "nobody"], "there is no robot 'nobody'"),
     ):
-        told = in_this_process("alarms", *given)
+        told = irtwin("alarms", *given)
         assert (told.status, message in told.err) == (2, True), told.err
     assert not (tmp_path / "none").exists() and not (workspace / "alarms").exists()

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.data_sets import irtwin, write
+from tests.forks import Command
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.robot.urdf import parse_urdf
@@ -182,20 +180,12 @@ def test_places_are_checked_before_the_work(option, tmp_path):
 def test_stopped_half_way_nothing_is_left(tmp_path):
     data = write(tmp_path / "data", ROBOT, runs())
     files = ["--json", "out/out.json", "--report", "out/out.html", "--save-twin", "out/twin.json"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "irtwin", "diagnose", str(data), *files],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # shells ignore it in what runs behind
-    ) as process:
-        assert process.stderr is not None
-        for line in process.stderr:
-            if "every effect" in line:
-                process.send_signal(signal.SIGINT)
-                break
-        rest = process.stderr.read()
+    process = Command("diagnose", data, *files, folder=tmp_path)
+    for line in process.stderr:
+        if "every effect" in line:
+            process.send_signal(signal.SIGINT)
+            break
+    _, rest = process.communicate()
     assert process.returncode == 130
     assert "irtwin: stopped" in rest
     assert "Traceback" not in rest

@@ -51,7 +51,6 @@ def test_where_it_cannot_it_says_why_once_and_all_that_answers_says_that_it_is_b
     shutil.copytree(left_behind, tmp_path / "workspace")
     graph = tmp_path / "workspace/graph"
     with KnowledgeGraph(graph), serving(graph) as server:
-        assert server.process.stderr is not None
         said = server.process.stderr.readline()
         assert "behind the database, and cannot catch up: " in said and "it is open already" in said
         for path in ("/", ROBOT.removeprefix("/irtwin/id"), ROBOT):

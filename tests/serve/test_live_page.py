@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 from tests.endpoint import Server, serving
+from tests.forks import Command
 from tests.screens import faults, narrow_and_dark
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -88,15 +87,13 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     page.goto(f"{robot.url}/live/Arm")
     wait_for(lambda: page.inner_text("#stream") == "not watched yet")
     log = next((folder / "data").rglob("*.parquet"))
-    command = [sys.executable, "-m", "irtwin", "live", "--replay", log, "--robot", "Arm"]
-    command += ["--workspace", folder / "workspace"]
     begun = time.time()
-    with subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True) as live:
-        wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
-        wait_for(lambda: page.inner_text("#stream") == "flowing")
-        wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
-        assert begun < page.evaluate("irtwinLive.time") < time.time() + 1  # of this replay, however late it is drawn
-        _, said = live.communicate(timeout=120)
+    live = Command("live", "--replay", log, "--robot", "Arm", "--workspace", folder / "workspace")
+    wait_for(lambda: page.evaluate("irtwinLive.drawn") > 3)
+    wait_for(lambda: page.inner_text("#stream") == "flowing")
+    wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
+    assert begun < page.evaluate("irtwinLive.time") < time.time() + 1  # of this replay, however late it is drawn
+    _, said = live.communicate()
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
     assert page.evaluate("irtwinLive.states") > 400

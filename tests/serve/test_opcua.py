@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shutil
 import socket
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import pytest
 from asyncua import ua
 from asyncua.sync import Client
 from tests.endpoint import serving
+from tests.forks import Command
 from tests.plants import HOSTILE
 
 pytestmark = pytest.mark.slow
@@ -67,8 +66,7 @@ def test_a_port_that_is_taken_is_told_in_a_line(plant_place: Path, tmp_path: Pat
     workspace = shutil.copytree(plant_place, tmp_path / "plant")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        serve = [sys.executable, "-m", "irtwin", "serve", "--workspace", workspace]
-        command = [*serve, "--port", "0", "--opcua", str(port)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = Command("serve", "--workspace", workspace, "--port", 0, "--opcua", port)
+        _, said = done.communicate()
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].endswith(f"port {port}: Address already in use; give --opcua another")
+    assert said.splitlines()[-1].endswith(f"port {port}: Address already in use; give --opcua another")
