@@ -147,7 +147,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def new_postgresql_database() -> Iterator[Callable[[], str]]:
-    """Give a function that makes an empty database and returns its URL."""
+    """Give a function that returns the URL of an empty database: a schema, for a database is 300 files to write."""
     programs = _server_programs()
     if programs is None:
         pytest.skip("no PostgreSQL server on this machine")
@@ -174,8 +174,8 @@ def new_postgresql_database() -> Iterator[Callable[[], str]]:
     def make() -> str:
         name = f"test_{next(numbers)}"
         with server.connect() as connection:
-            connection.execute(text(f"CREATE DATABASE {name}"))
-        return f"postgresql+psycopg://postgres@/{name}?host={folder}"
+            connection.execute(text(f"CREATE SCHEMA {name}"))
+        return f"postgresql+psycopg://postgres@/postgres?host={folder}&options=-csearch_path%3D{name}"
 
     try:
         yield make

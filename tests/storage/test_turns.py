@@ -113,6 +113,7 @@ def test_what_those_who_run_the_server_can_mend_is_one_line(
     place = engine.open_engine(url)
     with engine.writing(place) as session:
         session.execute(text("CREATE ROLE visitor LOGIN PASSWORD 'do-not-tell'"))
+        session.execute(text(f"GRANT USAGE ON SCHEMA {session.scalar(text('SELECT current_schema()'))} TO visitor"))
     guest = url.replace("postgres@", "visitor:do-not-tell@")
     with pytest.raises(InputError, match=r"visitor:\*\*\*@.*this user may not do that") as caught:
         Workspace(tmp_path / "guest", guest)
