@@ -1,18 +1,19 @@
 """What users assert by SPARQL Update or an edited OWL file: tried, kept in the database, and followed.
 
-Run as a module it does one update for `irtwin serve`, in a process that can be ended: a JSON object on standard input
-says which, and an answer of one line says what is wrong with it. Nothing is kept before that line; the graph follows
-after it.
+Run as a module it does updates for `irtwin serve`, each in a fork that can be ended. JSON on a line of standard input
+says which. An answer of one line says what is wrong with it, and an empty line that the fork has ended. Nothing
+is kept before the answer; the graph follows after it.
 """
 
 from __future__ import annotations
 
 import json
+import multiprocessing
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pyoxigraph import Quad
 
@@ -88,8 +89,21 @@ def follow(
 
 
 def main(memory: int) -> None:
-    """Do the update on standard input; write what is wrong with it. Both are JSON."""
-    request = json.load(sys.stdin.buffer)
+    """Do the updates on standard input, each in a fork, which finds imported what it takes."""
+    forks = multiprocessing.get_context("fork")
+    for line in sys.stdin.buffer:
+        request = json.loads(line)
+        if Workspace.is_there(Location.told(request["location"])):
+            from irtwin.knowledge.asserted import trial  # noqa: F401
+            from irtwin.providers import planner  # noqa: F401
+        fork = forks.Process(target=_do, args=(request, memory))
+        fork.start()
+        fork.join()
+        print(flush=True)
+
+
+def _do(request: dict[str, Any], memory: int) -> None:
+    """Do an update; write what is wrong with it, as JSON."""
     location = Location.told(request["location"])
     if location.graph_url is None:
         leave_network()

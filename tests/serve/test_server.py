@@ -111,7 +111,9 @@ def test_it_listens_on_this_machine_alone(server) -> None:
 @pytest.mark.slow
 def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start) -> None:
     with start(new_graph()) as running:
+        assert running.update("CLEAR ALL").status_code == 204  # its process stays for the next
         workers = list(running.workers())
+        assert len(workers) > 3
         os.kill(running.process.pid, signal.SIGTERM)
         assert running.process.wait(timeout=30) == 0
         assert not any(psutil.pid_exists(worker) for worker in workers)

@@ -200,6 +200,7 @@ def application(
                 await asyncio.gather(catching_up, return_exceptions=True)
         finally:
             live.samples.close()
+            await updates.close()
             await pool.close()
 
     app = Starlette(
