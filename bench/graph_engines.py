@@ -65,7 +65,7 @@ class Irtwin(Engine):
         self.changed: list[str] = []
 
     def load(self, file: Path) -> None:
-        from irtwin.knowledge.store.graph import in_graph
+        from irtwin.knowledge.store.named_graphs import in_graph
 
         self.graph.replace(in_graph((quad.triple for quad in parse(path=file)), GRAPH), GRAPH)
 

@@ -29,7 +29,8 @@ import psutil
 from pyoxigraph import Literal, NamedNode, Triple
 
 from irtwin.knowledge.questions.queries import named_questions
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 
 LIVE = "http://example.com/soak"
 TOO_MUCH = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"

@@ -16,7 +16,8 @@ from irtwin.asserting import follow, keep
 from irtwin.errors import InputError
 from irtwin.knowledge import by_parts
 from irtwin.knowledge.owl_rl.beside import Beside
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY
 from irtwin.rewriting import conclude, fill, map_rows, rewriting

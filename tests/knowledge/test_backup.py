@@ -20,7 +20,8 @@ from irtwin.errors import InputError
 from irtwin.input_file import checksum
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.backup import backup, restore
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.location import Location
 from irtwin.storage import database

@@ -18,7 +18,8 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_INFERRED, GRAPH_SOURCE, RDF, shorten
 from irtwin.resources import folder

@@ -13,7 +13,8 @@ from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.owl_rl import by_owlrl
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.reasoning import asserted, engine_of, reason
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_OWL_RL, GRAPH_SOURCE, OWL, RDF, RDFS, XSD
 
 TYPE, SUBCLASS = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf")

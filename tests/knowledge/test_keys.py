@@ -6,7 +6,8 @@ import pytest
 from pyoxigraph import Quad, RdfFormat, parse
 
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ID, IRT
 
 PREFIXES = f"@prefix irt: <{IRT}> . @prefix run: <{ID}run/> . @prefix robot: <{ID}robot/> . @base <{ID}> .\n"

@@ -14,7 +14,8 @@ from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import by_owlrl
 from irtwin.knowledge.owl_rl import closure as owl_rl
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE
 
 CASES = Path(__file__).parents[2] / "../shared/conformance/owl2rl"

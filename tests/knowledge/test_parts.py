@@ -17,7 +17,8 @@ from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,

@@ -13,7 +13,8 @@ from tests.endpoint import make_graph
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store import snapshot
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot, kept
 
 VALUES = "SELECT ?v { ?s <http://e/v> ?v } ORDER BY ?v"

@@ -125,7 +125,7 @@ def test_another_process_holding_the_graph_makes_updates_wait(writable) -> None:
 WRITER = """
 import sys, time
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.graph import in_graph
+from irtwin.knowledge.store.named_graphs import in_graph
 from pyoxigraph import Literal, NamedNode, Triple
 
 with KnowledgeGraph(sys.argv[1]) as graph:

@@ -20,7 +20,7 @@ from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.changes import DERIVED_FROM
-from irtwin.knowledge.store.graph import in_graph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
 from irtwin.resources import Files, Resources, folder
 

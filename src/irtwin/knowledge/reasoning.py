@@ -24,7 +24,8 @@ from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.parts import Joined, Ontology
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.changes import DERIVED_FROM, NOT_ASSERTED, nodes_of
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import (
     GRAPH_CHANGED,
     GRAPH_INFERRED,

@@ -14,7 +14,8 @@ from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.running import conclusions
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_OWL_RL, GRAPH_SHACL, GRAPH_SOURCE, term
 from irtwin.live.live_run import Tables, activities
 from irtwin.providers.names import run_iri

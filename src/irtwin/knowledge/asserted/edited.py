@@ -12,7 +12,8 @@ from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl.closure import show
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.export import exported
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_rdf, refuse
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
 

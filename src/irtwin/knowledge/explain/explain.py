@@ -19,7 +19,8 @@ from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.tariff import ELECTRICITY
 from irtwin.knowledge.vocabulary import (

@@ -16,7 +16,7 @@ from pyoxigraph import QueryTriples, Store, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.rules.rule import Rule
-from irtwin.knowledge.store.graph import in_graph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import PREFIXES
 
 MOST_ROUNDS = 100

@@ -26,7 +26,8 @@ from irtwin.knowledge.reasoning import made_of as reasoned_from
 from irtwin.knowledge.shacl.of_ontology import SUB_CLASS_OF, with_ontology
 from irtwin.knowledge.shacl.suspects import any_suspect, queries
 from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
-from irtwin.knowledge.store.graph import KnowledgeGraph, in_graph
+from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,

@@ -10,6 +10,7 @@ from typing import cast
 from pyoxigraph import BlankNode, CanonicalizationAlgorithm, Dataset, Literal, NamedNode, Quad, Triple
 
 Object = NamedNode | BlankNode | Literal | Triple
+_NAMED_AT_ONCE = 5_000  # IRIs in a query
 
 
 def has_blank_node(statements: Iterable[Quad | Triple]) -> bool:
@@ -60,3 +61,11 @@ def _canonical(triples: Iterable[Triple]) -> Dataset:
     dataset = Dataset(Quad(triple.subject, triple.predicate, triple.object) for triple in triples)
     dataset.canonicalize(CanonicalizationAlgorithm.RDFC_1_0)
     return dataset
+
+
+def by_name(nodes: Iterable[NamedNode | BlankNode]) -> tuple[list[str], list[BlankNode]]:
+    """Return the IRIs among nodes, some thousand at a time, and the others, which no query can name."""
+    terms = list(nodes)
+    named = [str(node) for node in terms if isinstance(node, NamedNode)]
+    batches = [" ".join(named[at : at + _NAMED_AT_ONCE]) for at in range(0, len(named), _NAMED_AT_ONCE)]
+    return batches, [node for node in terms if isinstance(node, BlankNode)]

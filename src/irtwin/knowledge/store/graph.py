@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -24,11 +22,11 @@ from pyoxigraph import (
 )
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store import changes, store_files
-from irtwin.knowledge.store.blank_nodes import has_blank_node, named_below, same
+from irtwin.knowledge.store import changes, ontology, store_files
+from irtwin.knowledge.store.blank_nodes import by_name, has_blank_node, named_below, same
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.keywords import refuse_service
-from irtwin.knowledge.store.rdf_input import read_turtle
+from irtwin.knowledge.store.named_graphs import belonging, graph_name, is_below, is_of_many, names_in, triples_in
 from irtwin.knowledge.store.reading import KeptAnswers, answers_of
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
@@ -38,8 +36,7 @@ from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import as_change, by_asking, by_doing, check
-from irtwin.knowledge.tariff import tariff_of
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, ONTOLOGY, OWL, VOID, prefixes
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
 if TYPE_CHECKING:
@@ -47,7 +44,6 @@ if TYPE_CHECKING:
 
 Subject = NamedNode | BlankNode | Triple
 _MOST_KEPT = 2_000  # values of an answer that is kept
-_NAMED_AT_ONCE = 5_000  # IRIs in a query
 _MANY = 10_000  # new quads: from there on a file of their own is quicker than the store's log, and takes no memory
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
 _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
@@ -165,7 +161,7 @@ class KnowledgeGraph:
     @property
     def has_ontology(self) -> bool:
         """Whether the ontology's graph is made of the modules and of the tariff that hold for the workspace now."""
-        return self.holds(self._ontology_version())
+        return self.holds(ontology.version(self.resources, self._workspace))
 
     def load_ontology(self) -> None:
         """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says.
@@ -173,22 +169,7 @@ class KnowledgeGraph:
         With them goes a name of their content, by which a graph that is made of these already is left alone.
         """
         if not self.has_ontology:
-            modules = _read_modules(*self._modules())
-            more = in_graph(chain(self._tariff(), [self._ontology_version()]), GRAPH_ONTOLOGY)
-            self.replace(chain(modules, more), GRAPH_ONTOLOGY)
-
-    def _modules(self) -> tuple[tuple[Path, ...], bytes]:
-        """Return the files of the ontology, and their content."""
-        paths = tuple(self.resources.paths("ontology"))
-        return paths, b"".join(path.read_bytes() for path in paths)
-
-    def _ontology_version(self) -> Triple:
-        digest = hashlib.sha256(self._modules()[1])
-        digest.update("".join(map(str, self._tariff())).encode())
-        return Triple(NamedNode(ONTOLOGY), NamedNode(f"{OWL}versionInfo"), Literal(f"sha-256:{digest.hexdigest()}"))
-
-    def _tariff(self) -> Iterable[Triple]:
-        return () if self._workspace is None else tariff_of(self._workspace)
+            self.replace(ontology.quads(self.resources, self._workspace), GRAPH_ONTOLOGY)
 
     @property
     @telling
@@ -243,7 +224,7 @@ class KnowledgeGraph:
         memory that grows little with their number. Graphs that stay as they are are left alone; returns the IRIs of
         those that changed.
         """
-        quads = _belonging(quads, below)
+        quads = belonging(quads, below)
         old = self.graphs(*below)
         if isinstance(self._store, Store) and not old:
             first = next(quads, None)
@@ -255,12 +236,12 @@ class KnowledgeGraph:
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
-        names = {*_names(new), *old}
-        changed = sorted(name for name in names if not same(_read(new, name), _read(self._store, name)))
+        names = {*names_in(new), *old}
+        changed = sorted(name for name in names if not same(triples_in(new, name), triples_in(self._store, name)))
         if changed:
             self._forget_what_was_inferred(changed)
             with self._writing():
-                self._write(";\n".join(replacement(name, _read(new, name)) for name in changed))
+                self._write(";\n".join(replacement(name, triples_in(new, name)) for name in changed))
             self._store.flush()
         return changed
 
@@ -329,16 +310,16 @@ class KnowledgeGraph:
 
         below: whole IRIs; one that ends in / stands for all graphs whose IRIs begin with it, and "" for all.
         """
-        if below and not any(map(_is_of_many, below)):  # a fleet has too many to look through
+        if below and not any(map(is_of_many, below)):  # a fleet has too many to look through
             return sorted(name for name in set(below) if self._store.contains_named_graph(NamedNode(name)))
-        return sorted(name for name in _names(self._store) if not below or _is_below(name, below))
+        return sorted(name for name in names_in(self._store) if not below or is_below(name, below))
 
     @telling
     def triples(self, *below: str) -> set[Triple]:
         """Return the triples of the named graphs `below`, as in `graphs`, of all without it."""
         if not below:
             return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
-        return {triple for name in self.graphs(*below) for triple in _read(self._store, name)}
+        return {triple for name in self.graphs(*below) for triple in triples_in(self._store, name)}
 
     def quads_in(self, name: str) -> Iterator[Quad]:
         """Yield the quads of one named graph, by its whole IRI, as the store gives them."""
@@ -349,7 +330,7 @@ class KnowledgeGraph:
         """Answer a SELECT, ASK, CONSTRUCT or DESCRIBE over the union of all named graphs.
 
         `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
-        PREFIX.        InputError where the text is no such query, asks another server, or has too many answers.
+        PREFIX. InputError where the text is no such query, asks another server, or has too many answers.
         """
         text = bound(text, {name: self._term(one) for name, one in (bindings or {}).items()})
         answers = self.answers
@@ -391,8 +372,8 @@ class KnowledgeGraph:
                 text,
                 base_iri=base,
                 prefixes=self.prefixes,
-                default_graph=None if whole else [_graph_name(iri) for iri in default_graphs],
-                named_graphs=None if whole else [_graph_name(iri) for iri in named_graphs],
+                default_graph=None if whole else [graph_name(iri) for iri in default_graphs],
+                named_graphs=None if whole else [graph_name(iri) for iri in named_graphs],
                 custom_functions=self._functions({} if faults is None else faults),
             )
         except SyntaxError as error:
@@ -462,7 +443,7 @@ class KnowledgeGraph:
 
         Not of a server's graph.
         """
-        named, others = _by_name(nodes)
+        named, others = by_name(nodes)
         for some in named:
             rows = self._store.query(f"SELECT ?s ?p ?o ?g {{ VALUES ?s {{ {some} }} GRAPH ?g {{ ?s ?p ?o }} }}")
             yield from map(tuple, cast(Any, rows))
@@ -471,7 +452,7 @@ class KnowledgeGraph:
     @telling
     def leading_to(self, nodes: Iterable[NamedNode | BlankNode], apart: Iterable[str]) -> set[NamedNode | BlankNode]:
         """Return the subjects of which named graphs, but for some, say something with one of some nodes for object."""
-        named, others = _by_name(nodes)
+        named, others = by_name(nodes)
         without = ", ".join(f"<{name}>" for name in apart)
         form = "SELECT DISTINCT ?s {{ VALUES ?o {{ {} }} GRAPH ?g {{ ?s ?p ?o }} FILTER(?g NOT IN ({})) }}"
         linked = {
@@ -517,55 +498,3 @@ class KnowledgeGraph:
         if isinstance(self._store, SparqlServer) or self._workspace is None:
             return {}
         return series_functions(self._store, self._workspace, faults)
-
-
-@lru_cache(maxsize=1)  # a run puts them into two graphs
-def _read_modules(paths: tuple[Path, ...], content: bytes) -> tuple[Quad, ...]:
-    """Return what modules of the ontology say, which are read anew where their content is another."""
-    return tuple(in_graph(chain.from_iterable(map(read_turtle, paths)), GRAPH_ONTOLOGY))
-
-
-def in_graph(triples: Iterable[Triple], name: str | None = None) -> Iterator[Quad]:
-    """Say of each triple that it belongs into the named graph, or into the default graph."""
-    if name is None:  # to name the default graph takes as long as all the rest
-        return (Quad(*triple) for triple in triples)
-    graph = NamedNode(name)
-    return (Quad(*triple, graph) for triple in triples)  # type: ignore[call-arg]
-
-
-def _by_name(nodes: Iterable[NamedNode | BlankNode]) -> tuple[list[str], list[BlankNode]]:
-    """Return the IRIs among nodes, some thousand at a time, and the others, which no query can name."""
-    terms = list(nodes)
-    named = [str(node) for node in terms if isinstance(node, NamedNode)]
-    batches = [" ".join(named[at : at + _NAMED_AT_ONCE]) for at in range(0, len(named), _NAMED_AT_ONCE)]
-    return batches, [node for node in terms if isinstance(node, BlankNode)]
-
-
-def _belonging(quads: Iterable[Quad], below: tuple[str, ...]) -> Iterator[Quad]:
-    for quad in quads:
-        if not (isinstance(quad.graph_name, NamedNode) and _is_below(quad.graph_name.value, below)):
-            raise ValueError(f"a quad of graph {quad.graph_name} does not belong into {', '.join(below)}")
-        yield quad
-
-
-def _is_of_many(name: str) -> bool:
-    return not name or name.endswith("/")
-
-
-def _is_below(name: str, below: tuple[str, ...]) -> bool:
-    return any(name.startswith(one) if _is_of_many(one) else name == one for one in below)
-
-
-def _names(store: Store | SparqlServer) -> list[str]:
-    return [graph.value for graph in store.named_graphs() if isinstance(graph, NamedNode)]
-
-
-def _read(store: Store | SparqlServer, name: str) -> set[Triple]:
-    return {quad.triple for quad in store.quads_for_pattern(None, None, None, NamedNode(name))}
-
-
-def _graph_name(iri: str) -> NamedNode:
-    try:
-        return NamedNode(iri)
-    except ValueError as error:
-        raise InputError(f"{iri!r} is not the name of a graph: {error}") from error
