@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import tomllib
+from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -14,6 +15,8 @@ COVERED_BY = tomllib.loads((TESTS / "COVERED_BY.toml").read_text(encoding="utf-8
 
 
 def has_code(file: Path) -> bool:
+    if file.name != "__init__.py":
+        return True
     return any(not isinstance(part, ast.Expr) for part in ast.parse(file.read_text(encoding="utf-8")).body)
 
 
@@ -36,13 +39,21 @@ def own_test(name: str) -> Path:
     return TESTS.joinpath(*rooms[:1], f"test_{last}.py")
 
 
+def statements(block: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield the statements of a block, those within others too."""
+    for part in block:
+        yield part
+        for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from statements(getattr(part, name, []))
+
+
 @cache
 def imported(file: Path) -> frozenset[str]:
     """Return the modules of irtwin that a file imports anywhere, those of helpers too, and what a command runs."""
     text = file.read_text(encoding="utf-8")
     found = {"cli.__init__", "__main__"} if '"-m", "irtwin"' in text else set()
     found |= {"fleet.__main__"} if '"-m", "irtwin.fleet"' in text else set()
-    for part in ast.walk(ast.parse(text)):
+    for part in statements(ast.parse(text).body):
         names = []
         if isinstance(part, ast.ImportFrom) and part.module:
             names = [part.module, *(f"{part.module}.{one.name}" for one in part.names)]

@@ -76,7 +76,7 @@ def _cases(names: list[str]) -> list[object]:
     return [pytest.param(name, marks=[marks[name]] if name in marks else [], id=name) for name in names]
 
 
-@pytest.mark.parametrize("name", _cases(sorted(FILES)))
+@pytest.mark.parametrize("name", _cases(sorted(FILES.keys() - {"10000 columns.parquet"})))  # which is read below
 def test_each_is_refused_in_a_line_or_read(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     FILES[name](path)

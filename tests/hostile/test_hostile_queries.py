@@ -107,8 +107,13 @@ def test_deep(small: Server, name: str) -> None:
     assert refused(small, DEEP[name], 400) == "the query is nested too deeply, or too long, to be read\n"
 
 
+BY_DAY = ("product", "sorted pairs", "long sequence", "text that doubles")  # time, memory, and texts that grow
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TOO_MUCH)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in BY_DAY else pytest.mark.nightly) for name in TOO_MUCH]
+)
 def test_too_much(small: Server, name: str) -> None:
     said = refused(small, TOO_MUCH[name], 503)
     assert said.startswith(
