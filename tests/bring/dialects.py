@@ -13,6 +13,7 @@ from irtwin import resources
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, from_columns
+from irtwin.signals.log import DataSet
 
 NAME = "kuka_kr6_r700"
 N = 400  # samples: 4.8 s of exciting motion; of 330 the checks tell less
@@ -66,3 +67,12 @@ def write_text(
     lines = [*head, delimiter.join(columns), *([delimiter.join(units)] if units else []), *rows]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
+
+
+def assert_same(data_set: DataSet, fields: str = "time q torque power", tolerance: float = 1e-12) -> None:
+    """Hold a data set's run to the demo's."""
+    found, true = data_set.runs[0].signals, signals(good())
+    for field in fields.split():
+        np.testing.assert_allclose(
+            getattr(found, field), getattr(true, field), rtol=tolerance, atol=tolerance, err_msg=field
+        )
