@@ -14,8 +14,9 @@ from starlette.types import Receive, Scope, Send
 from irtwin.serve import description, graph_store, negotiation, page
 from irtwin.serve.answer import Replies, Reply
 from irtwin.serve.asking import Asking
+from irtwin.serve.body import read_body
 from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
-from irtwin.serve.protocol import Operation, Refusal, read_body, read_get, read_parameters, read_post
+from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import parse_qs
-
-from starlette.requests import Request
 
 FORM = "application/x-www-form-urlencoded"
 QUERY = "application/sparql-query"
@@ -85,20 +82,6 @@ def read_parameters(encoded: str) -> dict[str, list[str]]:
         raise Refusal(400, "the parameters are not UTF-8") from None
     except ValueError:
         raise Refusal(400, f"more than {_MOST_PARAMETERS} parameters") from None
-
-
-async def read_body(request: Request, most: int, seconds: float) -> bytes:
-    """Read a request's body of at most so many bytes, within so many seconds. Raises Refusal."""
-    body = bytearray()
-    try:
-        async with asyncio.timeout(seconds):
-            async for piece in request.stream():
-                body += piece
-                if len(body) > most:
-                    raise Refusal(413, f"a request has at most {most:,} bytes")
-    except TimeoutError:
-        raise Refusal(408, "the request did not come in time") from None
-    return bytes(body)
 
 
 def _text(body: bytes) -> str:
