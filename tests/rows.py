@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
 from irtwin.storage.schema import Activity, Base, Joint, Robot, Run, RunEnergy, RunState, Twin, TwinRun
+
+if TYPE_CHECKING:
+    from irtwin.providers.provider import Made
+    from irtwin.storage.database import Workspace
 
 ROBOT = "KUKA_KR6_R700"
 NOON = datetime(2026, 3, 1, 12, tzinfo=UTC)
@@ -99,6 +103,20 @@ def activity(name: str, provider: str, subject: str = f"robot/{ROBOT}") -> Activ
         ended=NOON,
         software="irtwin 0.1.0",
     )
+
+
+def keep(workspace: Workspace, robot_id: str, provider: str, subject: str, made: Made) -> None:
+    """Keep what a provider made, as the planner does."""
+    by = Activity(
+        activity_id=f"{provider}.{subject}",
+        robot_id=robot_id,
+        provider=provider,
+        subject=subject,
+        started=NOON,
+        ended=NOON,
+        software="x",
+    )
+    workspace.replace_activity(by, made.used, made.rows, made.series, made.documents)
 
 
 def twin(twin_id: str) -> list[Base]:

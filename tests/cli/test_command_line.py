@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from tests import sparql_servers
 from tests.data_sets import irtwin
+from tests.forks import Command
 from tests.small_robots import data_set, waiting_data_set
 
 from irtwin.cli.command_line import cli
@@ -19,14 +20,7 @@ from irtwin.workflow import unpack_demo
 
 pytestmark = pytest.mark.slow
 
-PHYSICS = ("scipy", "pinocchio", "coal", "duckdb", "pyarrow")
 HEAVY = ("numpy", "pinocchio", "rdflib", "pyoxigraph", "sqlalchemy", "owlready2", "pyarrow")
-
-
-def process(*arguments: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Call the command line where only a process of its own will do: what it imports, and where it stands."""
-    command = [sys.executable, "-m", "irtwin", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +43,7 @@ def workspace(small_data_set: Path, tmp_path_factory: pytest.TempPathFactory) ->
 def test_help_imports_nothing_heavy():
     code = f"import sys, irtwin.cli; print([m for m in sys.modules if m in {HEAVY!r}])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
-    text = process("--help").stdout
+    text = irtwin("--help").out
     for command in cli.commands:
         assert f"  {command} " in text
 
@@ -71,16 +65,6 @@ def test_questions_are_answered_in_three_forms(workspace):
     assert "robots" in table.out
     assert "1 row" in table.out
     assert "energy_per_joint" in irtwin("query").out
-
-
-def test_a_question_imports_no_physics(workspace):
-    """Nor what reads samples: so that it is answered in a fraction of a second."""
-    argv = ["irtwin", "query", "energy_per_joint", "--workspace", str(workspace)]
-    ask = f"import sys; sys.argv = {argv!r}\nfrom irtwin.cli import main\nmain()\n"
-    code = f"{ask}print([m for m in {PHYSICS!r} if m in sys.modules])"
-    said = subprocess.check_output([sys.executable, "-c", code], text=True).splitlines()
-    assert "joint_1" in "".join(said)
-    assert said[-1] == "[]"
 
 
 def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
@@ -237,8 +221,9 @@ def test_the_map_command_ends_what_has_no_end(tmp_path):
         "WITH RECURSIVE t(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM t) SELECT n FROM t WHERE n < 0" ] ."""
     )
     known = ["--database", "sqlite:///x.db", "--out", "x.nq", "--timeout", "0.5"]
-    done = process("workspace", "map", "x.ttl", *known, folder=tmp_path)
-    assert (done.returncode, "its SQL has not ended after 0.5 s" in done.stderr) == (2, True), done.stderr
+    done = Command("workspace", "map", "x.ttl", *known, folder=tmp_path)
+    _, said = done.communicate()
+    assert (done.returncode, "its SQL has not ended after 0.5 s" in said) == (2, True), said
     assert not (tmp_path / "x.nq").exists()
 
 

@@ -2,11 +2,10 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import Quad, RdfFormat, parse
+from tests.knowledge.graphs import graph_of, reasoned_over
 
-from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 DATA = Path(__file__).parent / "data"
 
@@ -19,18 +18,18 @@ def two_robots() -> list[Quad]:
 @pytest.fixture
 def graph(two_robots: list[Quad]) -> KnowledgeGraph:
     """The ontology and two robots, nothing inferred yet."""
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
-    return graph
+    return graph_of(two_robots)
+
+
+@pytest.fixture(scope="session")
+def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
+    """The ontology, two robots and what is inferred of them, which no test changes."""
+    return reasoned_over(two_robots)
 
 
 @pytest.fixture(scope="session")
 def concluded(two_robots: list[Quad]) -> KnowledgeGraph:
     """The ontology, two robots and all that is concluded of them, which no test changes."""
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
-    reason(graph)
+    graph = reasoned_over(two_robots)
     validate(graph)
     return graph

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pyoxigraph import BlankNode, Quad
+from pyoxigraph import BlankNode
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain import explain as explaining
@@ -15,18 +15,8 @@ from irtwin.knowledge.explain.explanation import Explanation, to_json
 from irtwin.knowledge.owl_rl.closure import show
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
-    reason(graph)
-    return graph
 
 
 def only(graph: KnowledgeGraph, pattern: str) -> Explanation:

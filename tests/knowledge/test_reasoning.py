@@ -82,15 +82,6 @@ def short(triples: set[Triple]) -> set[tuple[str, ...]]:
     }
 
 
-@pytest.fixture(scope="module")
-def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(two_robots, GRAPH_SOURCE, "https://w3id.org/irtwin/graph/activity/")
-    reason(graph)
-    return graph
-
-
 def test_rules_conclude_what_is_known_of_two_robots(reasoned: KnowledgeGraph) -> None:
     links = short({one for one in reasoned.triples(GRAPH_SHACL) if not isinstance(one.object, Literal)})
     assert links == CONCLUSIONS | DOMINANT | ALARMS | ACTIONS

@@ -1,6 +1,7 @@
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
+from tests.knowledge.graphs import reasoned_over
 
 from irtwin.knowledge import parts
 from irtwin.knowledge.reasoning import reason
@@ -138,7 +139,7 @@ def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad]) -> Non
     wrong += [typed(MAGIC + "2", "Effect"), typed(LUCK, "Effect_Family"), typed(FOUND, "Gap_Finding")]
     for name, value in (("located_in_Channel", SMELL), ("has_Family", LUCK)):
         wrong.append(Quad(NamedNode(FOUND), NamedNode(term(name)), NamedNode(value), wrong[-1].graph_name))
-    graph = reasoned(wrong)
+    graph = reasoned_over(wrong)
     for name, kind in ((RUN, "IR_RunProcess"), (JOINT, "Robot_Joint"), (MAGIC, "Effect"), (SMELL, "Channel")):
         assert graph.holds(typed(name, kind).triple)
     assert WRONG_LINES - set(map(str, validate(graph))) == set()
@@ -174,16 +175,8 @@ def test_report_is_replaced_not_gathered(two_robots: list[Quad], graph: Knowledg
     assert len(graph.triples(GRAPH_VALIDATION)) == 2
 
 
-def reasoned(two_robots: list[Quad]) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
-    reason(graph)
-    return graph
-
-
 def violations_anew(quads: list[Quad]) -> tuple[str, ...]:
-    return tuple(map(str, validate(reasoned(quads))))
+    return tuple(map(str, validate(reasoned_over(quads))))
 
 
 @pytest.fixture
@@ -204,7 +197,7 @@ def checked(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
 def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], checked: list[set[str]]) -> None:
     of_b = individual("run", "Arm_B.work_1")
     broken = changed(two_robots, of_b, "Run_Time", Literal(0.0))
-    graph = reasoned(broken)
+    graph = reasoned_over(broken)
     assert tuple(map(str, validate(graph))) == violations_anew(broken)
     worse = changed(broken, RUN, "Run_Time", None)
     for now in (worse, broken, two_robots):
@@ -229,7 +222,7 @@ def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], ch
 def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl(
     two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    graph = reasoned(two_robots)
+    graph = reasoned_over(two_robots)
     assert validate(graph) == ()
     monkeypatch.setattr(validation.pyshacl, "validate", None)
     longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
@@ -239,7 +232,7 @@ def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl(
 
 
 def test_what_was_not_reasoned_over_is_checked_whole(two_robots: list[Quad], checked: list[set[str]]) -> None:
-    graph = reasoned(two_robots)
+    graph = reasoned_over(two_robots)
     validate(graph)
     wrong = changed(two_robots, RUN, "Run_Time", None)
     graph.change(set(two_robots) - set(wrong), set(wrong) - set(two_robots))
@@ -249,7 +242,7 @@ def test_what_was_not_reasoned_over_is_checked_whole(two_robots: list[Quad], che
 
 
 def test_nothing_is_checked_where_nothing_changed(two_robots: list[Quad], checked: list[set[str]]) -> None:
-    graph = reasoned(changed(two_robots, RUN, "Run_Time", None))
+    graph = reasoned_over(changed(two_robots, RUN, "Run_Time", None))
     first = validate(graph)
     checked.clear()
     assert validate(graph) == first
@@ -259,7 +252,7 @@ def test_nothing_is_checked_where_nothing_changed(two_robots: list[Quad], checke
 def test_a_part_that_was_just_reasoned_over_is_not_read_again(
     two_robots: list[Quad], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    graph = reasoned(two_robots)
+    graph = reasoned_over(two_robots)
     assert validate(graph) == ()
     longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
     graph.change(set(two_robots) - set(longer), set(longer) - set(two_robots))
@@ -274,7 +267,7 @@ def test_a_part_that_was_just_reasoned_over_is_not_read_again(
 
 
 def test_violations_go_with_their_robot(two_robots: list[Quad], checked: list[set[str]]) -> None:
-    graph = reasoned(changed(two_robots, RUN, "Run_Time", None))
+    graph = reasoned_over(changed(two_robots, RUN, "Run_Time", None))
     assert len(validate(graph)) == 1
     gone = {one for one in graph.quads() if "Arm_A" in str(one.triple) and "/inferred/" not in str(one.graph_name)}
     graph.change({one for one in gone if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))}, ())

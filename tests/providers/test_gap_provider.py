@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy import select
+from tests.rows import keep
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.document.curves import Curves
@@ -107,24 +107,10 @@ def workspace(tmp_path: Path):
     runs = tuple(as_run(measure(robot, swing(robot, seed, seconds=6.0), noise=0.05)) for seed in (1, 2, 3))
     with Workspace(tmp_path / "workspace") as opened:
         ingest(opened, DataSet(Path(), robot, runs, BARE, None, "mains", True, {}))
-        keep(opened, "identification", robot_iri(ROBOT), identification.provide(opened, ROBOT))
-        keep(opened, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(opened, f"{ROBOT}.swing_1"))
+        keep(opened, ROBOT, "identification", robot_iri(ROBOT), identification.provide(opened, ROBOT))
+        keep(opened, ROBOT, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(opened, f"{ROBOT}.swing_1"))
         opened.better = to_json(identify(robot, [condition(run, robot, 10.0) for run in runs[:2]], FULL))
         yield opened
-
-
-def keep(workspace: Workspace, provider: str, subject: str, made: Any) -> None:
-    now = datetime.now(UTC)
-    activity = schema.Activity(
-        activity_id=f"{provider}.1",
-        robot_id=ROBOT,
-        provider=provider,
-        subject=subject,
-        started=now,
-        ended=now,
-        software="x",
-    )
-    workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
 
 
 def count(workspace: Workspace, table: Any) -> int:
@@ -188,7 +174,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
         assert f"gap_diagnosis/{found.diagnosis_id}" in set(used)
     assert count(workspace, schema.RunEnergy) == 0
     assert count(workspace, gap_schema.GapDiagnosis) == 1
-    keep(workspace, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
+    keep(workspace, ROBOT, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
     assert count(workspace, schema.RunEnergy) == 1
     assert adopt(workspace, ROBOT) == twin_id
 

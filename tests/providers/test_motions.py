@@ -5,13 +5,13 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from sqlalchemy import select
+from tests.rows import keep
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.document.curves import Curves
@@ -67,20 +67,6 @@ def data_set(*more: Run) -> DataSet:
     return DataSet(Path(), ROBOT, (*RUNS, *more), EFFECTS, None, "mains", True, {})
 
 
-def keep(workspace: Workspace, provider: str, subject: str, made: Any) -> None:
-    now = datetime.now(UTC)
-    activity = schema.Activity(
-        activity_id=f"{provider}.{subject}",
-        robot_id=NAME,
-        provider=provider,
-        subject=subject,
-        started=now,
-        ended=now,
-        software="x",
-    )
-    workspace.replace_activity(activity, made.used, made.rows, made.series, made.documents)
-
-
 @pytest.mark.slow
 def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
@@ -94,10 +80,10 @@ def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     monkeypatch.setattr(conditioning, "Motion", noting)
     ids = [f"{NAME}.{run.name}" for run in RUNS]
     for run_id in ids:
-        keep(workspace, "run_state", run_iri(run_id), run_state.provide(workspace, run_id))
-    keep(workspace, "identification", robot_iri(NAME), identification.provide(workspace, NAME))
+        keep(workspace, NAME, "run_state", run_iri(run_id), run_state.provide(workspace, run_id))
+    keep(workspace, NAME, "identification", robot_iri(NAME), identification.provide(workspace, NAME))
     for run_id in ids:
-        keep(workspace, "energy", run_iri(run_id), energy.provide(workspace, run_id))
+        keep(workspace, NAME, "energy", run_iri(run_id), energy.provide(workspace, run_id))
     better = to_json(identify(ROBOT, robot_motions(workspace, NAME).own, EFFECTS))
     record(workspace, NAME, DIAGNOSIS, Curves(follows=(), runs=(), experiment=None), better)
     adopt(workspace, NAME)
