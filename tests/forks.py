@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 from subprocess import TimeoutExpired
+from typing import TextIO, cast
 
 from irtwin.cli import main
 from tests import killed_writers
@@ -33,12 +34,12 @@ class Command:
     ):
         (reads, writes), (out, prints), (err, warns) = (FORKS.Pipe(duplex=False) for _ in range(3))
         self.stdin, self.stdout, self.stderr = _opened(writes, "w"), _opened(out, "r"), _opened(err, "r")
-        place = (folder or Path.cwd(), {**os.environ, **more}, prepare)
-        told = ([str(argument) for argument in arguments], (reads, prints, warns), *place)
-        self.killed = False  # by `kill`
-        self._process = FORKS.Process(target=_begin, args=told)
+        ends, argv = (reads, prints, warns), ["irtwin", *map(str, arguments)]
+        environment = {**os.environ, **more}
+        self._process = FORKS.Process(target=_begin, args=(argv, ends, folder or Path.cwd(), environment, prepare))
         self._process.start()
-        for end in (reads, prints, warns):
+        self.killed = False  # by `kill`
+        for end in ends:
             end.close()
 
     @property
@@ -85,14 +86,14 @@ class Command:
         return said
 
 
-def _opened(end: Connection, mode: str):  # type: ignore[no-untyped-def]
+def _opened(end: Connection, mode: str) -> TextIO:
     file = os.fdopen(os.dup(end.fileno()), mode, encoding="utf-8")
     end.close()
-    return file
+    return cast(TextIO, file)
 
 
 def _begin(
-    arguments: list[str],
+    argv: list[str],
     ends: tuple[Connection, ...],
     folder: Path,
     environment: dict[str, str],
@@ -106,7 +107,7 @@ def _begin(
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    sys.argv = ["irtwin", *arguments]
+    sys.argv = argv
     if prepare:
         prepare()
     main()
