@@ -1,4 +1,4 @@
-"""A hook of MkDocs: notebooks, run when the guide is built, are pages with their results; CONTRIBUTING.md is one."""
+"""A hook of MkDocs: notebooks, run when the guide is built, are pages with their results; so is CONTRIBUTING.md."""
 
 import ast
 import contextlib
@@ -22,6 +22,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         for notebook in sorted(notebooks.glob("*.ipynb")):
             text = "\n\n".join(parts(notebook))
             files.append(File.generated(config, f"notebooks/{notebook.stem}.md", content=text))
+        for page in Path().rglob("*.html"):
+            files.append(File.generated(config, f"made/{page.name}", content=page.read_bytes()))
     sys.path.remove(str(notebooks))
     contributing = Path(config.docs_dir, "..", "CONTRIBUTING.md").read_text(encoding="utf-8").replace("](docs/", "](")
     files.append(File.generated(config, "CONTRIBUTING.md", content=contributing))
@@ -42,7 +44,7 @@ def parts(notebook: Path) -> Iterator[str]:
 
 
 def shown(source: str, names: dict[str, Any], place: str) -> str:
-    """Run a cell, and return what it prints and the value of its last line, as Jupyter shows them."""
+    """Run a cell, and return what it prints and the value of its last line, as Jupyter shows them; a page is framed."""
     tree, value, printed = ast.parse(source), None, io.StringIO()
     last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
     with contextlib.redirect_stdout(printed):
@@ -51,5 +53,8 @@ def shown(source: str, names: dict[str, Any], place: str) -> str:
             value = eval(compile(ast.Expression(last.value), place, "eval"), names)
     if hasattr(value, "_repr_html_"):
         return str(value._repr_html_())
+    if isinstance(value, Path) and value.suffix == ".html":
+        place = f"../made/{value.name}"
+        return f'<iframe src="{place}" title="{value.name}" loading="lazy"></iframe>\n[The page by itself]({place})'
     text = printed.getvalue() + ("" if value is None else repr(value))
     return f"```text\n{text.rstrip()}\n```" if text else ""

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from irtwin.errors import InputError
+from irtwin.identification.progress import telling
 from irtwin.knowledge.asserted.statements import map_facts
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.extensions import check_mappings
@@ -111,7 +112,8 @@ def populate_others(place: Workspace, graph: KnowledgeGraph, announce: Announce)
     def set_aside(robot_id: str, reason: InputError) -> None:
         announce(f"  {robot_id} is set aside: {reason}; remove it with `irtwin workspace drop {robot_id}`")
 
-    did = populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
+    with telling(announce):
+        did = populate(place, graph, lambda: map_rows(place, graph), announce, set_aside)
     if circle := in_a_circle(graph):
         announce(f"  {circle}")
     return did

@@ -11,6 +11,7 @@ from irtwin import resources
 from irtwin.asking import open_graph
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
+from irtwin.identification.progress import telling
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import Explainer
 from irtwin.knowledge.store.backup import backup as keep
@@ -199,7 +200,8 @@ def populate_apart(apart: Workspace, announce: Announce) -> None:
         graph.load_ontology()
         check_effects(graph)
         map_rows(apart, graph)
-        populate(apart, graph, lambda: map_rows(apart, graph), announce)
+        with telling(announce):
+            populate(apart, graph, lambda: map_rows(apart, graph), announce)
 
 
 def write_report(place: Workspace, robot_id: str) -> Path:

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -45,6 +46,27 @@ def test_its_notebooks_show_what_is_true_of_their_robot(guide: Path) -> None:
     saved = re.search(r"(\d+)[\d.]* \+- [\d.]+ J less", shown["5_cheaper_motion"])
     assert saved is not None and int(saved[1]) > 100
     assert all((guide / "notebooks" / f"{name}.ipynb").is_file() for name in shown)
+
+
+def test_it_shows_pages_and_curves_that_were_made_when_it_was_built(guide: Path) -> None:
+    framed = {}
+    for page in guide.rglob("*.html"):
+        for source in re.findall(r'<iframe src="([^"]+)"', page.read_text(encoding="utf-8")):
+            framed[page.stem] = (page.parent / source).resolve()
+    assert {"first-log", "simulator", "2_simulator", "3_energy"} <= set(framed)
+    assert all("<h1>Crane</h1>" in page.read_text(encoding="utf-8") for page in framed.values())
+    for name in ("1_first_log", "5_cheaper_motion"):
+        assert "<polyline" in (guide / "notebooks" / f"{name}.html").read_text(encoding="utf-8")
+
+
+def test_it_is_searched_from_a_folder_without_a_network(guide: Path, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((guide / "tutorials" / "energy.html").as_uri())
+    page.fill(".md-search__input", "backlash")
+    page.wait_for_selector(".md-search-result__item")
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
 def text_of(page: Path) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 
 from irtwin.errors import InputError
+from irtwin.identification.progress import track
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import shorten
@@ -60,7 +61,7 @@ def populate(
         before = len(done)
         for name, subjects in ({of: todo[of] for of in todo if of not in renewed} or todo).items():
             announce(f"  {name}: {len(subjects)} individual{'s' if len(subjects) > 1 else ''}")
-            for subject in subjects:
+            for subject in track(subjects, name):
                 robot_id = _robot_id(graph, subject)
                 if robot_id in refused:
                     continue
