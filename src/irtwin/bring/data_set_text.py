@@ -66,11 +66,11 @@ def data_set_text(
         lines += [line if line.startswith("#") else f"# {line}" for line in _sheet_lines({})]
     lines += [
         "",
-        "# [twin]",
+        "[twin]",
         _line("effects", list(BASELINE), "what the twin models; without it, these and what the runs show", False),
         _line("cutoff", 10.0, "Hz, of the low-pass filter that all runs pass; without it, found", False),
         "",
-        "# [topics]  # for runs that are ROS bags in which several topics would do",
+        "[topics]  # for runs that are ROS bags in which several topics would do",
         _line("joint_states", "/joint_states", "the topic of the joint states", False),
     ]
     for run in runs:
