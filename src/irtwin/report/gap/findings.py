@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from irtwin.document.document import LIKELY, OddStretch, odd
+from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
@@ -174,15 +175,19 @@ def _closes(one: ToldFinding, count: int) -> str:
 
 
 def other_numbers(differing: Sequence[OtherNumber]) -> str:
-    """Say which numbers of the simulator's model the robot has otherwise, the farthest first; may be empty."""
+    """Say which numbers of the simulator's model the robot has otherwise, the farthest first; may be empty.
+
+    What a model's file has another word for has this word, with the symbol that tables have.
+    """
+    words = {name: f"{word} ({name})" for effect in catalogue().values() for name, word in effect.in_mjcf.items()}
 
     def apart(one: OtherNumber) -> float:
         _, _, model, robot, _ = one
         return abs(math.log(robot / model)) if robot / (model or math.inf) > 0 else math.inf
 
     told = [
-        f"{name}{f' of {joint}' if joint else ''} {wording.quantity(robot, '' if unit == '1' else unit).rstrip()}"
-        f" in place of {wording.number(model)}"
+        f"{words.get(name, name)}{f' of {joint}' if joint else ''} "
+        f"{wording.quantity(robot, '' if unit == '1' else unit).rstrip()} in place of {wording.number(model)}"
         for name, joint, model, robot, unit in sorted(differing, key=apart, reverse=True)[:_NAMED]
     ]
     rest = len(differing) - len(told)
