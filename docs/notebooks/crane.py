@@ -15,11 +15,13 @@ import pyarrow.csv
 RATE = 200  # samples a second
 EFFECTS = ["rigid_body", "coulomb_friction", "viscous_friction", "mechanical_power", "standby_power"]
 URDF = """<robot name="Crane">
-  <link name="base"/>
+  <link name="base"><visual><geometry><cylinder radius="0.4" length="0.1"/></geometry></visual></link>
   <link name="table"><inertial><mass value="20"/>
-    <inertia ixx="2" iyy="2" izz="4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <inertia ixx="2" iyy="2" izz="4" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><origin xyz="-0.2 0 0.9"/><geometry><box size="0.1 0.2 1.7"/></geometry></visual></link>
   <link name="carriage"><inertial><mass value="12"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><origin xyz="0.2 0 0.1"/><geometry><box size="0.8 0.1 0.1"/></geometry></visual></link>
   <joint name="turn" type="revolute"><parent link="base"/><child link="table"/><axis xyz="0 0 1"/>
     <limit lower="-3.1" upper="3.1" velocity="4" effort="150"/></joint>
   <joint name="lift" type="prismatic"><parent link="table"/><child link="carriage"/><axis xyz="0 0 1"/>
