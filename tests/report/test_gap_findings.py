@@ -93,7 +93,7 @@ def test_a_confidence_that_all_share_is_said_once() -> None:
 def test_guesses_beside_a_likely_cause_are_counted() -> None:
     three = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.3), ("backlash", 0.1)), (("lag", 0.04),)))
     assert said("attributed", three) == (
-        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %), beside 2 guesses."
+        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %), and 2 less likely."
     )
 
 
@@ -137,7 +137,7 @@ def test_at_most_three_are_named_and_the_rest_is_counted() -> None:
     told = said("ambiguous", *many, finding(**LITTLE), finding(channel="power", **LITTLE))
     assert "joint_3" in told and "joint_4" not in told
     assert told.endswith(
-        "Not named here: 3 findings together close 20 % of the gap in torque and 1 finding closes less than 0.1 % "
+        "Beyond this, 3 findings together close 20 % of the gap in torque and 1 finding closes less than 0.1 % "
         "of the gap in power."
     )
 
@@ -158,7 +158,7 @@ def test_an_unexplained_gap_says_what_part_is_closed() -> None:
     assert told.startswith(
         "There is a gap in the power, and no effect in the catalogue closes it. Part of it is closed:"
     )
-    assert told.endswith("Not named here: 1 finding closes nothing of the gap in torque.")
+    assert told.endswith("Beyond this, 1 finding closes nothing of the gap in torque.")
     assert said("unexplained") == "There is a gap, and no effect in the catalogue closes it."
 
 

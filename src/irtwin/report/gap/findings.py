@@ -62,13 +62,13 @@ class ToldFinding:
 
     @property
     def effects(self) -> str:
-        """The causes, each with its alternatives; beside likely ones, guesses are counted.
+        """The causes, each with its alternatives; of those beside likely ones the number.
 
         Confidences stand beside them, unless all are as sure as the finding.
         """
         told = [some for some in self.members if _together(some) >= LIKELY] or self.members
         guesses = len(self.members) - len(told)
-        beside = f", beside {guesses} {'guess' if guesses == 1 else 'guesses'}" if guesses else ""
+        beside = f", and {guesses} less likely" if guesses else ""
         as_sure = all(wording.share(chance) == wording.share(self.confidence) for some in told for _, chance in some)
         names = [" or ".join(name if as_sure else _with(name, chance) for name, chance in some) for some in told]
         return wording.listed(names) + beside
@@ -123,7 +123,7 @@ def sentence(
     """
     if verdict == "no_gap":
         if misses is not None:
-            beside = f" Not named: {counted(findings)}." if findings else ""
+            beside = f" Beyond this, {counted(findings)}." if findings else ""
             return f"There is no gap: the simulator agrees with the robot, to {misses}.{beside}"
         if not findings and not has_floor:
             return (
@@ -136,7 +136,7 @@ def sentence(
     told = _told(findings)
     rest = [one for one in findings if one not in told]
     words, guessed = "; ".join(one.sentence for one in told), not any(one.likely for one in told)
-    beside = f" Not named here: {counted(rest)}." if rest else ""
+    beside = f" Beyond this, {counted(rest)}." if rest else ""
     if verdict == "unexplained" and because != "unsure":
         part = "" if not told else f" Part of it is {words}." if guessed else f" Part of it is closed: {words}."
         return f"{_left(because, where, differ)}{part}{beside}"
