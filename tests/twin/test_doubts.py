@@ -48,7 +48,7 @@ def test_a_contact_is_said_with_its_run_time_and_joint_and_moves_no_number():
 
 
 def test_what_no_consistent_bodies_give_is_said():
-    twin = fitted(effects=["rigid_body", "mechanical_power"])
+    twin = fitted(effects=["rigid_body"])
     assert f"up to {100 * twin.body_change:.2g} % of a joint's (RMS)" in doubts(twin)[0]
     assert doubts(replace(twin, body_change=None)) == ()
 
@@ -65,11 +65,6 @@ def test_a_data_sheet_that_the_runs_deny_is_said(ohm, denied):
     assert [line.startswith(f"joint_1: the data sheet says R is {ohm:.3g} ohm, the runs 0.") for line in said] == [
         True
     ] * denied
-
-
-def test_a_twin_without_an_effect_of_power_is_said():
-    (said,) = doubts(fitted(effects=("rigid_body", "coulomb_friction", "viscous_friction")))
-    assert "no effect of the twin is of power" in said and "[twin]" in said
 
 
 def test_a_robot_without_inertias_is_said():

@@ -15,7 +15,6 @@ def doubts(twin: Twin) -> tuple[str, ...]:
     """Return what is to be said of a twin."""
     return (
         *_of_stretches(twin),
-        *_of_power(twin),
         *_of_motion(twin),
         *_of_description(twin),
         *_of_bodies(twin),
@@ -38,15 +37,6 @@ def _of_bodies(twin: Twin) -> Iterator[str]:
         yield (
             "no physically consistent bodies give the measured torque: theirs differs from the best fit's by up to "
             f"{100 * twin.body_change:.2g} % of a joint's (RMS); an effect may be lacking, or a joint of the URDF wrong"
-        )
-
-
-def _of_power(twin: Twin) -> Iterator[str]:
-    """Yield that a twin without an effect of power takes none."""
-    if not any(effect.channel == "power" for effect in twin.stack.effects):
-        yield (
-            "no effect of the twin is of power, so it says 0 W and 0 J of each motion; add one to effects of [twin] in "
-            "dataset.toml, or leave effects out, which takes those that the runs show"
         )
 
 
