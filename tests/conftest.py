@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
-from sqlalchemy import create_engine, text
+from sqlalchemy import NullPool, create_engine, text
 
 _CHROMIUM = (
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -169,7 +169,8 @@ def new_postgresql_database() -> Iterator[Callable[[], str]]:
     call("initdb", "-D", data, "-A", "trust", "-U", "postgres", "-E", "UTF8", "--no-sync")
     call("pg_ctl", "-D", data, "-l", log, "-w", "-o", f"-k {folder} -c listen_addresses='' -c fsync=off", "start")
     numbers = itertools.count()
-    server = create_engine(f"postgresql+psycopg://postgres@/postgres?host={folder}", isolation_level="AUTOCOMMIT")
+    url = f"postgresql+psycopg://postgres@/postgres?host={folder}"
+    server = create_engine(url, isolation_level="AUTOCOMMIT", poolclass=NullPool)  # tests end connections
 
     def make() -> str:
         name = f"test_{next(numbers)}"

@@ -80,7 +80,7 @@ def estimate(
         values, _ = _solve(factors, noise, expected, spread, lowest, prior)
         left, before = _left(given, pattern, values), (weights, noise)
         noise = np.maximum(np.sqrt((weights * left).sum(axis=0) / count), least)
-        weights = robust_weights(left, rows, noise)
+        weights = robust_weights(left, rows, noise, size)
         blocks = [block.weighted(own) for block, own in zip(given, weights, strict=True)]
         factors = _of_all(blocks, pattern)
         if np.allclose(weights, before[0], atol=SETTLED) and np.allclose(noise, before[1], SETTLED, 0.0):

@@ -172,12 +172,15 @@ def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequ
 def _weighted(factors: Sequence[np.ndarray], rows: np.ndarray, own: int) -> list[np.ndarray]:
     """Return blocks' factors, weighted by how little the first `own` columns and sharp friction leave of each."""
     known = [factor[:, [*range(own + 1), -1]] for factor in factors]
-    weights = np.ones(len(rows))
+    weights, size = np.ones(len(rows)), np.linalg.norm([np.linalg.norm(one[:, -1]) for one in known])
     for _ in range(_REWEIGHTINGS):
         counting = [np.sqrt(weight) * factor for weight, factor in zip(weights, known, strict=True)]
         left = _left(triangle(np.concatenate(counting)), known, own)[0][0]
         noise = np.sqrt((weights * left).sum() / rows.sum())
-        before, weights = weights, robust_weights(left, rows, max(noise, np.finfo(float).tiny))
+        before, weights = (
+            weights,
+            robust_weights(left, rows, max(noise, np.finfo(float).tiny), size / np.sqrt(rows.sum())),
+        )
         if np.allclose(weights, before, atol=SETTLED):
             break
     return [np.sqrt(weight) * factor for weight, factor in zip(weights, factors, strict=True)]

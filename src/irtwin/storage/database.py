@@ -392,7 +392,7 @@ class Workspace:
             if self.engine.dialect.name == "sqlite":
                 _check_that_nothing_is_lost(self.folder, "its database holds no tables")
             with self._writing() as session:
-                Base.metadata.create_all(session.connection(), tables, checkfirst=False)
+                Base.metadata.create_all(session.connection())
                 stamp(session.connection())
         migrate(self.engine)
         there = engine.columns(self.engine)
