@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block, triangle
 from irtwin.identification.estimators import estimate

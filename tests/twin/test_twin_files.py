@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, measure, swing
 
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
 from irtwin.errors import InputError

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from irtwin.document import form
 from irtwin.document.experiment import Experiment
 from irtwin.document.form import Between, OneOf
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.document.told import Names, part, tells, told
 from irtwin.document.words import ONTOLOGY, Channel, Effect, Joint, Measured, Regime, Run
 from irtwin.errors import InputError
@@ -33,7 +34,6 @@ CauseId = Annotated[str, Names("gap_cause/{diagnosis_id}/{}", "cause_id")]
 
 LIKELY = 0.5  # confidence from which a cause or a finding is likely, more so than not; below it is a guess
 FALSE_PLACES = 0.05  # rate of false discoveries up to which a place is sure, as intervals are 95 % ones
-_NAMED = 3  # odd stretches, in words
 LEAST_SHARE = 0.02  # of its channel's excess that a place has, to be worth a line
 
 
@@ -253,34 +253,6 @@ class NotRepeating:
     share: Share = told("Disturbance_Share")
     quantities: tuple[DisturbanceQuantity, ...] = told()
     explained_by: CauseId | None = told("explained_by_Cause")
-
-
-@part("Odd_Stretch", table="gap_odd_stretch", of="odd_stretch_of", ranked=True)
-class OddStretch:
-    """A stretch of a run, s, of which the twin leaves far more of some joints' torque than of the rest of the runs."""
-
-    run: Run = told("odd_in_Run")
-    start: float = told("Stretch_Start")
-    stop: float = told("Stretch_End")
-    joints: tuple[Joint, ...] = told("odd_at_Joint")
-
-    @property
-    @tells(key=True)
-    def stretch_id(self) -> str:
-        """Its name: a run has one stretch that begins then."""
-        return f"{self.run}:{self.start:g}"
-
-    @property
-    def place(self) -> str:
-        """Where it is, in words."""
-        return f"{self.run} from {self.start:.1f} to {self.stop:.1f} s ({', '.join(self.joints)})"
-
-
-def odd(stretches: Sequence[OddStretch]) -> str:
-    """Return the places of stretches in words; of many, how many more there are; nothing where there are none."""
-    more = len(stretches) - _NAMED
-    places = [one.place for one in stretches[:_NAMED]] + ([f"and {more} more"] if more > 0 else [])
-    return "; ".join(places)
 
 
 @part("Untestable_Effect", table="gap_not_testable", of="untestable_in", ranked=True)

@@ -11,7 +11,7 @@ from itertools import groupby
 
 import numpy as np
 
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.identification.accumulate import Block
 
 _FREEDOM = 4.0  # degrees of freedom of Student's t, as Lange, Little and Taylor 1989 take where nothing is known

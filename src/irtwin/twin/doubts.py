@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from irtwin.document.document import odd
+from irtwin.document.odd_stretch import odd
 from irtwin.twin.twin import Twin
 
 _CONTRADICTED = 0.01  # of a joint's torque, RMS: by less, consistent bodies are as good as any

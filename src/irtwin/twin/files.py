@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from irtwin.document import form
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
 from irtwin.effects.prior import Prior

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from irtwin.document.document import OddStretch
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.effect import NORMAL, Effect, Term
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack

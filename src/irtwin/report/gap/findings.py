@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from irtwin.document.document import LIKELY, OddStretch, odd
+from irtwin.document.document import LIKELY
+from irtwin.document.odd_stretch import OddStretch, odd
 from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from irtwin.document.document import LIKELY, OddStretch
+from irtwin.document.document import LIKELY
+from irtwin.document.odd_stretch import OddStretch
 from irtwin.report import wording
 from irtwin.report.gap import findings
 from irtwin.report.gap.findings import ToldFinding
