@@ -160,22 +160,6 @@ def test_a_sign_is_mended_and_a_dead_channel_stops():
         checked(spoilt(healthy(), one("torque", 2, np.zeros_like)))
 
 
-@pytest.mark.parametrize("value", [None, 0.0], ids=["as it was", "zero"])
-def test_a_channel_that_freezes_for_a_while_is_said_with_its_time(value):
-    def frozen(torque: np.ndarray) -> np.ndarray:
-        torque[800:900] = torque[800] if value is None else value
-        return torque
-
-    (finding,) = check(spoilt(healthy(), one("torque", 1, frozen))).findings
-    assert (finding.fault, finding.channel, finding.stops) == ("frozen", "tau_joint_2", False)
-    assert finding.evidence == {"start": 8.0, "stop": 8.99} and "from 8.00 to 8.99 s of swing_0" in finding.say
-
-
-def test_a_coarse_torque_that_stays_for_a_step_is_not_frozen():
-    coarse = spoilt(healthy(), one("torque", 1, lambda torque: 4 * np.round(torque / 4)))
-    assert not any(finding.fault == "frozen" for finding in check(coarse).findings)
-
-
 def test_speeds_that_contradict_the_positions_are_left_out():
     mended = checked(spoilt(healthy(), one("dq", 0, np.rad2deg))).data_set
     assert mended.runs[0].signals.dq is None

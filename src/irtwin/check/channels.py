@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
-from irtwin.check.moving import LEAST_RANGE, Moving
+from irtwin.check.moving import Moving
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, columns_of
 from irtwin.signals.finding import LogFinding
@@ -17,13 +16,12 @@ _JITTER = 0.3  # of the interval: median deviation of the times between samples
 _HELD = 0.9  # of a column's changes come at one pace, of several samples
 _FLAT = 0.02  # of the samples at the greatest magnitude,
 _ROW = 10  # this many in a row: the signal is cut off there
-_FROZEN = 10.0  # times as long as it stays otherwise; tiago's torque, in steps of 0.02 N m, stays 7 times as long
 _STEPS = 12  # values over the whole range: too coarse to fit to
 _FEWEST = 200  # samples, for all of these
 
 
 def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
-    """Return the columns that are dead, held, cut off, frozen for a while or coarse, and times that jump about."""
+    """Return the columns that are dead, held, cut off or coarse, and times that jump about."""
     findings = [finding for finding in (_jitter(moving),) if finding is not None]
     known = {
         column: [columns_of(run.signals, robot.joint_names)[column] for run in moving.runs]
@@ -31,7 +29,7 @@ def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     }
     for column, values in known.items():
         speeds = column in CHANNELS["dq"].columns(robot.joint_names)  # held against the positions elsewhere
-        for check in (_held,) if speeds else (_dead, _held, _cut_off, partial(_frozen, robot), _coarse):
+        for check in (_held,) if speeds else (_dead, _held, _cut_off, _coarse):
             finding = check(column, values, moving)
             if finding is not None:
                 findings.append(finding)
@@ -98,26 +96,6 @@ def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> LogFindin
                 return LogFinding(
                     "saturation", column, moving.names, False, False, {"at": float(end), "share": share}, say
                 )
-    return None
-
-
-def _frozen(robot: Robot, column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
-    own = [k for k, name in enumerate(robot.joint_names) if column.endswith(f"_{name}")]
-    for run, each in zip(moving.runs, values, strict=True):
-        edges = np.concatenate([[0], np.flatnonzero(np.diff(each)) + 1, [len(each)]])
-        lengths = np.diff(edges)
-        longest = int(np.argmax(lengths))
-        there = slice(edges[longest], edges[longest + 1])
-        q = run.signals.q[there, own] if own else run.signals.q[there]
-        usual = np.quantile(lengths, 0.99)
-        if len(each) < _FEWEST or lengths[longest] < _FROZEN * usual or np.ptp(q, axis=0).max() < LEAST_RANGE:
-            continue
-        start, stop = (float(time) for time in run.signals.time[there][[0, -1]])
-        say = (
-            f"{column} stays at {each[there][0]:.4g} from {start:.2f} to {stop:.2f} s of {run.name}, though the "
-            f"{'joint' if own else 'robot'} moves: nothing was measured there; cut that out of the log"
-        )
-        return LogFinding("frozen", column, (run.name,), False, False, {"start": start, "stop": stop}, say)
     return None
 
 

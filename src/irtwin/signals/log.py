@@ -167,7 +167,7 @@ def read_log(
     payload_mass in kg, payload_com in m in the flange frame. Raises InputError as `read_data_set` does.
     """
     signals, dropped = read_signals(file, robot, repair=repair)
-    pieces, sampled = as_sampled(signals, file)
+    pieces, sampled = as_sampled(signals, file, robot.joint_names)
     known = {"payload_mass": payload_mass, "payload_com": payload_com, "performs": performs}
     run = run_of(file.stem, signals, file=file, sha256=checksum(file), **known)
     return DataSet(
@@ -342,7 +342,7 @@ def _runs(
         if role == PLANNED:
             signals = signals.motion
             check_plan(signals, path)
-        pieces, sampled = as_sampled(signals, path)
+        pieces, sampled = as_sampled(signals, path, robot.joint_names)
         repairs += dropped
         findings += sampled
         run = Run(

@@ -13,6 +13,7 @@ from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.filter import FEWEST_PERIODS
 from irtwin.signals.finding import LogFinding
+from irtwin.signals.frozen import frozen
 from irtwin.signals.holes import HOLE
 from irtwin.signals.samples import FEWEST
 
@@ -28,13 +29,16 @@ def interval(time: np.ndarray) -> float:
     return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
 
 
-def as_sampled(signals: Signals, path: Path) -> tuple[list[Signals], list[LogFinding]]:
+def as_sampled(signals: Signals, path: Path, joints: Sequence[str]) -> tuple[list[Signals], list[LogFinding]]:
     """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
 
-    Held positions: one sample of each update stays. A piece of fewer than 20 samples is left out. A run that has
-    neither comes back as it is. Raises InputError where no piece is left, or there are more than 100.
+    Held positions: one sample of each update stays. Samples at which a channel froze are left out. So is a piece of
+    fewer than 20 samples. A run that has none of these comes back as it is. Raises InputError where no piece is left,
+    or there are more than 100.
     """
     signals, note = _without_held(signals, path)
+    signals, lost = _without_frozen(signals, path, joints)
+    note += lost
     pieces = _cut(signals)
     if len(pieces) == 1:
         return pieces, note
@@ -89,6 +93,26 @@ def _without_held(signals: Signals, path: Path) -> tuple[Signals, list[LogFindin
     note = f"{path}: positions change at {true:.4g} Hz, samples are stamped at {logged:.4g} Hz; taken at the former"
     evidence = {"logged_hz": logged, "true_hz": true}
     return signals.rows(rows), [LogFinding("held_samples", "q", (path.stem,), True, True, evidence, note)]
+
+
+def _without_frozen(signals: Signals, path: Path, joints: Sequence[str]) -> tuple[Signals, list[LogFinding]]:
+    lost = list(frozen(signals, joints)) if len(signals.time) >= FEWEST else []
+    if not lost:
+        return signals, []
+    measured = np.ones(len(signals.time), dtype=bool)
+    for _, stretch in lost:
+        measured[stretch] = False
+    columns = list(dict.fromkeys(column for column, _ in lost))
+    ends = sorted((float(signals.time[rows.start]), float(signals.time[rows.stop - 1])) for _, rows in lost)
+    start, stop = ends[0]
+    others = "" if len({rows.start for _, rows in lost}) == 1 else ", and later"
+    say = (
+        f"{path}: {', '.join(columns)} froze from {start:.2f} to {stop:.2f} s{others}, though the robot moved: nothing "
+        f"was measured there; {np.sum(~measured)} samples are left out"
+    )
+    evidence = {"start": start, "stop": stop, "left_out": float(np.sum(~measured))}
+    findings = [LogFinding("frozen", column, (path.stem,), True, True, evidence, say) for column in columns]
+    return signals.rows(measured), findings
 
 
 def _hold(q: np.ndarray) -> int | None:
