@@ -10,7 +10,7 @@ from tests.synthetic import arm, swing
 
 from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import ChangedFrictionWithTemperature, TemperatureDependentFriction
-from irtwin.effects.load import ExternalContact, Payload
+from irtwin.effects.load import CableDrag, ExternalContact, Payload
 from irtwin.gap.regression.candidate_columns import Candidates
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, Variant, in_scope
 from irtwin.gap.screening.contact import contact
@@ -94,3 +94,11 @@ def test_a_shape_that_a_change_alone_has_is_not_missing():
     missing, changed = in_scope(tried, both=True)
     assert [one.effect for one in missing.variants] == [standing]
     assert changed == tried[1]
+
+
+def test_a_shape_that_never_changes_gives_way_to_that_of_its_changes():
+    standing = CableDrag()
+    variants = tuple(Variant(one, (k,), ()) for k, one in enumerate((standing, *standing.changes())))
+    tried = [Hypothesis(standing.id, "joint_1", scope, variants) for scope in (MISSING, CHANGED)]
+    missing, changed = in_scope(tried, both=True)
+    assert [missing.variants, changed.variants] == [variants[:1], variants[1:]]

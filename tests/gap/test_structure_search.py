@@ -23,7 +23,7 @@ from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 300, 12
 NOISE = 0.6
-EFFECT = catalogue()["cable_drag"]
+EFFECT = catalogue()["torque_drift"]
 
 
 def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
@@ -60,7 +60,7 @@ def found(mix, coefficients):
 
 
 def changing(before, now, twin=()):
-    """What is said of a cable's drag of so many noises in the reference runs, and in the observed ones."""
+    """What is said of a drift of so many noises in the reference runs, and in the observed ones."""
     generator = np.random.default_rng(0)
     blocks = []
     for run in range(RUNS):
@@ -77,7 +77,7 @@ def changing(before, now, twin=()):
     system = System(terms, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), np.arange(RUNS), observed)
     scopes = [(CHANGED, system.changed)] if twin else [(MISSING, system.base), (CHANGED, system.changed)]
     candidates = [
-        Hypothesis("cable_drag", None, scope, (Variant(EFFECT, (place,), (column.term,)),)) for scope, place in scopes
+        Hypothesis("torque_drift", None, scope, (Variant(EFFECT, (place,), (column.term,)),)) for scope, place in scopes
     ]
     return [cause.scope for cause in causes(system, candidates)]
 
@@ -140,7 +140,7 @@ def test_groups_that_disagree_speak_against_an_effect():
         known = ((catalogue()["torque_offset"], Term("constant", "1")),)
         every = np.arange(len(sizes)), np.ones(len(sizes), dtype=bool)
         system = System(known, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), *every)
-        one = Hypothesis("cable_drag", None, MISSING, (Variant(EFFECT, (1,), (column.term,)),))
+        one = Hypothesis("torque_drift", None, MISSING, (Variant(EFFECT, (1,), (column.term,)),))
         return [cause.log_odds for cause in causes(system, [one])]
 
     (agreed,), mixed = odds([3.0] * 8), odds([4.0, -1.0] * 4)
@@ -205,9 +205,10 @@ def test_what_explains_most_does_not_hide_what_is_likely():
 
 def test_what_is_expected_in_each_joint_shows_in_all_together():
     """None of six joints shows it by itself; where some size is expected and not there, that speaks against it."""
-    size, prior = 0.1, HypothesisPrior(effects=20, joints=6)
+    size = 0.1
     columns = tuple(CandidateColumn(EFFECT, k, Term("k", "1", f"j{k}", expected=size, spread=size)) for k in range(6))
     each = hypotheses(columns, 1, MISSING)
+    prior = HypothesisPrior(effects=20, joints={(each[0].effect, MISSING): 6})
 
     def odds(there):
         system = replace(system_of(np.eye(6), np.full(6, there), size=1.0)[0], columns=columns)

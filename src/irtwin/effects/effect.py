@@ -142,7 +142,8 @@ class Effect(ABC):
     add to. Columns of an effect that `needs` "torque" or "power" are built from what other effects predict, never
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
-    so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect.
+    so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect;
+    one that is `never_changed` has such a shape for its changes.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -181,6 +182,7 @@ class Effect(ABC):
     taken_off: ClassVar[str | None] = None
     in_mjcf: ClassVar[Mapping[str, str]] = {}
     of_change: ClassVar[bool] = False
+    never_changed: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)

@@ -46,10 +46,11 @@ def balanced_joint(robot: Robot) -> str:
 
 @dataclass(frozen=True)
 class CableDrag(JointEffect):
-    """k (q - q0): a hose package that pulls. Its constant part shows as a torque offset."""
+    """k (q - q0): a hose package that pulls. Its constant part is a twin's torque offset."""
 
     id: ClassVar[str] = "cable_drag"
     family: ClassVar[str] = "load"
+    never_changed: ClassVar[bool] = True
     taken_off: ClassVar[str | None] = "with the hose package off"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -64,33 +65,72 @@ class CableDrag(JointEffect):
         """Return that a hose pulls back."""
         return {"k": Possible(0.0, np.inf, "a hose pulls a joint back to where it is at rest")}
 
+    def changes(self) -> tuple[Effect, ...]:
+        """Return the change of the constant part, too: no offset beside it has to bring that."""
+        return (ChangedCableDrag(joints=self.joints, runs=self.runs),)
+
+
+@dataclass(frozen=True)
+class ChangedCableDrag(CableDrag):
+    """k q - k q0: a hose that pulls from elsewhere, or otherwise, than in the runs before."""
+
+    of_change: ClassVar[bool] = True
+    never_changed: ClassVar[bool] = False
+
+    def standing(self) -> Effect:
+        """Return it in a twin, whose torque offset has the constant part."""
+        return CableDrag(joints=self.joints, runs=self.runs)
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return k and k q0."""
+        return (*super().joint_terms(joint), Term("k q0", force_unit(joint), joint.name, spread=20.0))
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return q and -1."""
+        return motion.q, np.full_like(motion.q, -1.0)
+
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
+        """Return k."""
+        own = slice(None, None, 2)
+        return self.standing().parameters(robot, Coefficients(given.values[own], given.covariance[own, own]))
+
 
 @dataclass(frozen=True)
 class GravityCompensation(JointEffect):
-    """k (L(q) - L0) dL/dq: a spring or a cylinder beside the joint; its first two orders in the angle."""
+    """k (L(q) - L0) dL/dq: a spring or a cylinder beside the joint; its first `orders` in the angle.
+
+    One is enough where it is anchored far off, or has no length at rest: k a b sin(q - q0).
+    """
 
     id: ClassVar[str] = "gravity_compensation"
     family: ClassVar[str] = "load"
 
+    orders: int = 2
+
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return the effect at the joint that makers balance: the first that gravity loads."""
-        return (self,) if robot is None else (self.on(balanced_joint(robot)),)
+        """Return one order and two, at the joint that makers balance: the first that gravity loads."""
+        shapes = self.variants(orders=(1, 2))
+        return shapes if robot is None else tuple(one.on(balanced_joint(robot)) for one in shapes)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the torques that go with cos q, sin q, cos 2 q and sin 2 q."""
-        names = ("cos", "sin", "cos 2", "sin 2")
+        names = ("cos", "sin", "cos 2", "sin 2")[: 2 * self.orders]
         return tuple(Term(name, force_unit(joint), joint.name, spread=1000.0) for name in names)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return cos q, sin q, cos 2 q, sin 2 q."""
-        return np.cos(motion.q), np.sin(motion.q), np.cos(2 * motion.q), np.sin(2 * motion.q)
+        return self._waves(motion.q)
+
+    def _waves(self, q: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(wave(order * q) for order in range(1, self.orders + 1) for wave in (np.cos, np.sin))
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the largest torque over a turn."""
-        waves = np.column_stack([np.cos(_TURN), np.sin(_TURN), np.cos(2 * _TURN), np.sin(2 * _TURN)])
+        waves = np.column_stack(self._waves(_TURN))
+        count = 2 * self.orders
         quantities = []
         for place, joint in enumerate(self.acting(robot)):
-            own = slice(4 * place, 4 * place + 4)
+            own = slice(count * place, count * place + count)
             torque = waves @ given.values[own]
             wave = waves[int(np.argmax(np.abs(torque)))]
             deviation = float(np.sqrt(wave @ given.covariance[own, own] @ wave))

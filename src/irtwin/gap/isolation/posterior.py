@@ -14,7 +14,8 @@ it is at one more has even odds, whichever that is. In words: `docs/how-it-decid
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,23 +34,24 @@ _SCREENED = 128  # places, or choices of runs, out of which a screening takes on
 
 @dataclass(frozen=True)
 class HypothesisPrior:
-    """The prior of hypotheses: `effects` in each scope and `joints` are as likely as others."""
+    """The prior of hypotheses: `effects` in each scope are as likely as others, at any of their `joints`, so many."""
 
     effects: int
-    joints: int
+    joints: Mapping[tuple[str, str], int]
 
     @classmethod
     def of(cls, candidates: Sequence[Hypothesis]) -> HypothesisPrior:
         """Take it from all candidates of a search."""
-        joints = {one.joint for one in candidates if one.joint}
-        return cls(len({(one.effect, one.scope) for one in candidates}), max(len(joints), 1))
+        effects = {(one.effect, one.scope) for one in candidates}
+        return cls(len(effects), Counter((one.effect, one.scope) for one in candidates if one.joint))
 
     def log_odds(self, one: Hypothesis, structure: Sequence[Hypothesis]) -> float:
         """Return the log odds of a hypothesis beside those that were found."""
+        places = self.joints[one.effect, one.scope] if one.joint else 1
         count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in structure) if one.joint else 0
         if count:  # sets of so many joints are as likely as one another
-            return float(np.log((count + 1) / (2 * max(self.joints - count, 1))))
-        return -float(np.log(self.effects * (self.joints if one.joint else 1)))
+            return float(np.log((count + 1) / (2 * max(places - count, 1))))
+        return -float(np.log(self.effects * places))
 
 
 @dataclass(frozen=True)

@@ -95,16 +95,21 @@ def hypotheses(
 
 
 def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
-    """Return hypotheses, the `missing` ones without the shapes that are a change's.
+    """Return hypotheses, the `missing` ones without the shapes that are a change's, those that changed with these.
 
     Such a shape is `of_change`, or acts in some observed runs only, beside reference runs (`both`).
     """
     inside = []
     for one in candidates:
-        kept = tuple(v for v in one.variants if one.scope == CHANGED or not _of_change(v.effect, both))
+        left_out = _never_changed if one.scope == CHANGED else _of_change
+        kept = tuple(v for v in one.variants if not left_out(v.effect, both))
         if kept:
             inside.append(replace(one, variants=kept))
     return inside
+
+
+def _never_changed(effect: Effect, both: bool) -> bool:
+    return effect.never_changed and both
 
 
 def _of_change(effect: Effect, both: bool) -> bool:
