@@ -55,12 +55,16 @@ def test_a_change_of_dry_friction_is_told_beside_a_turn_over_another_speed(tmp_p
     assert causes(tmp_path, 0.025, stronger=1.3) == {"coulomb_friction": ("joint_1",)}
 
 
-def reduced(noise: float) -> System:
-    """The equations of torque with viscous friction as the candidate; `noise` N m more where dry friction turns."""
+def reduced(noise: float, last: float | None = None) -> System:
+    """The equations of torque with viscous friction as the candidate; `noise` N m more where dry friction turns.
+
+    `last`: so much in the last of five runs.
+    """
     motions = []
     for seed in range(1, 6):
         motion = replace(measure(ROBOT, swing(ROBOT, seed), noise=0.05, seed=seed), cutoff=15.0)
-        more = noise * np.random.default_rng(seed).standard_normal(motion.dq.shape)
+        level = noise if last is None or seed < 5 else last
+        more = level * np.random.default_rng(seed).standard_normal(motion.dq.shape)
         logged = low_pass(motion.torque + more * turning(ROBOT, motion.dq), motion.rate, 15.0)
         motions.append(replace(motion, torque=logged))
     grouping = Grouping({one.run: one.run for one in motions}, frozenset(one.run for one in motions))
@@ -111,6 +115,14 @@ def test_what_is_left_where_friction_turns_is_no_gap() -> None:
     assert np.all(before > 2 * after)
     assert np.all(1.5 * after < system.residual_rms(apart.chosen, system.noise_before))
     np.testing.assert_array_equal(apart.level(floor), floor)
+
+
+@pytest.mark.parametrize(("noise", "otherwise"), [(3.0, False), (30.0, True)])
+def test_friction_that_turns_otherwise_than_in_the_reference_runs_shows(noise: float, otherwise: bool) -> None:
+    system = reduced(noise=3.0, last=noise)
+    one = replace(system, observed=np.array([block.run == system.blocks[-1].run for block in system.blocks]))
+    assert (Apart.of(one, one, []).turned(np.array([0.02, 0.02])).max() > 0) == otherwise
+    assert Apart.of(system, system, []).turned(np.array([0.02, 0.02])).max() == -np.inf
 
 
 def test_what_is_closed_where_friction_turns_counts_by_the_noise_there() -> None:

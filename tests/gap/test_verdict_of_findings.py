@@ -34,15 +34,23 @@ VARIANT = SimpleNamespace(effect=catalogue()["coulomb_friction"])
 CAUSE = SimpleNamespace(rivals=(), scope="missing", joints=("j1",), variants=(VARIANT,))
 
 
-def left(before, after, causes=(), closing=MUCH, **more):
-    """before, after: RMS of each joint, in floors; `closing`: what the causes close; `more` as left_open."""
+def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), **more):
+    """before, after: RMS of each joint, in floors; `closing`: what the causes close; `turned` as of `Apart.turned`.
+
+    `more` as left_open.
+    """
     floor = np.ones(len(before))
     finding = SimpleNamespace(
         name="torque",
         places=("j1", "j2")[: len(before)],
         causes=causes,
         floor=floor,
-        apart=SimpleNamespace(plain=None, left=(np.array(before), np.array(after)), level=lambda floor: floor),
+        apart=SimpleNamespace(
+            plain=SimpleNamespace(halves=(slice(None),)),
+            left=(np.array(before), np.array(after)),
+            level=lambda floor: floor,
+            turned=lambda floor: np.array(turned),
+        ),
         closing=lambda some: closing,
     )
     return left_open([finding], DEFAULT, **more)
@@ -121,8 +129,28 @@ LITTLE = Closing(share=0.2, interval=(-0.1, 0.5), floors=0.6, size=0.4)
 def test_without_a_cause_more_than_reference_runs_leave_over_one_another_is_left_open(monkeypatch, said, why):
     more = dict(said)
     found = more.pop("spread")
-    monkeypatch.setattr(verdict, "spread", lambda system, floor: found)
+    monkeypatch.setattr(verdict, "spread", lambda system, floor, rows: found)
     assert left([1.5, 1.0], [1.5, 1.0], **{"alike": True, **more}) == why
+
+
+def test_a_tenth_of_a_floor_squared_is_no_gap_however_alike_reference_runs_are(monkeypatch):
+    monkeypatch.setattr(verdict, "spread", lambda system, floor, rows: 0.04)
+    assert left([1.05, 1.0], [1.05, 1.0], alike=True) is None
+    assert left([1.15, 1.0], [1.15, 1.0], alike=True) == MUCH_IS_LEFT
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ({}, MUCH_IS_LEFT),
+        ({"alike": False}, None),
+        ({"causes": [CAUSE]}, None),  # something that matters is named
+        ({"turned": [-0.5, 2.0]}, None),  # rows about reversals are few
+    ],
+)
+def test_friction_that_turns_otherwise_than_in_the_reference_runs_is_left_open(monkeypatch, said, why):
+    monkeypatch.setattr(verdict, "spread", lambda system, floor, rows: 1.0)
+    assert left([1.0, 1.0], [1.0, 1.0], **{"turned": [-0.5, 4.0], "alike": True, **said}) == why
 
 
 def test_a_gap_that_only_an_impossible_number_closes_is_left_open():

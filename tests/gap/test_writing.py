@@ -11,7 +11,7 @@ from tests.synthetic import arm
 
 from irtwin.document.document import CauseParameter
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.gap.writing import _joints, _members, beside, beside_unknown, folded
+from irtwin.gap.writing import _joints, _members, beside, closing_nothing, doubted, folded
 from irtwin.simulator.differences import not_held
 
 
@@ -45,6 +45,13 @@ def test_a_cause_that_no_finding_that_matters_has_is_marked():
     assert all(one.folded_away for one in folded(said.causes, little))
 
 
+def test_a_little_cause_that_left_out_runs_do_not_confirm_is_doubted():
+    first = document("ambiguous").findings[0]
+    little, sure = replace(first, matters=False, share_interval95=(-0.1, 0.1)), replace(first, matters=False)
+    assert closing_nothing([little]) == set(first.causes)
+    assert closing_nothing([first, replace(sure, share_interval95=(0.01, 0.1))]) == set()
+
+
 def test_a_guess_beside_a_likely_cause_adds_no_joint_to_what_is_said_of_the_family():
     cause = document("ambiguous").causes[0]
     guess, other = (replace(cause, joints=(joint,), confidence=0.49) for joint in ("joint_1", "joint_2"))
@@ -55,7 +62,7 @@ def test_a_guess_beside_a_likely_cause_adds_no_joint_to_what_is_said_of_the_fami
 def test_beside_something_unknown_a_cause_is_as_likely_as_not():
     cause, *_ = document("ambiguous").causes
     sure = replace(cause, confidence=0.92, evidence=replace(cause.evidence, probability_of_rivals={"backlash": 0.46}))
-    told = beside_unknown(sure, DEFAULT.criterion)
+    told = doubted(sure, DEFAULT.criterion)
     assert told.confidence == pytest.approx(0.5)
     assert told.evidence.probability_of_rivals == pytest.approx({"backlash": 0.25})
     assert told.indistinguishable_from == sure.indistinguishable_from

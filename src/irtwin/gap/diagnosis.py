@@ -97,8 +97,11 @@ class Diagnosis:
             writing.cause(robot, finding, cause, ids_of[id(cause)], self.scale, self.thresholds.criterion)
             for finding, cause in self.causes
         )
-        if self.left_open == MUCH_IS_LEFT:
-            written = tuple(writing.beside_unknown(one, self.thresholds.criterion) for one in written)
+        findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
+        doubted = set(ids) if self.left_open == MUCH_IS_LEFT else writing.closing_nothing(findings)
+        written = tuple(
+            writing.doubted(one, self.thresholds.criterion) if one.id in doubted else one for one in written
+        )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
             written = tuple(writing.beside(self.simulator, one) for one in written)
@@ -220,7 +223,9 @@ def diagnose(
         differing=differ,
         explained=[one.disturbance for one in taken],
     )
-    located = places(left, seed, most_left(findings) if open_because == MUCH_IS_LEFT else None)
+    located = places(
+        left, seed, most_left(findings, thresholds, alike=case.alike) if open_because == MUCH_IS_LEFT else None
+    )
     tell("Designing the next experiment")
     stacks = {"torque": search.stack, "power": search.power_stack}
     equations = channel_equations(stacks, case, search.below, torque or twin_torque)

@@ -80,12 +80,22 @@ def cause(
     )
 
 
-def beside_unknown(cause: document.Cause, limits: Criterion) -> document.Cause:
-    """Return a cause where much of the gap is left: an effect that is no cause is there, and may stand for this one."""
+def doubted(cause: document.Cause, limits: Criterion) -> document.Cause:
+    """Return a cause that an effect which is none of the catalogue's may stand behind, as sure as that leaves it."""
     part = (1 - limits.unknown_there) / (1 - limits.unknown)
     rivals = {rival: part * chance for rival, chance in cause.evidence.probability_of_rivals.items()}
     evidence = replace(cause.evidence, probability_of_rivals=rivals)
     return replace(cause, confidence=part * cause.confidence, evidence=evidence)
+
+
+def closing_nothing(findings: Sequence[document.Finding]) -> set[str]:
+    """Return the ids of causes that are little, and of which left out groups do not say that they close anything."""
+    return {
+        cause
+        for finding in findings
+        if not finding.matters and finding.share_interval95[0] <= 0
+        for cause in finding.causes
+    }
 
 
 def findings(

@@ -1,7 +1,7 @@
 """A channel's equations as a gap is judged by them: rows in which dry friction turns stand apart.
 
-Nobody knows the law of friction there. What causes leave of these rows is their noise, and no gap; what they close of
-them counts by it.
+Nobody knows the law of friction there. What causes leave of these rows is their noise, and no gap, unless reference
+runs leave far less; what they close of them counts by it.
 """
 
 from __future__ import annotations
@@ -65,6 +65,20 @@ class Apart:
         known = reference_rms(self.plain, self.plain.noise_before)[self.plain.halves[0]]
         return np.asarray(np.maximum(floor, known))
 
+    def turned(self, floor: np.ndarray) -> np.ndarray:
+        """Return (g,) by how much causes leave more, where dry friction turns, than reference runs over one another.
+
+        In squares of what these leave there, or of the floor (g,) RMS, if that is more; minus infinity where too few
+        reference runs tell.
+        """
+        turning = self.plain.halves[-1]
+        known = spread(self.plain, floor, turning) if len(self.plain.halves) > 1 else None
+        if known is None:
+            return np.full(len(floor), -np.inf)
+        level = np.maximum(floor, reference_rms(self.plain, self.plain.noise_before)[turning])
+        left = observed_rms(self.system, self.chosen, self.noise)[turning]
+        return np.asarray((left / level) ** 2 - 1 - known)
+
     def counted(self, squares: np.ndarray) -> np.ndarray:
         """Return squares of rows apart (..., 2 g) together, (..., g): slow ones in units of the noise of the others."""
         first = self.system.halves[0]
@@ -78,12 +92,12 @@ class Apart:
         return HeldOut(self.counted(apart.before), self.counted(apart.after), rows)
 
 
-def spread(system: System, floor: np.ndarray) -> float | None:
+def spread(system: System, floor: np.ndarray, rows: slice) -> float | None:
     """Return the largest excess, in floors squared, of a half of the reference groups over the other half.
 
     Each half in turn plays the observed runs: what a fit to both leaves in it is held against what a fit to the other
-    half leaves there, or the floor (g,) RMS if that is more, in rows in which no dry friction turns. The largest of all
-    equations and halves; None where the groups are fewer than four.
+    half leaves there, or the floor (g,) RMS if that is more, in the equations of some `rows`, a half of the system's.
+    The largest of all equations and halves; None where the groups are fewer than four.
     """
     groups = [int(group) for group in np.flatnonzero(~system.group_observed)]
     if len(groups) < FEWEST_GROUPS:
@@ -91,7 +105,7 @@ def spread(system: System, floor: np.ndarray) -> float | None:
     noise = system.noise_before
 
     def left(fitted: Sequence[int], of: Sequence[int]) -> np.ndarray:
-        return system.rms((), noise, fitted, of)[system.halves[0]]
+        return system.rms((), noise, fitted, of)[rows]
 
     def excess(played: Sequence[int], others: Sequence[int]) -> float:
         return float(np.max((left(groups, played) / np.maximum(floor, left(others, others))) ** 2 - 1))

@@ -46,15 +46,20 @@ def left_open(
     before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
     much = max(limits.criterion.excess, (1 - limits.matters.closed) * before)
     if alike and not named:
-        much = min(much, _spread(findings, much))
+        much = min(much, max(_spread(findings, much), limits.matters.floors**2))
+        if _turned(findings, limits):
+            return MUCH_IS_LEFT
     if after > much and not (nameless and beside <= much):
         return MUCH_IS_LEFT
     return DOES_NOT_REPEAT if nameless else None
 
 
-def most_left(findings: Sequence[ChannelFinding]) -> tuple[str, int]:
-    """Return the channel and the place in it with the largest excess that causes leave, over floor and references."""
-    left = {
+def most_left(findings: Sequence[ChannelFinding], limits: Thresholds, *, alike: bool = False) -> tuple[str, int]:
+    """Return the channel and the place in it with the largest excess that causes leave, over floor and references.
+
+    `alike` as of `left_open`: where dry friction turns otherwise than in the reference runs, that is the place.
+    """
+    left = (alike and _turned(findings, limits)) or {
         (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor)) ** 2)[place])
         for finding in findings
         if finding.floor is not None
@@ -94,8 +99,19 @@ def _classes(finding: document.Finding) -> list[list[float]]:
 
 def _spread(findings: Sequence[ChannelFinding], unknown: float) -> float:
     """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
-    known = [spread(one.apart.plain, one.floor) for one in findings if one.floor is not None]
+    known = [spread(one.apart.plain, one.floor, one.apart.plain.halves[0]) for one in findings if one.floor is not None]
     return max((unknown if one is None else one for one in known), default=unknown)
+
+
+def _turned(findings: Sequence[ChannelFinding], limits: Thresholds) -> dict[tuple[str, int], float]:
+    """Return the channels and places where dry friction turns otherwise than in the reference runs, by how much."""
+    return {
+        (finding.name, place): float(more)
+        for finding in findings
+        if finding.floor is not None
+        for place, more in enumerate(finding.apart.turned(finding.floor))
+        if more > limits.criterion.excess
+    }
 
 
 def _largest(
