@@ -18,8 +18,9 @@ from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
-from irtwin.gap.isolation.finding import ChannelFinding, Without, find
+from irtwin.gap.isolation.finding import ChannelFinding, find
 from irtwin.gap.isolation.refusal import Refusals, find_possible
+from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower

@@ -13,8 +13,8 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
-from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, Without, attributed, finding_of
-from irtwin.gap.isolation.structure_search import Attribution
+from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, attributed, finding_of
+from irtwin.gap.isolation.structure_search import Attribution, Without
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
 from irtwin.gap.regression.cross_fitted import TwinPower

@@ -16,7 +16,7 @@ from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
-from irtwin.gap.isolation.structure_search import Attribution, attribute
+from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
 from irtwin.gap.regression.joint_equations import JointEquations
@@ -26,8 +26,6 @@ from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
 
 _NO_NOISE = 1e-9
-Without = str | tuple[str, str | None]
-"""What a search is not to name: an effect, or an effect at a joint (None: of the whole robot)."""
 
 
 @dataclass(frozen=True)
@@ -191,10 +189,10 @@ def attributed(
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
     tell_step("  rows in which joints are slow")
-    candidates = _hypotheses(case, system, without)
+    candidates = _hypotheses(case, system)
     apart = system.by_speed
     level = floor if floor is None or apart is system else np.tile(floor, 2)
-    attribution = attribute(apart, candidates, case.thresholds.criterion, level)
+    attribution = attribute(apart, candidates, case.thresholds.criterion, level, without)
     if apart is system:
         return attribution
     alone, chosen = system.with_columns([k for cause in attribution.causes for k in cause.columns])
@@ -209,8 +207,8 @@ def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
     return case.modelled | {(one.id, None) for one in catalogue().values() if not can_show(one, case.others)}
 
 
-def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypothesis]:
-    """Return what may be missing or have changed, `without` some effects; effects on power may act in every joint.
+def _hypotheses(case: Case, system: System) -> list[Hypothesis]:
+    """Return what may be missing or have changed; effects on power may act in every joint.
 
     What a simulator and the robot both have, and the twin lacks, is no difference between them.
     """
@@ -219,7 +217,7 @@ def _hypotheses(case: Case, system: System, without: Set[Without]) -> list[Hypot
         candidates += hypotheses(system.columns, system.base, MISSING, inside=_inside(case, system))
     if system.both:
         candidates += hypotheses(system.columns, system.changed, CHANGED)
-    return [one for one in candidates if not {one.effect, (one.effect, one.joint)} & without]
+    return candidates
 
 
 def quantities(robot: Robot, finding: ChannelFinding, one: FoundCause) -> list[Quantity]:

@@ -12,7 +12,8 @@ from irtwin.effects.effect import NORMAL, Possible, Quantity, Stated
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.finding import ChannelFinding, Without, of_variant
+from irtwin.gap.isolation.finding import ChannelFinding, of_variant
+from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.hypotheses import CHANGED, Variant, place_of
 from irtwin.robot.description import Robot
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -22,6 +22,8 @@ _KEPT = 2  # projections, each by another noise: a look by what is left, and one
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
 Member = tuple[Hypothesis, Variant]
+Without = str | tuple[str, str | None]
+"""What a search is not to name: an effect, or an effect at a joint (None: of the whole robot)."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +41,21 @@ class Attribution:
 
 
 def attribute(
-    system: System, candidates: Sequence[Hypothesis], limits: Criterion, floor: np.ndarray | None = None
+    system: System,
+    candidates: Sequence[Hypothesis],
+    limits: Criterion,
+    floor: np.ndarray | None = None,
+    without: Set[Without] = frozenset(),
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
     is taken out and looked for anew, and so are two of one joint together. floor: (g,) RMS, 0 or None where unknown;
+    what is tried `without` some effects is no likelier for that.
     """
-    candidates = in_scope(candidates, both=system.both)
-    search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
+    every = in_scope(candidates, both=system.both)
+    candidates = [one for one in every if not {one.effect, (one.effect, one.joint)} & without]
+    search = _Search(system, candidates, HypothesisPrior.of(every), limits, floor)
     noise = np.ones(len(system.pattern))
     for _ in track(range(2), "looks at what the twin leaves"):
         noise = system.residual_rms((), noise)
