@@ -62,6 +62,14 @@ def test_a_coarse_torque_did_not_freeze(run, step):
     assert not list(frozen(replace(run.signals, torque=step * np.round(run.signals.torque / step)), ROBOT.joint_names))
 
 
+def test_a_coarse_meter_beside_slow_motion_did_not_freeze(run):
+    time = run.signals.time
+    slow = np.interp(time, [0, 9, 11, 20], [0, 9, 9.05, 18.05])  # hardly moves from 9 to 11 s
+    q = np.column_stack([5 * np.interp(slow, time, q) for q in run.signals.q.T])
+    power = 10 * np.round(np.interp(slow, time, 40 * run.signals.power) / 10)
+    assert not list(frozen(replace(run.signals, q=q, torque=None, power=power), ROBOT.joint_names))
+
+
 def test_a_torque_at_its_limit_did_not_freeze(run):
     most = np.quantile(run.signals.torque, 0.99, axis=0)
     assert not list(frozen(replace(run.signals, torque=np.minimum(run.signals.torque, most)), ROBOT.joint_names))
