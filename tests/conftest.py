@@ -21,8 +21,8 @@ from sqlalchemy import NullPool, create_engine, text
 
 _CHROMIUM = (
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--disable-gpu-rasterization",  # a card that is played takes longer for it
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+    "--disable-gpu",  # a card that is played takes longer for pages; pictures in 3-D are drawn without
 )  # fmt: skip
 
 # Many tests start irtwin anew: its modules are compiled once, even where the machine asks for no compiled files.

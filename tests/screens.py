@@ -39,6 +39,25 @@ def on_screen(page: Any, width: int, scheme: str) -> list[tuple[str, list[Any]]]
     return wrong + faults(page, rules=OF_THE_SCREEN)
 
 
+def complaints_of(page: Any, mine: tuple[str, ...] | None = None) -> list[str]:
+    """Return a list that takes what a page complains of, but for what the driver of the graphics says of its speed.
+
+    mine: how the addresses begin that it may ask; it complains of all others.
+    """
+    complaints: list[str] = []
+
+    def hear(message: Any) -> None:
+        if "GL Driver Message (OpenGL, Performance" not in message.text:
+            complaints.append(f"{message.type}: {message.text}")
+
+    page.on("console", hear)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("dialog", lambda dialog: complaints.append(dialog.message))
+    if mine is not None:
+        page.on("request", lambda it: None if it.url.startswith(mine) else complaints.append(it.url))
+    return complaints
+
+
 def is_dark(page: Any) -> bool:
     """Whether a page is light on dark."""
     back, ink = (

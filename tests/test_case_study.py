@@ -22,7 +22,7 @@ from irtwin.resources import folder
 from irtwin.signals.log import read_data_set
 from irtwin.signals.motion import Motion
 from tests.data_sets import Said, irtwin
-from tests.screens import faults, narrow_and_dark
+from tests.screens import complaints_of, faults, narrow_and_dark
 
 pytestmark = [
     pytest.mark.slow,
@@ -146,9 +146,7 @@ def test_the_page_draws_its_figures_and_moves_the_robot(done: Done, browser: Any
     assert file.stat().st_size < 3_000_000
     page = browser.new_page(viewport={"width": 1440, "height": 900})
     page.set_default_timeout(90_000)  # ms; without a graphics card the scene's pictures take their time
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
+    complaints = complaints_of(page)
     page.goto(file.as_uri())
     page.wait_for_selector("#figure-energy .scatterlayer .trace")
     page.wait_for_function("document.querySelector('.pose[data-at=last] img').src")

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from tests import gap_cases, rows
 from tests.gap_pages import figures_of, graph_of, page_of, six_axis
+from tests.screens import complaints_of
 
 from irtwin.document.curves import Curves
 from irtwin.errors import InputError
@@ -281,9 +282,7 @@ def test_every_figure_is_drawn_without_network(browser: Any, pages: dict[str, Pa
     for verdict in set(pages) - {"ambiguous"}:  # which tests/report/test_pages_in_browser.py opens
         file = pages[verdict]
         page = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True).new_page()
-        complaints: list[str] = []
-        page.on("console", lambda message, into=complaints: into.append(message.text))
-        page.on("pageerror", lambda error, into=complaints: into.append(str(error)))
+        complaints = complaints_of(page)
         page.goto(file.as_uri())
         page.wait_for_selector("#figure-heat_map .heatmaplayer image, #figure-heat_map .hm")
         for plot in page.locator(".plot").all():

@@ -9,7 +9,7 @@ from typing import Any
 import httpx
 import pytest
 from tests.endpoint import Server
-from tests.screens import faults, is_dark, narrow_and_dark
+from tests.screens import complaints_of, faults, is_dark, narrow_and_dark
 
 from irtwin.report.heading import heading
 
@@ -23,25 +23,23 @@ READY = {"/query": "#questions button", "/live": "#robots tr, #none:visible"}
 
 
 @pytest.fixture(scope="module")
-def context(browser: Any) -> Iterator[Any]:
-    """One context for all pages: what the browser compiled for one serves the next."""
-    opened = browser.new_context(viewport={"width": 1440, "height": 900})
-    yield opened
-    opened.close()
+def opened(browser: Any, plant: Server) -> Iterator[tuple[Any, list[str]]]:
+    """One page for all tests: a window of its own for each takes as long again. And whatever it complains of."""
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    yield page, complaints_of(page, (plant.url, "data:"))
+    page.close()
 
 
 @pytest.fixture
-def page(context: Any, plant: Server) -> Iterator[tuple[Any, list[str]]]:
-    """A page, and whatever it complains of or asks of others."""
-    page = context.new_page()
-    page.set_default_timeout(60_000)
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("dialog", lambda dialog: complaints.append(dialog.message))
-    page.on("request", lambda it: None if it.url.startswith((plant.url, "data:")) else complaints.append(it.url))
-    yield page, complaints
-    page.close()
+def page(opened: tuple[Any, list[str]]) -> tuple[Any, list[str]]:
+    """The page as if it were new: wide, light, empty, and without a complaint."""
+    page, complaints = opened
+    page.goto("about:blank")
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.emulate_media(color_scheme="light")
+    complaints.clear()
+    return opened
 
 
 @pytest.mark.parametrize("path", PAGES)
@@ -192,8 +190,7 @@ def test_by_keyboard(page: tuple[Any, list[str]], plant: Server) -> None:
     assert page.evaluate("document.activeElement.closest('main') !== null")
 
 
-def test_a_report_cannot_ask_the_server(browser: Any, plant: Server) -> None:
-    page = browser.new_page()
+def test_a_report_cannot_ask_the_server(page: tuple[Any, list[str]], plant: Server) -> None:
+    page, _ = page
     page.goto(f"{plant.url}/reports/Arm_A.html")
     page.wait_for_selector("text=kept out")
-    page.close()

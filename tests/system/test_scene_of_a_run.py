@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from tests.playing import play
+from tests.screens import complaints_of
 
 from irtwin.asking import ask
 
@@ -26,9 +27,7 @@ def test_each_run_ends_with_the_energy_of_the_graph(browser: Any, small_run: Pat
     assert len(known) == 3
     assert report.stat().st_size < 6_000_000
     page = browser.new_page()
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
+    complaints = complaints_of(page)
     page.goto(report.as_uri())
     page.wait_for_selector("#figure-torque .scatterlayer .trace")
     for name, energy in known.items():

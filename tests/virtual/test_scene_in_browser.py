@@ -12,6 +12,7 @@ import pytest
 from tests import mesh_robots
 from tests.mesh_robots import HAND
 from tests.playing import play
+from tests.screens import complaints_of
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
 from irtwin.providers.mesh_files import mesh_copies
@@ -62,10 +63,7 @@ def open_page(
     for earlier in browser.contexts:
         earlier.close()  # which would draw on
     page = browser.new_page(viewport={"width": 720, "height": 420})
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: complaints.append(request.url))
+    complaints = complaints_of(page, mine=())
     page.goto(path.as_uri())
     page.wait_for_function("document.querySelector('.irtwin-scene').irtwinScene")
     assert complaints == [path.as_uri()]
