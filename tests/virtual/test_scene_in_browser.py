@@ -60,9 +60,10 @@ def open_page(
     path = folder / "scene.html"
     fragment = scene_html(robot, [run(robot), *more], title=title, meshes=meshes)
     path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
-    for earlier in browser.contexts:
-        earlier.close()  # which would draw on
-    page = browser.new_page(viewport={"width": 720, "height": 420})
+    # A window of its own for each takes as long as the scene, and an earlier one would draw on.
+    pages = [page for context in browser.contexts for page in context.pages]
+    page = pages[0] if pages else browser.new_page(viewport={"width": 720, "height": 420})
+    page.emulate_media(media="screen")
     complaints = complaints_of(page, mine=())
     page.goto(path.as_uri())
     page.wait_for_function("document.querySelector('.irtwin-scene').irtwinScene")
@@ -77,7 +78,7 @@ def pixels(page: Any) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def arm(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, list[str]]:
-    """The scene of the KR6, for the tests that come first: others close it."""
+    """The scene of the KR6, for the tests that come first: others leave it."""
     return open_page(browser, tmp_path_factory.mktemp("arm"), kr6())
 
 
