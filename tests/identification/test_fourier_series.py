@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.identification.fourier_series import RestSeries, between_samples
@@ -32,6 +32,7 @@ def test_the_bases_give_the_series_motion_at_the_grid() -> None:
 
 
 @pytest.mark.slow
+@settings(max_examples=30)
 @given(st.integers(2, 10), st.integers(0, 2**32 - 1))
 def test_between_samples_bounds_what_a_fine_grid_shows(harmonics: int, seed: int) -> None:
     series = RestSeries(1.0, harmonics).series(np.random.default_rng(seed).normal(size=(2 * harmonics - 1, 2)))

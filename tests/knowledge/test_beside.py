@@ -69,7 +69,7 @@ def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
         return None
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(st.lists(st.sampled_from(AXIOMS), unique=True), st.lists(st.sampled_from(FACTS), unique=True, max_size=12))
 def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
     ontology, facts = triples(axioms), triples(said)

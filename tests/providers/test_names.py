@@ -4,7 +4,7 @@ import re
 import unicodedata
 
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 from tests.providers.test_records import data_set, run
@@ -22,6 +22,7 @@ def test_plain_names_are_their_own_identifiers():
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.lists(st.text(), min_size=2, max_size=2, unique_by=lambda name: unicodedata.normalize("NFC", name)))
 @example(["机器人", "人器机"])
 @example(["R 1", "R_1"])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.robot.chains import chains
 
@@ -96,6 +96,7 @@ def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, matrix,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
+@settings(max_examples=25)
 @given(urdf=chains())
 def test_a_chain_its_table_and_the_robot_of_its_table_agree(convention, urdf):
     robot = parse_urdf(urdf)

@@ -49,7 +49,7 @@ def test_a_curve_is_all_samples_or_the_extremes_of_them(tmp_path: Path) -> None:
         file.curve("y", 0, 1)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(one=MOMENT, other=MOMENT)
 def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, other: float) -> None:
     file, power = series
@@ -62,7 +62,7 @@ def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, o
         assert found == [pytest.approx(inside.mean(), rel=1e-12), inside.min(), inside.max()]
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(moments=st.lists(MOMENT, min_size=3, max_size=3))
 def test_integrals_are_those_of_the_line_through_the_samples(series: Known, moments: list[float]) -> None:
     file, power = series
