@@ -44,9 +44,9 @@ def own_settings(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the modules of most slow tests: else one that began late is what all processes wait for."""
-    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: -slow[item.path])
+    """Begin with the modules of most tests that take long: else one that began late is what all processes wait for."""
+    long = Counter(item.path for item in items if {"slow", "system"} & {mark.name for mark in item.iter_markers()})
+    items.sort(key=lambda item: -long[item.path])
 
 
 def pytest_sessionstart() -> None:
