@@ -179,6 +179,22 @@ def test_offset_shows_in_the_measurement_but_is_no_torque():
     np.testing.assert_allclose(stack.real_torque(motion, np.array([2.0, 3.0, 50.0, 60.0])), motion.dq * [2, 3])
 
 
+def test_the_log_alone_tells_the_torque_of_a_joint_at_rest():
+    stack = Stack(arm(2), ["coulomb_friction", "viscous_friction", "torque_offset"])
+    motion = swing(arm(2), 1, seconds=1)
+    rests = np.zeros((100, 2), dtype=bool)
+    rests[30:60, 1] = True
+    motion = replace(motion, dq=np.where(rests, 0.0, motion.dq), torque=np.full((100, 2), 7.0), standing=rests)
+    values = np.array([4.0, 4.0, 2.0, 3.0, 0.5, 0.6])
+    known, borne = stack.real_torque(motion, values), stack.borne_torque(motion, values)
+    told = stack.told_by_log(motion)
+    assert told[30:60, 1].all() and not told[:30].any()
+    np.testing.assert_allclose(borne[told], 7.0 - 0.6)
+    np.testing.assert_array_equal(borne[~told], known[~told])
+    unlogged = replace(motion, torque=None)
+    np.testing.assert_array_equal(stack.borne_torque(unlogged, values), known)
+
+
 def test_copper_loss_takes_current_where_the_torque_constant_is_known():
     robot = arm(2)
     motion = swing(robot, 1, seconds=1)

@@ -69,6 +69,38 @@ def names(finding) -> list[str]:
     return [f"{cause.effect} {cause.scope} {' '.join(cause.joints)}" for cause in finding.causes]
 
 
+def pausing(held: float) -> Case:
+    """Runs that stop for 1 s in 5: there joint 2 bears `held` N m of either sign more, as friction left it."""
+    plain = case()
+    motions = {}
+    for k, (run, motion) in enumerate(plain.motions.items()):
+        rests = (motion.time > 2.0) & (motion.time < 3.0)
+        still = {name: np.where(rests[:, None], 0.0, getattr(motion, name)) for name in ("dq", "ddq")}
+        stands = replace(swing(ROBOT, k, seconds=5.0), run=run, **still)
+        stands = replace(stands, q=np.where(rests[:, None], motion.q[rests][0], motion.q))
+        quiet = measure(ROBOT, stands, seed=k)
+        more = np.zeros_like(motion.dq)
+        more[rests, 1] = held * (-1) ** k
+        loss = (truth(ROBOT)["R"] * (2 * quiet.current + more / 8.0) * more / 8.0).sum(axis=1)
+        noise = NOISE * np.random.default_rng(k).standard_normal((len(rests), 3))
+        standing = np.repeat(rests[:, None], 2, axis=1)
+        shown = replace(quiet, torque=quiet.torque + more + noise[:, :2], power=quiet.power + loss + noise[:, 2])
+        motions[run] = replace(shown, current=None, standing=standing)
+    return replace(plain, motions=motions, given=(ROBOT, motions))
+
+
+def test_power_at_rest_is_that_of_the_torque_which_friction_left_there():
+    one = pausing(held=4.0)
+    stack = Stack(ROBOT, one.effects)
+    plain = LeftOut(stack, torque_system(stack, one.with_torque, one.grouping, (), None))
+    before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
+    for motion in one.with_power:
+        rests = motion.standing.all(axis=1)
+        said = before(motion, plain.torque(motion))[0]
+        assert np.sqrt(np.mean((motion.power - said)[rests] ** 2)) < 2 * NOISE
+    assert names(found(one)) == []
+
+
 def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     finding = found(case(real=3.0))
     assert names(finding) == ["asymmetric_friction missing joint_2"]

@@ -65,6 +65,9 @@ def test_a_line_meets_power_where_it_is_taken_and_touches_it_beside():
         return line.carried @ of[stack.real] + line.free @ free + line.known
 
     np.testing.assert_allclose(said(coefficients), power(coefficients), rtol=1e-9)
+    told = power_line(stack, loaded, partial(stack.carried, loaded), torque, now, values, np.ones((1, 3), dtype=bool))
+    assert not told.carried.any()
+    np.testing.assert_allclose(told.free @ free + told.known, power(coefficients), rtol=1e-9)
     step = 1e-5 * rng.uniform(-1, 1, len(coefficients))
     change = power(coefficients + step) - power(coefficients - step)
     np.testing.assert_allclose(said(coefficients + step) - said(coefficients - step), change, atol=1e-7)

@@ -205,6 +205,18 @@ class Stack:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
         return self.torque_of([effect for effect in self._torque if effect.channel == "torque"], motion, values)
 
+    def told_by_log(self, motion: Motion) -> np.ndarray:
+        """Return where a log alone tells a joint's torque, (N, n): at rest dry friction holds what it has to."""
+        return np.zeros(motion.dq.shape, dtype=bool) if motion.torque is None else self.undecided(motion)
+
+    def borne_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m: what the log shows, less what sensors add, where it alone tells."""
+        torque, told = self.real_torque(motion, values), self.told_by_log(motion)
+        if not told.any():
+            return torque
+        sensors = [effect for effect in self._torque if effect.channel == "measurement"]
+        return np.where(told, motion.torque - self.torque_of(sensors, motion, values), torque)
+
     def torque_of(self, effects: Sequence[Effect], motion: Motion, values: np.ndarray) -> np.ndarray:
         """Return what some of the effects add to torque, (N, n) N m, by the (K,) torque coefficients of all."""
         total = values + self.shift(motion)

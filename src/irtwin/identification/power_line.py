@@ -32,14 +32,20 @@ class PowerLine:
 
 
 def power_line(
-    stack: Stack, motion: Motion, carrying: Carrying, torque: np.ndarray, power: np.ndarray, values: np.ndarray
+    stack: Stack,
+    motion: Motion,
+    carrying: Carrying,
+    torque: np.ndarray,
+    power: np.ndarray,
+    values: np.ndarray,
+    told: np.ndarray | bool = False,
 ) -> PowerLine:
     """Return the equation of power, linear in the coefficients of torque about the real `torque` (N, n).
 
     carrying: gives (N, R) what real columns carry by a slope; power: (N, L) columns of power on that torque; values:
-    (L,) its coefficients.
+    (L,) its coefficients; told: (N, n) where a log tells that torque, so that no coefficient does.
     """
-    slope = power_slope(stack, motion, torque, values)
+    slope = np.where(told, 0.0, power_slope(stack, motion, torque, values))
     real = carrying(slope)
     fixed = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
     known = power[:, stack.fixed] @ fixed + real @ stack.shift(motion)[stack.real] - (slope * torque).sum(axis=1)

@@ -81,9 +81,9 @@ class ExplainedTorque(Explained):
         """Return the real joint torque, (N, n) N m, of a run or a part of one."""
         whole = motion.whole or motion
         if self._held is None or self._held[0] != whole.run:
-            torque = self.stack.real_torque(whole, self.values)
+            torque, told = self.stack.borne_torque(whole, self.values), self.stack.told_by_log(whole)
             for cause in self.finding.causes:
-                torque = torque + self.added(cause, whole, real=True)
+                torque = torque + np.where(told, 0.0, self.added(cause, whole, real=True))
             self._held = whole.run, torque
         return self._held[1][motion.start : motion.start + len(motion.time)]
 

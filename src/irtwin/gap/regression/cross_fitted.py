@@ -40,10 +40,10 @@ class LeftOut:
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of a run or a part of one."""
         if motion.run not in self._without:
-            return self._stack.real_torque(motion, self._all)
+            return self._stack.borne_torque(motion, self._all)
         run = motion.whole or motion
         if run.run not in self._held or self._held[run.run][0] is not run:
-            self._held[run.run] = run, self._stack.real_torque(run, self._without[run.run])
+            self._held[run.run] = run, self._stack.borne_torque(run, self._without[run.run])
         return self._held[run.run][1][motion.start : motion.start + len(motion.time)]
 
     def below(self, whole: Motion) -> Predicted:

@@ -80,7 +80,8 @@ def joint_equations(
         def of_part(motion: Motion) -> Rows:
             own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
             carrying = partial(carried, own, pattern=stack.pattern, real=stack.real)
-            line = power_line(stack, motion, carrying, torque, stack.power_columns(motion, torque), power.values)
+            about = torque, stack.power_columns(motion, torque), power.values, stack.told_by_log(motion)
+            line = power_line(stack, motion, carrying, *about)
             electrical = added.part(motion)
 
             def of_power() -> list[np.ndarray]:
