@@ -171,15 +171,18 @@ def _overlap(one: Hypothesis, other: Hypothesis) -> bool:
 
 def _gains(left: np.ndarray, variants: Sequence[Variant], library: Library) -> tuple[float, int]:
     """Return the squares that the best variant explains, and its place; none where a coefficient breaks its bound."""
-    columns = np.array([variant.columns for variant in variants])
-    normal = left[columns[:, :, None], columns[:, None, :]] + np.eye(columns.shape[1])
+    gains = [_gain(left, variant, library) for variant in variants]
+    best = int(np.argmax(gains))
+    return gains[best], best
+
+
+def _gain(left: np.ndarray, variant: Variant, library: Library) -> float:
+    columns = np.array(variant.columns)
     right = left[columns, -1]
-    values = np.linalg.solve(normal, right[..., None])[..., 0]
-    lowest = np.array([[term.lowest for term in variant.terms] for variant in variants]) / library.system.scale[columns]
+    values = np.linalg.solve(left[np.ix_(columns, columns)] + np.eye(len(columns)), right)
+    lowest = np.array([term.lowest for term in variant.terms]) / library.system.scale[columns]
     lowest[columns >= library.system.changed] = -np.inf
-    gain = np.where((values < lowest).any(axis=1), 0.0, (values * right).sum(axis=1))
-    best = int(np.argmax(gain))
-    return float(gain[best]), best
+    return 0.0 if (values < lowest).any() else float(values @ right)
 
 
 def majority(labels: dict[str, Any]) -> dict[str, Any]:
