@@ -70,6 +70,13 @@ def test_a_coarse_meter_beside_slow_motion_did_not_freeze(run):
     assert not list(frozen(replace(run.signals, q=q, torque=None, power=power), ROBOT.joint_names))
 
 
+def test_a_meter_without_joints_tells_of_no_motion(run):
+    power = run.signals.power.copy()
+    power[800:900] = power[800]
+    metered = Signals(run.signals.time, np.empty((len(power), 0)), power=power)
+    assert not list(frozen(metered, ()))
+
+
 def test_a_torque_at_its_limit_did_not_freeze(run):
     most = np.quantile(run.signals.torque, 0.99, axis=0)
     assert not list(frozen(replace(run.signals, torque=np.minimum(run.signals.torque, most)), ROBOT.joint_names))

@@ -36,7 +36,7 @@ def frozen(signals: Signals, joints: Sequence[str]) -> Iterator[tuple[str, slice
             jump = _JUMP * np.median(steps[steps > 0]) if steps.any() else np.inf
             for own in _long(one):
                 jumps = max(steps[own.start], steps[own.stop]) > jump
-                if jumps and one[own.start] not in ends and np.ptp(q[own], axis=0).max() > LEAST_RANGE:
+                if jumps and one[own.start] not in ends and np.ptp(q[own], axis=0).max(initial=0.0) > LEAST_RANGE:
                     yield column, own
 
 
