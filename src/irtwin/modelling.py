@@ -181,7 +181,7 @@ def motions_of(robot: Robot, file: Path) -> list[Motion]:
 
 
 def _motions(twin: Twin, run: Run) -> list[Motion]:
-    pieces, _ = as_sampled(run.signals, run.file, twin.robot.joint_names)
+    pieces, _ = as_sampled(run.signals, run.file)
     return [condition(replace(run, signals=piece), twin.robot, twin.cutoff) for piece in pieces]
 
 

@@ -12,6 +12,7 @@ from tests.synthetic import arm, as_run, measure, swing
 from irtwin.signals.channels import Signals
 from irtwin.signals.frozen import frozen
 from irtwin.signals.log import Run, read_data_set
+from irtwin.signals.sampling import as_sampled
 
 ROBOT = arm(2)
 
@@ -48,6 +49,13 @@ def test_a_few_frozen_samples_leave_one_run(tmp_path, run):
 def test_a_position_that_stands_and_jumps_froze(run):
     ((column, rows),) = frozen(changed(run, "q", 0, slice(800, 840)), ROBOT.joint_names)
     assert (column, rows) == ("q_joint_1", slice(800, 840))
+
+
+def test_a_plan_that_jumps_is_left_as_it_is(run):
+    jumping = replace(changed(run, "q", 0, slice(800, 840)), torque=None, power=None)
+    assert as_sampled(jumping, run.file) == ([jumping], [])
+    pieces, _ = as_sampled(jumping, run.file, ROBOT.joint_names)
+    assert len(pieces) == 2
 
 
 def test_a_joint_that_stands_and_moves_on_did_not_freeze(run):

@@ -23,7 +23,6 @@ from irtwin.twin.predict import predict
 
 ROBOT = arm(2)
 FILE = Path("runs/a.csv")
-JOINTS = ROBOT.joint_names
 
 
 def signals(time: np.ndarray, hold: int = 1) -> Signals:
@@ -44,7 +43,7 @@ def with_hole(whole: Run, at: int, seconds: float) -> Run:
 
 def test_an_even_run_stays_as_it_is():
     whole = signals(np.arange(500) / 100)
-    pieces, said = as_sampled(whole, FILE, JOINTS)
+    pieces, said = as_sampled(whole, FILE)
     assert pieces == [whole]
     assert pieces[0] is whole
     assert said == []
@@ -83,7 +82,7 @@ def test_a_repeat_of_a_run_in_pieces_repeats_the_first(tmp_path):
 def test_a_piece_too_short_is_left_out_and_said():
     time = np.arange(300) / 100
     time[290:] += 1e9
-    pieces, said = as_sampled(signals(time), FILE, JOINTS)
+    pieces, said = as_sampled(signals(time), FILE)
     assert [len(piece.time) for piece in pieces] == [290]
     (line,) = said
     assert line.say.endswith("taken as one run; 10 samples left out, in pieces of fewer than 20")
@@ -92,13 +91,13 @@ def test_a_piece_too_short_is_left_out_and_said():
 def test_nothing_but_holes_is_refused():
     time = np.arange(300) / 100 + 100.0 * (np.arange(300) // 10)
     with pytest.raises(InputError, match=r"29 holes in time, the first from 0.09 s to 100.1 s, leave 0 pieces"):
-        as_sampled(signals(time), FILE, JOINTS)
+        as_sampled(signals(time), FILE)
 
 
 def test_the_median_of_bursts_is_not_the_interval():
     time = np.cumsum(np.tile([1e-6, 1e-6, 0.02], 200))
     assert interval(time) == pytest.approx(0.005)
-    assert as_sampled(signals(time), FILE, JOINTS)[1] == []
+    assert as_sampled(signals(time), FILE)[1] == []
 
 
 @pytest.mark.slow
@@ -108,7 +107,7 @@ def test_no_times_ask_for_many_more_rows_than_there_are_samples(gaps):
     if not (np.diff(time) > 0).all():
         return
     try:
-        pieces, _ = as_sampled(signals(time), FILE, JOINTS)
+        pieces, _ = as_sampled(signals(time), FILE)
     except InputError:
         return
     for piece in pieces:
@@ -124,7 +123,7 @@ def test_conditioning_asks_for_no_rows_across_a_hole():
 @pytest.mark.parametrize("hold", [2, 3, 5])
 def test_held_positions_are_taken_at_the_rate_of_their_updates(hold):
     held = signals(np.arange(1500) / 500, hold)
-    (piece,), (said,) = as_sampled(held, FILE, JOINTS)
+    (piece,), (said,) = as_sampled(held, FILE)
     np.testing.assert_array_equal(piece.time, held.time[::hold])
     np.testing.assert_array_equal(piece.q, held.q[::hold])
     assert f"positions change at {500 / hold:.4g} Hz, samples are stamped at 500 Hz" in said.say
@@ -134,7 +133,7 @@ def test_a_standstill_of_held_positions_is_no_hole():
     time = np.arange(3000) / 500
     moved = np.minimum(time, 2.0) + np.maximum(time - 4.0, 0.0)  # stands from 2 s to 4 s
     held = replace(signals(time), q=np.column_stack([np.sin(2 * moved), np.cos(3 * moved)])[np.arange(3000) // 3 * 3])
-    (piece,), _ = as_sampled(held, FILE, JOINTS)
+    (piece,), _ = as_sampled(held, FILE)
     assert np.diff(piece.time).max() < 0.01
     assert len(piece.time) == 1000
 
@@ -144,14 +143,14 @@ def test_a_robot_that_stands_or_creeps_is_not_held():
     still = replace(signals(time), q=np.zeros((1000, 2)))
     creeping = replace(signals(time), q=np.column_stack([np.round(0.1 * time, 3), np.zeros(1000)]))
     for each in (still, creeping):
-        assert as_sampled(each, FILE, JOINTS) == ([each], [])
+        assert as_sampled(each, FILE) == ([each], [])
 
 
 def test_the_cutoff_of_held_positions_is_that_of_the_motion():
     whole = as_run(swing(ROBOT, 1, 20.0, rate=500.0))
     rows = np.arange(len(whole.signals.time)) // 3 * 3
     held = replace(whole, signals=replace(whole.signals, q=whole.signals.q[rows]))
-    (piece,), _ = as_sampled(held.signals, FILE, JOINTS)
+    (piece,), _ = as_sampled(held.signals, FILE)
     assert choose_cutoff([replace(held, signals=piece)]) == pytest.approx(choose_cutoff([whole]), rel=0.2)
 
 

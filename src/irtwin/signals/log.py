@@ -342,7 +342,7 @@ def _runs(
         if role == PLANNED:
             signals = signals.motion
             check_plan(signals, path)
-        pieces, sampled = as_sampled(signals, path, robot.joint_names)
+        pieces, sampled = as_sampled(signals, path, () if role == PLANNED else robot.joint_names)
         repairs += dropped
         findings += sampled
         run = Run(

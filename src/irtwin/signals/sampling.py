@@ -29,16 +29,17 @@ def interval(time: np.ndarray) -> float:
     return float(max(np.median(gaps), np.quantile(gaps, 0.9) / _BURST))
 
 
-def as_sampled(signals: Signals, path: Path, joints: Sequence[str]) -> tuple[list[Signals], list[LogFinding]]:
+def as_sampled(signals: Signals, path: Path, joints: Sequence[str] = ()) -> tuple[list[Signals], list[LogFinding]]:
     """Return a run's samples at the rate at which they were taken, in pieces without a hole; say what was done.
 
-    Held positions: one sample of each update stays. Samples at which a channel froze are left out. So is a piece of
-    fewer than 20 samples. A run that has none of these comes back as it is. Raises InputError where no piece is left,
-    or there are more than 100.
+    Held positions: one sample of each update stays. Samples at which a channel of the `joints` froze are left out; none
+    of a motion that nobody measured. A piece of fewer than 20 samples is left out. A run that has none of these comes
+    back as it is. Raises InputError where no piece is left, or there are more than 100.
     """
     signals, note = _without_held(signals, path)
-    signals, lost = _without_frozen(signals, path, joints)
-    note += lost
+    if joints:
+        signals, lost = _without_frozen(signals, path, joints)
+        note += lost
     pieces = _cut(signals)
     if len(pieces) == 1:
         return pieces, note

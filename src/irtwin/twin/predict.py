@@ -41,8 +41,7 @@ def predict(twin: Twin, run: Run) -> pa.Table:
     One row per sample of the run, as it was logged, less those between holes in time that follow each other too soon;
     power only where the twin has an effect of it. Raises InputError on a run that has nothing but holes.
     """
-    moved = replace(run.signals, torque=None, power=None)  # what froze of these is predicted all the same
-    pieces, _ = as_sampled(moved, run.file, twin.robot.joint_names)
+    pieces, _ = as_sampled(run.signals, run.file)
     return pa.concat_tables([_piece(twin, replace(run, signals=piece), run.signals.time) for piece in pieces])
 
 
