@@ -257,6 +257,12 @@ CASES = [
         ),
     ),
     Case(load.CableDrag(joints=J2), {("k", "joint_2"): 6.0}, lambda s: only(6 * s.motion.q[:, 1]), off=0.1),
+    Case(
+        load.CableDrag(stiffens=True, joints=J2),
+        {("k", "joint_2"): 6.0},
+        lambda s: only(6 * (s.motion.q[:, 1] - 0.3) + 4 * (s.motion.q[:, 1] - 0.3) ** 3),
+        off=0.1,
+    ),
     # a spring without length of its own: of one order, which gravity itself imitates
     Case(load.GravityCompensation(joints=J2), {}, lambda s: only(-80 * np.sin(2 * s.motion.q[:, 1] - 0.4))),
     Case(load.Payload(runs=("swing_1",)), {("m", None): 2.0, ("c_x", None): 0.05, ("c_z", None): 0.1}, ball, off=0.05),

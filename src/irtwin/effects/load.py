@@ -46,53 +46,88 @@ def balanced_joint(robot: Robot) -> str:
 
 @dataclass(frozen=True)
 class CableDrag(JointEffect):
-    """k (q - q0): a hose package that pulls. Its constant part is a twin's torque offset."""
+    """k (q - q0), or k (q - q0) + c (q - q0)^3 of one that `stiffens`: a hose package that pulls.
+
+    Its constant part is a twin's torque offset.
+    """
 
     id: ClassVar[str] = "cable_drag"
     family: ClassVar[str] = "load"
     never_changed: ClassVar[bool] = True
     taken_off: ClassVar[str | None] = "with the hose package off"
 
+    stiffens: bool = False
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return one as stiff wherever the joint is, and one that stiffens as it is stretched."""
+        return self.variants(stiffens=(False, True))
+
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return k."""
-        return (Term("k", f"{force_unit(joint)}/{joint.unit}", joint.name, spread=20.0),)
+        """Return what goes with the angle, N m/rad, and of one that stiffens with its square and cube, N m at 1 rad."""
+        straight = Term("k", f"{force_unit(joint)}/{joint.unit}", joint.name, spread=20.0)
+        if not self.stiffens:
+            return (straight,)
+        square, cube = (Term(f"c {power}", force_unit(joint), joint.name, spread=10.0) for power in (2, 3))
+        return straight, square, replace(cube, lowest=0.0)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return q."""
-        return (motion.q,)
+        """Return q, and of one that stiffens its square and cube."""
+        return tuple(motion.q**power for power in range(1, 4 if self.stiffens else 2))
+
+    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
+        """Return k, the stiffness where it is least: where the hose is at rest."""
+        if not self.stiffens:
+            return super().parameters(robot, given)
+        quantities = []
+        for place, joint in enumerate(self.acting(robot)):
+            own = slice(3 * place, 3 * place + 3)
+            least, slope = _least_stiffness(*given.values[own])
+            deviation = float(np.sqrt(slope @ given.covariance[own, own] @ slope))
+            quantities.append(quantity("k", joint.name, least, f"{force_unit(joint)}/{joint.unit}", deviation))
+        return tuple(quantities)
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return that a hose pulls back."""
         return {"k": Possible(0.0, np.inf, "a hose pulls a joint back to where it is at rest")}
 
     def changes(self) -> tuple[Effect, ...]:
-        """Return the change of the constant part, too: no offset beside it has to bring that."""
-        return (ChangedCableDrag(joints=self.joints, runs=self.runs),)
+        """Return the changes of the constant part, too: no offset beside it has to bring that."""
+        changed = ChangedCableDrag(joints=self.joints, runs=self.runs)
+        return changed.candidates()
+
+
+def _least_stiffness(straight: float, square: float, cube: float) -> tuple[float, np.ndarray]:
+    """Return the least of (straight + 2 square q + 3 cube q^2), and how it goes with each of the three."""
+    if cube <= 0:
+        return straight, np.array([1.0, 0.0, 0.0])
+    turned = square / (3 * cube)
+    return straight - turned * square, np.array([1.0, -2 * turned, 3 * turned**2])
 
 
 @dataclass(frozen=True)
 class ChangedCableDrag(CableDrag):
-    """k q - k q0: a hose that pulls from elsewhere, or otherwise, than in the runs before."""
+    """The same with its constant part: a hose that pulls from elsewhere, or otherwise, than in the runs before."""
 
     of_change: ClassVar[bool] = True
     never_changed: ClassVar[bool] = False
 
     def standing(self) -> Effect:
         """Return it in a twin, whose torque offset has the constant part."""
-        return CableDrag(joints=self.joints, runs=self.runs)
+        return CableDrag(self.stiffens, joints=self.joints, runs=self.runs)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return k and k q0."""
+        """Return the terms of a hose, and k q0."""
         return (*super().joint_terms(joint), Term("k q0", force_unit(joint), joint.name, spread=20.0))
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return q and -1."""
-        return motion.q, np.full_like(motion.q, -1.0)
+        """Return those of a hose, and -1."""
+        return (*super().samples(robot, motion, predicted), np.full_like(motion.q, -1.0))
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k."""
-        own = slice(None, None, 2)
-        return self.standing().parameters(robot, Coefficients(given.values[own], given.covariance[own, own]))
+        of_joint = len(given.values) // len(self.acting(robot))
+        own = np.flatnonzero(np.arange(len(given.values)) % of_joint < of_joint - 1)
+        return self.standing().parameters(robot, Coefficients(given.values[own], given.covariance[np.ix_(own, own)]))
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def attribute(
     shapes = [before.variant(place) for place in range(len(before.hypotheses))]
     visible = search.projection(noise).visible(shapes)
     structure, noise = search.settled(*search.pruned(*search.forward(before, noise)))
-    structure, noise = search.pruned(*search.paired(structure, noise))
+    structure, noise = search.likeliest(*search.pruned(*search.paired(structure, noise)))
     after = search.beside(structure, noise)
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
     beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
@@ -95,7 +95,7 @@ class _Search:
     prior: HypothesisPrior
     limits: Criterion
     floor: np.ndarray | None
-    tried: dict[tuple[bytes, bytes], Posterior] = field(default_factory=dict)
+    tried: dict[tuple[object, ...], Posterior] = field(default_factory=dict)
     leaves: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
     projections: dict[bytes, Projection] = field(default_factory=dict)  # by the noise of the last looks
 
@@ -107,9 +107,13 @@ class _Search:
         return self.tried[asked]
 
     def instead(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
-        """Try what may stand in the place of one hypothesis of a structure, beside the others."""
+        """Try what may stand in the place of one hypothesis of a structure, beside the others, once."""
         rest = [other for other in structure if other is not member]
-        return self._beside(rest, noise, [candidate for candidate in self.candidates if overlap(candidate, member[0])])
+        asked = np.sort(_columns(rest)).tobytes(), noise.tobytes(), _place(member[0])
+        if asked not in self.tried:
+            near = [candidate for candidate in self.candidates if overlap(candidate, member[0])]
+            self.tried[asked] = self._beside(rest, noise, near)
+        return self.tried[asked]
 
     def _beside(
         self, structure: Sequence[Member], noise: np.ndarray, some: Sequence[Hypothesis] | None = None
@@ -207,7 +211,7 @@ class _Search:
             if sorted(_columns(structure)) == sorted(_columns(before)):
                 break
             noise = self.left(structure, noise)
-            if {_place(member) for member, _ in structure} == {_place(member) for member, _ in before}:
+            if _places(structure) == _places(before):
                 break
         return structure, noise
 
@@ -218,12 +222,29 @@ class _Search:
             for one, other in track(pairs, "two causes of one joint looked for anew"):
                 rest = [each for each in structure if each is not one and each is not other]
                 pair = self.likeliest_pair(rest, noise, one[0])
-                if pair and {_place(each) for each, _ in pair} != {_place(one[0]), _place(other[0])}:
+                if pair and _places(pair) != _places([one, other]):
                     break
             else:
                 break
-            structure = [*rest, *pair]
+            before, structure = _places(structure), [*rest, *pair]
             structure, noise = self.settled(structure, self.left(structure, noise))
+            if _places(structure) == before:
+                break
+        return structure, noise
+
+    def likeliest(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
+        """Put what is likelier in the place of one hypothesis there: it was judged by what fewer had left."""
+        for _ in range(_SWEEPS):
+            for place, member in enumerate(structure):
+                posterior = self.instead(member, structure, noise)
+                other = posterior.likeliest_at(member[0])
+                if _place(posterior.hypotheses[other]) != _place(member[0]):
+                    structure = [*structure]
+                    structure[place] = posterior.hypotheses[other], posterior.variant(other)
+                    noise = self.left(structure, noise)
+                    break
+            else:
+                break
         return structure, noise
 
     def likeliest_pair(self, rest: Sequence[Member], noise: np.ndarray, like: Hypothesis) -> list[Member]:
@@ -324,6 +345,10 @@ def _columns(structure: Sequence[Member]) -> list[int]:
 
 def _place(one: Hypothesis) -> tuple[str, str, str | None]:
     return one.effect, one.scope, one.joint
+
+
+def _places(structure: Sequence[Member]) -> set[tuple[str, str, str | None]]:
+    return {_place(member) for member, _ in structure}
 
 
 def _where(one: Hypothesis) -> tuple[str | None, str]:
