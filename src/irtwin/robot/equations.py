@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,8 @@ MOST_JOINTS = 3  # that move: the terms of more fill pages, and nobody reads the
 _DUST = 1e-13  # of the largest coefficient: what rounding leaves
 _DIGITS = 6  # of a coefficient that is shown
 _STATES = 20  # at which the equations are held against Pinocchio
+_WAVES = np.array([0, 1, 2, -2, -1])  # of an angle, in the order of a Fourier transform
+_ANGLES, _LENGTHS = 2 * np.pi * np.arange(5) / 5, np.array([-1.0, 0.0, 1.0])  # rad, m: as many as tell them apart
 
 
 @dataclass(frozen=True)
@@ -72,10 +75,11 @@ def equations(robot: Robot) -> EquationsOfMotion:
             "For longer chains, `irtwin predict` computes the torque"
         )
     sympy = _library()
-    mass, height = _Chain(robot).energies()
+    mass, height = _energies(robot)
     q, dq, _ = _symbols(len(robot.joints))
     gravity = sympy.Matrix([sympy.diff(height, position) for position in q])
-    speed = sympy.Matrix([_speed_terms(mass, q, dq, joint) for joint in range(len(q))])
+    least = _DUST * max(map(abs, mass.atoms(sympy.Float)), default=0.0)
+    speed = sympy.Matrix([_speed_terms(mass, q, dq, joint, least) for joint in range(len(q))])
     derived = EquationsOfMotion(robot.joint_names, mass, speed, gravity, 0.0)
     return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, derived))
 
@@ -95,153 +99,69 @@ def _symbols(joints: int) -> tuple[list[Any], list[Any], list[Any]]:
     return q, dq, ddq
 
 
-def _speed_terms(mass: Any, q: list[Any], dq: list[Any], joint: int) -> Any:
-    """Return Coriolis and centrifugal torque: the Christoffel symbols of the mass matrix times speeds."""
+def _speed_terms(mass: Any, q: list[Any], dq: list[Any], joint: int, least: float) -> Any:
+    """Return Coriolis and centrifugal torque: the Christoffel symbols of the mass matrix times speeds.
+
+    Coefficients below the `least` are left out: what rounding leaves of terms that cancel.
+    """
     total = _library().Integer(0)
     for j, k in product(range(len(q)), repeat=2):
         if k < j:
             continue
         symbol = mass[joint, j].diff(q[k]) + mass[joint, k].diff(q[j]) - mass[j, k].diff(q[joint])
-        total += (symbol / 2 if j == k else symbol).expand() * dq[j] * dq[k]
+        terms = (symbol / 2 if j == k else symbol).expand().as_coefficients_dict().items()
+        total += sum(value * wave for wave, value in terms if abs(value) > least) * dq[j] * dq[k]
     return total
 
 
-class _Chain:
-    """Kinetic and potential energy in a ring of polynomials in the cosine, sine and value of each joint's position."""
+def _energies(robot: Robot) -> tuple[Any, Any]:
+    """Return the mass matrix (n, n), kg m^2 (kg m, kg), and the potential energy, J.
 
-    def __init__(self, robot: Robot) -> None:
-        from sympy.polys.domains import RR
-        from sympy.polys.rings import ring
-
-        self._robot, self._model = robot, robot.model
-        count = len(robot.joints)
-        names = [f"{sign}{n}" for sign in ("c", "s", "x") for n in range(1, count + 1)]
-        self._ring, *signs = ring(names, RR)
-        self._cos, self._sin, self._slide = signs[:count], signs[count : 2 * count], signs[2 * count :]
-        self._count = count
-
-    def energies(self) -> tuple[Any, Any]:
-        """Return the mass matrix (n, n), and the potential energy, J."""
-        count, model = self._count, self._model
-        turns, places, axes = self._kinematics()
-        mass = np.full((count, count), self._ring.zero, dtype=object)
-        potential = self._ring.zero
-        for body in range(1, count + 1):
-            inertia = model.inertias[body]
-            centre = places[body] + self._times(turns[body], self._numbers(inertia.lever))
-            potential = potential - self._times(self._numbers(model.gravity.linear * inertia.mass), centre)
-            line = np.full((3, count), self._ring.zero, dtype=object)  # m/s of the centre of mass a rad/s (m/s)
-            turn = line.copy()  # rad/s in the body's own axes
-            joint = body
-            while joint > 0:
-                axis = axes[joint]
-                if self._robot.joints[joint - 1].kind == "prismatic":
-                    line[:, joint - 1] = axis
-                else:
-                    line[:, joint - 1] = self._reduced(np.cross(axis, centre - places[joint]))
-                    turn[:, joint - 1] = self._times(turns[body].T, axis)
-                joint = model.parents[joint]
-            moments = self._numbers(np.array(inertia.inertia))
-            mass = mass + self._times(line.T, line) * inertia.mass
-            mass = mass + self._times(turn.T, self._times(moments, turn))
-        sympy = _library()
-        largest = max((abs(value) for entry in mass.flat for value in entry.values()), default=1.0)
-        return sympy.Matrix(count, count, [self._waves(entry, largest) for entry in mass.flat]), self._waves(
-            potential, max((abs(value) for value in potential.values()), default=1.0)
-        )
-
-    def _kinematics(self) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-        """Return turns (3, 3), origins (3,) and axes (3,) of the joints in the base frame; the first is the base."""
-        turns, places = [self._numbers(np.eye(3))], [self._numbers(np.zeros(3))]
-        axes = [self._numbers(np.zeros(3))]
-        data = self._model.createData()
-        pin.computeJointJacobians(self._model, data, np.zeros(self._count))
-        columns = np.reshape(data.J, (6, -1))
-        for number, joint in enumerate(self._robot.joints, start=1):
-            slides = joint.kind == "prismatic"
-            parent, before = self._model.parents[number], self._model.jointPlacements[number]
-            axis = data.oMi[number].rotation.T @ columns[: 3 if slides else 6, number - 1][-3:]
-            place = places[parent] + self._times(turns[parent], self._numbers(before.translation))
-            turn = self._times(turns[parent], self._numbers(before.rotation))
-            along = self._times(turn, self._numbers(axis))
-            if slides:
-                place = place + along * self._slide[number - 1]
-            else:
-                across = pin.skew(axis)
-                own = self._numbers(np.eye(3)) + self._numbers(across) * self._sin[number - 1]
-                own = own + self._numbers(across @ across) * (1 - self._cos[number - 1])
-                turn = self._times(turn, own)
-            turns.append(turn)
-            places.append(place)
-            axes.append(along)
-        return turns, places, axes
-
-    def _numbers(self, values: np.ndarray) -> np.ndarray:
-        """Return numbers as elements of the ring, the dust of rounding at zero."""
-        tidy = np.where(np.abs(values) < 1e-15, 0.0, values)
-        return np.asarray(np.vectorize(lambda value: self._ring(float(value)), otypes=[object])(tidy))
-
-    def _times(self, left: np.ndarray, right: np.ndarray) -> Any:
-        return self._reduced(left @ right)
-
-    def _reduced(self, values: Any) -> Any:
-        """Put 1 - c^2 for s^2 wherever it stands, so that equal polynomials look equal."""
-        if isinstance(values, np.ndarray):
-            return np.vectorize(self._reduced, otypes=[object])(values)
-        for cosine, sine in zip(self._cos, self._sin, strict=True):
-            place = next(k for k, generator in enumerate(self._ring.gens) if generator == sine)
-            while any(powers[place] > 1 for powers in values):
-                kept = self._ring.zero
-                for powers, factor in values.items():
-                    term = self._ring({powers: factor})
-                    if powers[place] > 1:
-                        lower = tuple(power - 2 * (k == place) for k, power in enumerate(powers))
-                        term = self._ring({lower: factor}) * (1 - cosine**2)
-                    kept = kept + term
-                values = kept
-        return values
-
-    def _waves(self, polynomial: Any, largest: float) -> Any:
-        """Return a polynomial as a sum of cosines and sines of sums of positions, times powers of those that slide.
-
-        Coefficients below the dust of `largest` are left out.
-        """
-        sympy = _library()
-        count = self._count
-        q, *_ = _symbols(count)
-        waves: dict[tuple[tuple[int, ...], tuple[int, ...]], complex] = {}
-        for powers, factor in polynomial.items():
-            spectrum = {(0,) * count: complex(factor)}
-            for joint in range(count):
-                for half in [(0.5, 0.5)] * powers[joint] + [(-0.5j, 0.5j)] * powers[count + joint]:
-                    spectrum = _shifted(spectrum, joint, half)
-            for wave, amplitude in spectrum.items():
-                key = (wave, tuple(powers[2 * count :]))
-                waves[key] = waves.get(key, 0.0) + amplitude
-        terms = []
-        for (wave, slides), amplitude in sorted(waves.items(), reverse=True):
-            first = next((k for k in wave if k), 0)
-            if first < 0:  # the conjugate of one that is counted
-                continue
-            angle = sum(k * position for k, position in zip(wave, q, strict=True))
-            along = sympy.prod(position**power for position, power in zip(q, slides, strict=True))
-            for value, function in ((amplitude.real, sympy.cos), (-amplitude.imag, sympy.sin)):
-                value = value * (2.0 if first else 1.0)
-                if abs(value) > _DUST * largest:
-                    terms.append(sympy.Float(value) * along * function(angle))
-        return sympy.Add(*terms)
+    Of the position of a joint that turns they have waves of up to twice the angle, of one that slides powers of up to
+    two: what Pinocchio says at a few positions of each joint determines them.
+    """
+    count, model, data = len(robot.joints), robot.model, robot.model.createData()
+    slides = [joint.kind == "prismatic" for joint in robot.joints]
+    poses = np.stack(np.meshgrid(*(_LENGTHS if each else _ANGLES for each in slides), indexing="ij"), axis=-1)
+    upper = np.triu([[pin.crba(model, data, q)] for q in poses.reshape(-1, count)])
+    height = [pin.computePotentialEnergy(model, data, q) for q in poses.reshape(-1, count)]
+    mass = _coefficients((upper + np.triu(upper, 1).swapaxes(-1, -2)).reshape(*poses.shape[:-1], count, count), slides)
+    entries = [_in_symbols(mass[..., row, column], slides, mass) for row, column in np.ndindex(count, count)]
+    potential = _coefficients(np.reshape(height, poses.shape[:-1]), slides)
+    return _library().Matrix(count, count, entries), _in_symbols(potential, slides, potential)
 
 
-def _shifted(
-    spectrum: dict[tuple[int, ...], complex], joint: int, half: tuple[complex, complex]
-) -> dict[tuple[int, ...], complex]:
-    """Multiply a spectrum by a cosine or a sine of a joint's position: half of it a step up, half a step down."""
-    result: dict[tuple[int, ...], complex] = {}
-    for wave, amplitude in spectrum.items():
-        for step, factor in zip((1, -1), half, strict=True):
-            key = tuple(k + step * (place == joint) for place, k in enumerate(wave))
-            result[key] = result.get(key, 0.0) + amplitude * factor
-    return result
+def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
+    """Return of values at all poses, an axis a joint, the coefficients of waves, and of powers where a joint slides."""
+    for axis, each in enumerate(slides):
+        if each:
+            powers = np.linalg.inv(np.vander(_LENGTHS, increasing=True))
+            values = np.moveaxis(np.tensordot(powers, values, (1, axis)), 0, axis)
+        else:
+            values = np.fft.fft(values, axis=axis, norm="forward")
+    return values
+
+
+def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.ndarray) -> Any:
+    """Return a sum of cosines and sines of sums of positions, times powers of those that slide.
+
+    Coefficients below the dust of the largest `beside` them are left out.
+    """
+    sympy = _library()
+    q, *_ = _symbols(len(slides))
+    terms = []
+    for place, amplitude in np.ndenumerate(coefficients):
+        wave = [0 if each else int(_WAVES[k]) for k, each in zip(place, slides, strict=True)]
+        first = next((k for k in wave if k), 0)
+        if first < 0:  # the conjugate of one that is counted
+            continue
+        angle = sum(k * position for k, position in zip(wave, q, strict=True))
+        along = sympy.prod(position**k for k, position, each in zip(place, q, slides, strict=True) if each)
+        for value, function in ((amplitude.real, sympy.cos), (-amplitude.imag, sympy.sin)):
+            value = value * (2.0 if first else 1.0)
+            if abs(value) > _DUST * np.abs(beside).max():
+                terms.append(sympy.Float(value) * along * function(angle))
+    return sympy.Add(*terms)
 
 
 def _deviation(robot: Robot, derived: EquationsOfMotion) -> float:
