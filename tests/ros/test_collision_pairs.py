@@ -60,7 +60,7 @@ def test_of_the_kr6_what_never_meets_is_what_does_not_at_other_poses() -> None:
     met = model.ever_meeting(np.random.default_rng(7).uniform(lower, upper, (2000, 6)))
     never = {frozenset(pair) for pair, reason in found.items() if reason == "Never"}
     assert not never & met
-    shaped = [link.name for link in robot.links if link.collisions]
+    shaped = model.shaped
     assert met <= {frozenset(pair) for pair in combinations(shaped, 2)} - {frozenset(pair) for pair in found}
 
 

@@ -19,8 +19,9 @@ from tests.system.ros_facts import facts
 from tests.system.ros_screen import HEIGHT, WIDTH, screen, started
 
 from irtwin import resources
-from irtwin.robot.description import Robot, Shape
+from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements, placements
+from irtwin.robot.structure import Solid, structure_of
 from irtwin.robot.urdf import read_urdf
 from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
@@ -60,7 +61,7 @@ def run(robot: Robot) -> Signals:
     return signals.rows(slice(0, 400))
 
 
-def points(shape: Shape) -> np.ndarray:
+def points(shape: Solid) -> np.ndarray:
     """Return points all over a shape's surface, (N, 3) m in the link's frame."""
     grid = np.linspace(-0.5, 0.5, 25)
     turn, high = (part.ravel() for part in np.meshgrid(np.linspace(0, 2 * np.pi, 60), grid))
@@ -80,7 +81,8 @@ def points(shape: Shape) -> np.ndarray:
         found = shape.size[0] * np.column_stack(
             [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
         )
-    return found @ shape.placement[:3, :3].T + shape.placement[:3, 3]
+    place = shape.origin.transform
+    return found @ place[:3, :3].T + place[:3, 3]
 
 
 def expected(robot: Robot, q: np.ndarray, view: dict[str, float]) -> np.ndarray:
@@ -88,9 +90,9 @@ def expected(robot: Robot, q: np.ndarray, view: dict[str, float]) -> np.ndarray:
     places = link_placements(robot, q)
     cloud = np.concatenate(
         [
-            points(shape) @ places[link.name][:3, :3].T + places[link.name][:3, 3]
-            for link in robot.links
-            for shape in link.shapes
+            points(shape) @ places[shape.link][:3, :3].T + places[shape.link][:3, 3]
+            for shape in structure_of(robot).solids
+            if shape.purpose == "visual" and shape.kind != "mesh"
         ]
     )
     back = np.array(

@@ -11,7 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.errors import InputError
-from irtwin.robot.description import Robot, Shape
+from irtwin.robot.description import Robot
+from irtwin.robot.structure import PRIMITIVES, Solid, structure_of
 
 STEP = 1e-3  # m: how far the fastest point moves between two checks, at most
 _PROBES = 300  # random poses at which pairs that always touch are found
@@ -61,13 +62,14 @@ class CollisionModel:
         self._names: list[str] = []
         self._margin = 0.0
         self._nearest = 0  # pair
-        shapes = sum(len(link.collisions) for link in robot.links) + len(obstacles)
+        solids = [one for one in structure_of(robot).solids if one.purpose == "collision" and one.kind in PRIMITIVES]
+        shapes = len(solids) + len(obstacles)
         if shapes > _MOST_SHAPES:
             raise InputError(
                 f"{robot.name}: {shapes} collision shapes and boxes cannot be checked; give at most "
                 f"{_MOST_SHAPES}, coarser ones"
             )
-        self._add_links()
+        self._add_links(solids)
         if obstacles and not self._names:
             raise InputError(
                 f"{robot.name}: its URDF has no collision shapes, so nothing can be kept off a box; "
@@ -83,9 +85,14 @@ class CollisionModel:
         return self._own > 0
 
     @property
+    def shaped(self) -> tuple[str, ...]:
+        """The links with collision shapes."""
+        return tuple(dict.fromkeys(self._names))
+
+    @property
     def unchecked(self) -> tuple[str, ...]:
         """The links with mass but without collision shapes, which nothing is kept off."""
-        return tuple(link.name for link in self._robot.links if link.mass > 0 and not link.collisions)
+        return tuple(link.name for link in self._robot.links if link.mass > 0 and link.name not in self._names)
 
     @property
     def own_pairs(self) -> frozenset[frozenset[str]]:
@@ -194,16 +201,15 @@ class CollisionModel:
             levers.append(lever)
         return np.array(levers)
 
-    def _add_links(self) -> None:
-        for link in self._robot.links:
-            frame = self._model.frames[self._model.getFrameId(link.name, pin.FrameType.BODY)]
-            for number, shape in enumerate(link.collisions):
-                place = frame.placement * pin.SE3(shape.placement)
-                solid = _solid(shape, f'{self._robot.name}: collision shape of link "{link.name}"')
-                self._names.append(link.name)
-                self._geometry.addGeometryObject(
-                    pin.GeometryObject(f"{link.name} {number}", frame.parentJoint, place, solid)
-                )
+    def _add_links(self, solids: Sequence[Solid]) -> None:
+        for number, solid in enumerate(solids):
+            frame = self._model.frames[self._model.getFrameId(solid.link, pin.FrameType.BODY)]
+            place = frame.placement * pin.SE3(solid.origin.transform)
+            shape = _shape(solid, f'{self._robot.name}: collision shape of link "{solid.link}"')
+            self._names.append(solid.link)
+            self._geometry.addGeometryObject(
+                pin.GeometryObject(f"{solid.link} {number}", frame.parentJoint, place, shape)
+            )
 
     def _pair_links(self) -> None:
         parents, objects = self._model.parents, list(self._geometry.geometryObjects)
@@ -263,12 +269,12 @@ def joined(parents: Sequence[int], one: int, other: int) -> bool:
     return one == other or parents[one] == other or parents[other] == one
 
 
-def _solid(shape: Shape, where: str) -> coal.ShapeBase:
-    if not all(_SMALLEST <= length <= _LARGEST for length in shape.size):
-        raise InputError(f"{where}: a {shape.kind} of {' '.join(f'{length:g}' for length in shape.size)} m has no size")
-    if shape.kind == "box":
-        return coal.Box(*shape.size)
-    return coal.Cylinder(*shape.size) if shape.kind == "cylinder" else coal.Sphere(*shape.size)
+def _shape(solid: Solid, where: str) -> coal.ShapeBase:
+    if not all(_SMALLEST <= length <= _LARGEST for length in solid.size):
+        raise InputError(f"{where}: a {solid.kind} of {' '.join(f'{length:g}' for length in solid.size)} m has no size")
+    if solid.kind == "box":
+        return coal.Box(*solid.size)
+    return coal.Cylinder(*solid.size) if solid.kind == "cylinder" else coal.Sphere(*solid.size)
 
 
 def _radius(solid: coal.ShapeBase) -> float:

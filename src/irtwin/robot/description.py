@@ -47,26 +47,11 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Shape:
-    """A shape of a link: "box" (x, y, z), "cylinder" (radius, length), "sphere" (radius), in m.
-
-    `placement` is the (4, 4) transform from the shape's frame to the link's; `colour` is RGBA in 0..1.
-    """
-
-    kind: str
-    size: tuple[float, ...]
-    placement: np.ndarray
-    colour: tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
 class Link:
-    """A rigid body, nominal inertia as the URDF gives it: mass in kg; its visual shapes, and those that collide."""
+    """A rigid body, nominal inertia as the URDF gives it: mass in kg."""
 
     name: str
     mass: float
-    shapes: tuple[Shape, ...] = ()
-    collisions: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)

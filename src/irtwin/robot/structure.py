@@ -5,7 +5,7 @@ Meshes are named, never opened.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -14,10 +14,12 @@ import pinocchio as pin
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.robot.description import Robot
-from irtwin.robot.urdf import numbers
+from irtwin.robot.xml_elements import numbers
 
 Three = tuple[float, float, float]
+Colours = Mapping[str | None, Element | None]
 _SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ()}
+PRIMITIVES = ("box", "cylinder", "sphere")
 PURPOSES = ("visual", "collision")
 
 
@@ -74,7 +76,8 @@ class Connection:
 
 @dataclass(frozen=True)
 class Solid:
-    """A shape of a link, for the eye or against collisions; sizes in m by `kind`, as in robot.description.Shape.
+    """A shape of a link, for the eye or against collisions: "box" (x, y, z), "cylinder" (radius, length), "sphere"
+    (radius), m.
 
     Of a "mesh", `file` is its path as the URDF writes it, and `size` the factors that it is stretched by. `colour` is
     RGBA in 0..1, None where none is given.
@@ -112,12 +115,44 @@ def structure_of(robot: Robot) -> Structure:
     while todo:
         order.append(todo.pop())
         todo += reversed(children.get(order[-1], []))
-    colours = {material.get("name"): material.find("color") for material in root.findall("material")}
+    colours, source = colours_of(root), f"URDF of {robot.name}"
     return Structure(
         tuple(_body(name, links[name]) for name in order),
         tuple(_connection(joints[name], name, moving) for name in order if name in joints),
-        tuple(solid for name in order for solid in _solids(robot.name, name, links[name], colours)),
+        tuple(solid for name in order for solid in solids_of(links[name], colours, source)),
     )
+
+
+def colours_of(root: Element) -> Colours:
+    """Return the colours that shapes of a URDF have by name."""
+    return {material.get("name"): material.find("color") for material in root.findall("material")}
+
+
+def solids_of(link: Element, colours: Colours, source: str, kinds: Collection[str] = tuple(_SIZES)) -> Iterator[Solid]:
+    """Yield a link's shapes of some kinds. Raises InputError, naming `source` and link, where one cannot be read."""
+    name = str(link.get("name"))
+    for purpose in PURPOSES:
+        where = f'{source}: {purpose} of link "{name}"'
+        for element in link.findall(purpose):
+            geometry = element.find("geometry")
+            shape = geometry[0] if geometry is not None and len(geometry) else None
+            if shape is None or shape.tag not in kinds:
+                continue
+            size = tuple(value for key in _SIZES[shape.tag] for value in _size(shape, key, where))
+            file = None
+            if shape.tag == "mesh":
+                file, size = shape.get("filename", ""), numbers(shape.get("scale", "1 1 1"), 3, where)
+            colour = _colour(element, colours, where) if purpose == "visual" else None
+            yield Solid(name, purpose, shape.tag, size, origin_of(element, where), colour, file)
+
+
+def origin_of(element: Element, where: str = "URDF") -> Origin:
+    """Return an element's <origin>. Raises InputError, naming `where`, where it cannot be read."""
+    origin = element.find("origin")
+    if origin is None:
+        return Origin()
+    xyz, rpy = (numbers(origin.get(key, "0 0 0"), 3, where) for key in ("xyz", "rpy"))
+    return Origin(_three(xyz), _three(rpy))
 
 
 def _parent(joint: Element) -> str:
@@ -129,7 +164,7 @@ def _body(name: str, link: Element) -> Body:
     mass = None if inertial is None else inertial.find("mass")
     if inertial is None or mass is None:
         return Body(name, None, None, None)
-    origin = _origin(inertial)
+    origin = origin_of(inertial)
     moments = inertial.find("inertia")
     turned = None
     if moments is not None:
@@ -151,44 +186,20 @@ def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
     kind = str(joint.get("type")) if name in moving else "fixed"
     dynamics = joint.find("dynamics") if name in moving else None
     said = [numbers("0" if dynamics is None else dynamics.get(key, "0"), 1, name)[0] for key in ("damping", "friction")]
-    return Connection(name, kind, _parent(joint), child, _origin(joint), axis, *said)
-
-
-def _solids(robot: str, name: str, link: Element, colours: dict[str | None, Element | None]) -> Iterator[Solid]:
-    for purpose in PURPOSES:
-        where = f'URDF of {robot}: {purpose} of link "{name}"'
-        for element in link.findall(purpose):
-            geometry = element.find("geometry")
-            shape = geometry[0] if geometry is not None and len(geometry) else None
-            if shape is None or shape.tag not in _SIZES:
-                continue
-            size = tuple(value for key in _SIZES[shape.tag] for value in _size(shape, key, where))
-            file = None
-            if shape.tag == "mesh":
-                file, size = shape.get("filename", ""), numbers(shape.get("scale", "1 1 1"), 3, where)
-            colour = _colour(element, colours, where) if purpose == "visual" else None
-            yield Solid(name, purpose, shape.tag, size, _origin(element, where), colour, file)
+    return Connection(name, kind, _parent(joint), child, origin_of(joint), axis, *said)
 
 
 def _size(shape: Element, key: str, where: str) -> tuple[float, ...]:
     return numbers(shape.get(key), 3 if key == "size" else 1, where)
 
 
-def _colour(visual: Element, colours: dict[str | None, Element | None], where: str) -> tuple[float, ...] | None:
+def _colour(visual: Element, colours: Colours, where: str) -> tuple[float, ...] | None:
     material = visual.find("material")
     if material is None:
         return None
     colour = material.find("color")
     colour = colours.get(material.get("name")) if colour is None else colour
     return None if colour is None else tuple(numbers(colour.get("rgba"), 4, where))
-
-
-def _origin(element: Element, where: str = "URDF") -> Origin:
-    origin = element.find("origin")
-    if origin is None:
-        return Origin()
-    xyz, rpy = (numbers(origin.get(key, "0 0 0"), 3, where) for key in ("xyz", "rpy"))
-    return Origin(_three(xyz), _three(rpy))
 
 
 def _three(values: Sequence[float] | np.ndarray) -> Three:

@@ -7,21 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
-import numpy as np
-import pinocchio as pin
 from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
-from irtwin.robot.description import Joint, Link, Robot, Shape
+from irtwin.robot.description import Joint, Link, Robot
+from irtwin.robot.structure import PRIMITIVES, colours_of, origin_of, solids_of
+from irtwin.robot.xml_elements import numbers
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _LARGEST = 20_000_000  # bytes
 _MOST_LINKS = 5000
 _DEEPEST = 500  # links, base to flange: Pinocchio goes down the tree by recursion, and 5000 take the whole stack
 _MOST_JOINTS = 100  # that move
-_GREY = (0.7, 0.7, 0.72, 1.0)
 
 
 def read_urdf(path: Path | str) -> Robot:
@@ -70,7 +69,7 @@ def _parse(text: str, source: str) -> Element:
 
 
 def _links(root: Element, source: str) -> dict[str, Link]:
-    materials = {m.get("name"): m for m in root.findall("material") if m.find("color") is not None}
+    colours = colours_of(root)
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         name = _attribute(element, "name", source, "a link")
@@ -81,8 +80,8 @@ def _links(root: Element, source: str) -> dict[str, Link]:
         if value < 0:
             raise InputError(f'{source}: link "{name}" has the negative mass {value} kg')
         _check_inertia(element, f'{source}: inertia of link "{name}"')
-        shapes, collisions = (_shapes(element, kind, materials, source) for kind in ("visual", "collision"))
-        links[name] = Link(name, value, shapes, collisions)
+        list(solids_of(element, colours, source, PRIMITIVES))  # for their faults; meshes are read where they are opened
+        links[name] = Link(name, value)
     if len(links) > _MOST_LINKS:
         raise InputError(f"{source}: has {len(links)} links; a robot of more than {_MOST_LINKS} cannot be modelled")
     if not links:
@@ -92,7 +91,9 @@ def _links(root: Element, source: str) -> dict[str, Link]:
 
 def _check_inertia(link: Element, where: str) -> None:
     """Hold an inertia to be six numbers, none of its moments negative: Pinocchio would take anything for zero."""
-    _placement(link.find("inertial/origin"), where)
+    inertial = link.find("inertial")
+    if inertial is not None:
+        origin_of(inertial, where)
     inertia = link.find("inertial/inertia")
     if inertia is None:
         return
@@ -100,42 +101,6 @@ def _check_inertia(link: Element, where: str) -> None:
     negative = [key for key in ("ixx", "iyy", "izz") if values[key] < 0]
     if negative:
         raise InputError(f"{where}: {negative[0]} is negative, {values[negative[0]]} kg m^2")
-
-
-def _shapes(link: Element, kind: str, materials: dict[str | None, Element], source: str) -> tuple[Shape, ...]:
-    where = f'{source}: {kind} of link "{link.get("name")}"'
-    shapes = (_shape(element, materials, where) for element in link.findall(kind))
-    return tuple(shape for shape in shapes if shape is not None)
-
-
-def _shape(visual: Element, materials: dict[str | None, Element], where: str) -> Shape | None:
-    """Return the primitive of a <visual> or <collision>; None for a mesh, which is never opened."""
-    geometry = visual.find("geometry")
-    kind = geometry[0] if geometry is not None and len(geometry) else None
-    if kind is None or kind.tag == "mesh":
-        return None
-    if kind.tag == "box":
-        size = numbers(kind.get("size"), 3, where)
-    elif kind.tag == "cylinder":
-        size = (_number(kind.get("radius"), where), _number(kind.get("length"), where))
-    elif kind.tag == "sphere":
-        size = (_number(kind.get("radius"), where),)
-    else:
-        return None
-    material = visual.find("material")
-    if material is not None and material.find("color") is None:
-        material = materials.get(material.get("name"))
-    colour = None if material is None else material.find("color")
-    rgba = _GREY if colour is None else numbers(colour.get("rgba"), 4, where)
-    return Shape(kind.tag, size, _placement(visual.find("origin"), where), (rgba[0], rgba[1], rgba[2], rgba[3]))
-
-
-def _placement(origin: Element | None, where: str) -> np.ndarray:
-    if origin is None:
-        return np.eye(4)
-    rpy = numbers(origin.get("rpy", "0 0 0"), 3, where)
-    xyz = numbers(origin.get("xyz", "0 0 0"), 3, where)
-    return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(np.array(rpy)), np.array(xyz)).homogeneous)
 
 
 def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joint]:
@@ -152,7 +117,7 @@ def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joi
             link = None if child is None else child.get("link")
             if link not in links:
                 raise InputError(f'{where}: its {end} link "{link}" is not defined')
-        _placement(element.find("origin"), where)
+        origin_of(element, where)
         kind = element.get("type")
         if kind == "fixed":
             continue
@@ -236,15 +201,3 @@ def _attribute(element: Element, key: str, source: str, what: str) -> str:
 
 def _number(text: str | None, where: str) -> float:
     return numbers(text, 1, where)[0]
-
-
-def numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
-    """Return so many finite numbers of an attribute. Raises InputError, naming `where`, on anything else."""
-    try:
-        values = tuple(float(word) for word in (text or "").split())
-    except ValueError:
-        values = ()
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        shown = text if text is None or len(text) < 60 else f"{text[:60]}..."
-        raise InputError(f'{where}: "{shown}" should be {count} finite number{"s" if count > 1 else ""}')
-    return values

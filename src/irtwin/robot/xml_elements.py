@@ -1,11 +1,14 @@
-"""Elements of XML and where they stand among its bytes, so that one is changed and all else stays."""
+"""Elements of XML and where they stand among its bytes, so that one is changed and all else stays; their numbers."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
+
+from irtwin.errors import InputError
 
 _TAG = re.compile(rb"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
 
@@ -71,3 +74,15 @@ def with_child(content: bytes, element: Element, tag: str, text: str) -> bytes:
     place = own.rindex(b"</")
     gap = b"\n" if b"\n" in own else b""
     return before + own[:place].rstrip() + gap + text.encode() + gap + own[place:] + after
+
+
+def numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
+    """Return so many finite numbers of an attribute. Raises InputError, naming `where`, on anything else."""
+    try:
+        values = tuple(float(word) for word in (text or "").split())
+    except ValueError:
+        values = ()
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        shown = text if text is None or len(text) < 60 else f"{text[:60]}..."
+        raise InputError(f'{where}: "{shown}" should be {count} finite number{"s" if count > 1 else ""}')
+    return values

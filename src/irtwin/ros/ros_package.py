@@ -62,7 +62,7 @@ def write_package(robot: Robot, folder: Path, meshes: Mapping[str, bytes] | None
     write(folder / "urdf" / f"{made.robot.name}.urdf", made.urdf.encode())
     for place, template in _files(made.robot.name).items():
         write(folder / place, _templates().get_template(template).render(said).encode())
-    return [*made.said, *_unchecked(model, made.robot)]
+    return [*made.said, *_unchecked(model)]
 
 
 def _places(meshes: Mapping[str, bytes]) -> dict[str, str]:
@@ -109,9 +109,9 @@ def _chain(robot: Robot) -> list[str]:
     return links[::-1]
 
 
-def _unchecked(model: CollisionModel, robot: Robot) -> list[str]:
+def _unchecked(model: CollisionModel) -> list[str]:
     bare = model.unchecked
-    if len(bare) and not any(link.collisions for link in robot.links):
+    if bare and not model.shaped:
         return ["no link has collision shapes of boxes, cylinders or spheres: MoveIt checks nothing against the robot"]
     return [f"no collision shape of boxes, cylinders or spheres: {', '.join(bare)}"] if bare else []
 

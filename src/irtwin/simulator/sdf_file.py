@@ -13,8 +13,7 @@ import scipy
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
-from irtwin.robot.urdf import numbers
-from irtwin.robot.xml_elements import outermost, with_child
+from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
 from irtwin.simulator.model_file import ModelFile, Tag
 

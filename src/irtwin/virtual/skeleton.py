@@ -21,7 +21,7 @@ _FOOT = (0.35, 0.38, 0.42, 1.0)
 class Part:
     """A box, cylinder (along z), sphere or mesh, fixed to a joint's frame; `joint` is its column, -1 for the base.
 
-    size in m as in robot.description.Shape; of a mesh, named by `mesh`, the factors that it is stretched by. placement:
+    size in m as in robot.structure.Solid; of a mesh, named by `mesh`, the factors that it is stretched by. placement:
     (4, 4), in the joint's frame; colour: RGBA in 0..1.
     """
 
