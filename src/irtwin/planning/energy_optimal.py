@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
-from irtwin.planning.timing import MotionLimits, Timed, Torque, along, shares
+from irtwin.planning.timing import MotionLimits, States, Timed, Torque, along, shares
 from irtwin.robot.collision import CollisionModel
 
 if TYPE_CHECKING:
@@ -30,42 +31,12 @@ _SHARE = 0.97  # of the limits that the search keeps to at its samples
 _NEAR = 0.05  # m: nearer pairs push
 
 
-class Movement(Protocol):
-    """From rest to rest in `seconds`."""
-
-    @property
-    def seconds(self) -> float:
-        """How long it takes."""
-
-    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
-
-
 @dataclass(frozen=True)
-class SplineMotion:
-    """A motion as a spline over time, (n,) joints, from rest to rest in `seconds`."""
+class Movement:
+    """From rest to rest in `seconds`; `motion`: from times (N,), s, to q, dq, ddq and jerk, (N, n) each."""
 
-    spline: BSpline
     seconds: float
-
-    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
-        q, dq, ddq, jerk = (self.spline(np.clip(time, 0, self.seconds), order) for order in range(4))
-        return q, dq, ddq, jerk
-
-
-@dataclass(frozen=True)
-class PathMotion:
-    """A path, (n,) joints over the place on it from 0 to 1, and that place as a spline over time, from rest to rest."""
-
-    path: BSpline
-    law: BSpline
-    seconds: float
-
-    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
-        s, ds, dds, ddds = (self.law(np.clip(time, 0, self.seconds), order) for order in range(4))
-        return along(self.path, s, ds, dds, ddds)
+    motion: Callable[[np.ndarray], States]
 
 
 def cheapest(
@@ -77,7 +48,7 @@ def cheapest(
     collisions: CollisionModel,
     *,
     on_path: bool = False,
-) -> Movement:
+) -> Movement | Timed:
     """Return the motion between the ends of `given` that takes least energy in `seconds`, of all that keep the limits.
 
     `on_path`: of all along its path that go forward all the way. Sought from the given motion, slowed, by quasi-Newton
@@ -85,7 +56,7 @@ def cheapest(
     keeps every limit and touches nothing; else the given motion, slowed, is the answer.
     """
     slowed = given.slower(seconds)
-    best: Movement = slowed
+    best: Movement | Timed = slowed
     least = energy(best, power)
     search: _Search | _OnPath
     search = _OnPath(slowed, limits, torque, power) if on_path else _Search(slowed, limits, torque, power, collisions)
@@ -99,7 +70,7 @@ def cheapest(
     return best
 
 
-def keeps(motion: Movement, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
+def keeps(motion: Movement | Timed, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
     """Return whether a motion keeps all limits and touches nothing."""
     time = np.linspace(0, motion.seconds, _DENSE)
     states = motion.motion(time)
@@ -108,7 +79,7 @@ def keeps(motion: Movement, limits: MotionLimits, torque: Torque, collisions: Co
     return collisions.first_meeting(time, states[0])[0] is None
 
 
-def energy(motion: Movement, power: Power) -> float:
+def energy(motion: Movement | Timed, power: Power) -> float:
     """Return the energy that a motion takes, J."""
     time = np.linspace(0, motion.seconds, _DENSE)
     return float(np.trapezoid(power(time, *motion.motion(time)[:3]), time))
@@ -141,6 +112,12 @@ class _Spline:
         return np.concatenate([self._ends[[0, 0, 0]], points, self._ends[[1, 1, 1]]])
 
 
+def _derivatives(spline: BSpline, time: np.ndarray) -> States:
+    """Return the values of a spline and their first three derivatives, (N, ...) each, at `time`: (N,) s."""
+    place, speed, acceleration, jerk = (spline(np.clip(time, spline.t[0], spline.t[-1]), order) for order in range(4))
+    return place, speed, acceleration, jerk
+
+
 class _OnPath:
     """Costs of the free points, (k,), of a time law between rest at 0 and rest at 1."""
 
@@ -151,9 +128,10 @@ class _OnPath:
         place[[0, -1]] = 0.0, 1.0
         self.spline = _Spline(self._time, _FREE_OF_LAW, place)
 
-    def motion(self, points: np.ndarray) -> PathMotion:
+    def motion(self, points: np.ndarray) -> Movement:
         """Return the motion of free points (k,)."""
-        return PathMotion(self._path, self.spline.through(points), float(self._time[-1]))
+        law = self.spline.through(points)
+        return Movement(float(self._time[-1]), lambda time: along(self._path, *_derivatives(law, time)))
 
     def goes_forward(self, points: np.ndarray) -> bool:
         """Whether a motion never goes back on its path."""
@@ -187,9 +165,10 @@ class _Search:
         self._time = np.linspace(0, given.seconds, _SAMPLES)
         self.spline = _Spline(self._time, _FREE, given.motion(self._time)[0])
 
-    def motion(self, points: np.ndarray) -> SplineMotion:
+    def motion(self, points: np.ndarray) -> Movement:
         """Return the motion of free points (k, n)."""
-        return SplineMotion(self.spline.through(points), self._seconds)
+        spline = self.spline.through(points)
+        return Movement(self._seconds, lambda time: _derivatives(spline, time))
 
     def goes_forward(self, points: np.ndarray) -> bool:
         """Whether a motion may go so: any may."""
@@ -214,25 +193,28 @@ class _Search:
             value += stiffness * wall
             for order, gradient in enumerate(gradients):
                 slopes[order] = slopes[order] + stiffness * gradient
-        return value, np.concatenate(
-            [sum(b[:, 3:-3].T @ s for b, s in zip(self.spline.bases, slopes, strict=True)).ravel()]
-        )
+        by_points = [basis[:, 3:-3].T @ slope for basis, slope in zip(self.spline.bases, slopes, strict=True)]
+        return value, np.sum(by_points, axis=0).ravel()
 
     def _energy(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
         """Return the energy, J, and its slope over each sample's q, dq, ddq, from differences sample by sample."""
         weights = np.gradient(self._time)
         weights[[0, -1]] /= 2
         power = self._power(self._time, *states)
-        slopes = []
-        for order in range(3):
-            slope = np.empty_like(states[order])
-            scale = _STEP / self._seconds**order
-            for joint in range(slope.shape[1]):
-                moved = [state.copy() for state in states]
-                moved[order][:, joint] += scale
-                slope[:, joint] = weights * (self._power(self._time, *moved) - power) / scale
-            slopes.append(slope)
+        slopes = [np.empty_like(state) for state in states]
+        for order, joint, change in self._changes(lambda *moved: self._power(self._time, *moved), states):
+            slopes[order][:, joint] = weights * change
         return float(weights @ power), slopes
+
+    def _changes(
+        self, of: Callable[..., np.ndarray], states: Sequence[np.ndarray]
+    ) -> Iterator[tuple[int, int, np.ndarray]]:
+        """Yield, by order and joint, how fast what is `of` q, dq and ddq, (N, ...), changes with each at a sample."""
+        own = of(*states)
+        for order, joint in product(range(3), range(states[0].shape[1])):
+            moved, step = [state.copy() for state in states], _STEP / self._seconds**order
+            moved[order][:, joint] += step
+            yield order, joint, (of(*moved) - own) / step
 
     def _walls(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
         """Return the mean square by which limits are passed, and its slope over each sample's q, dq, ddq, jerk."""
@@ -251,19 +233,9 @@ class _Search:
             beyond = np.sign(share) * np.maximum(np.abs(share) - _SHARE, 0)
             if beyond.any():
                 value += float((beyond**2).sum()) / len(beyond)
-                self._add_torque(states, share, beyond, slopes)
+                for order, joint, change in self._changes(self._torque, states[:3]):
+                    slopes[order][:, joint] += 2 * (beyond * change / limits.torque).sum(axis=1) / len(share)
         return value, slopes
-
-    def _add_torque(
-        self, states: list[np.ndarray], share: np.ndarray, beyond: np.ndarray, slopes: list[np.ndarray]
-    ) -> None:
-        for order in range(3):
-            scale = _STEP / self._seconds**order
-            for joint in range(share.shape[1]):
-                moved = [state.copy() for state in states[:3]]
-                moved[order][:, joint] += scale
-                change = (self._torque(*moved) / self._limits.torque - share) / scale
-                slopes[order][:, joint] += 2 * (beyond * change).sum(axis=1) / len(share)
 
     def _distances(self, q: np.ndarray) -> tuple[float, list[np.ndarray]]:
         """Return the mean square by which pairs are nearer than they may, over _NEAR, and its slope over q."""

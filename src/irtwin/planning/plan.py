@@ -107,7 +107,7 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
             f"the motion cannot be done in {task.seconds:g} s; the fastest on this way takes {quickest.seconds:.3f} s"
         )
     seconds = task.seconds or quickest.seconds
-    chosen: Movement = quickest.slower(seconds)
+    chosen: Movement | Timed = quickest.slower(seconds)
     if task.least_energy:
         about = limits, _torque(twin, task), _power(twin, task), collisions
         chosen = cheapest(quickest, seconds, *about, on_path=task.line)

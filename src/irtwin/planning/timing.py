@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 Torque = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """From q, dq, ddq, (N, n) each, to the joint torques (N, n), N m."""
+States = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""What a motion is at N instants: q, dq, ddq and jerk, (N, n) each; or a place on a path and its derivatives, (N,)."""
 
 FULL_ACCELERATION_AFTER = 0.1  # s: the jerk limit of a joint is its acceleration limit / 0.1 s
 _POINTS = 200  # of the path at which TOPP-RA bounds its speed
@@ -69,11 +71,11 @@ class Timed:
         """Return the same path, evenly slowed to last `seconds`."""
         return Timed(self.path, self.law, self.window, self.stretch * seconds / self.seconds)
 
-    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def motion(self, time: np.ndarray) -> States:
         """Return q, dq, ddq and jerk, (N, n) each, at `time`: (N,) s."""
         return along(self.path, *self.place(time))
 
-    def place(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def place(self, time: np.ndarray) -> States:
         """Return the place on the path and its first three derivatives, (N,) each, at `time`: (N,) s."""
         law_time = time / self.stretch + self.law.x[0] + self.window / 2
         ends = (law_time + self.window / 2, law_time - self.window / 2)
@@ -84,9 +86,7 @@ class Timed:
         return s, ds, dds, ddds
 
 
-def along(
-    path: BSpline, s: np.ndarray, ds: np.ndarray, dds: np.ndarray, ddds: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def along(path: BSpline, s: np.ndarray, ds: np.ndarray, dds: np.ndarray, ddds: np.ndarray) -> States:
     """Return q, dq, ddq and jerk, (N, n) each, at places on a path that change so, (N,) each."""
     p, p1, p2, p3 = (path(np.clip(s, path.t[path.k], path.t[-path.k - 1]), nu) for nu in range(4))
     v, a, j = ds[:, None], dds[:, None], ddds[:, None]
@@ -130,9 +130,7 @@ def fastest(path: BSpline, limits: MotionLimits, torque: Torque) -> Timed:
     return min(feasible, key=lambda each: each.seconds)
 
 
-def shares(
-    motion: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray], limits: MotionLimits, torque: Torque
-) -> dict[str, np.ndarray]:
+def shares(motion: States, limits: MotionLimits, torque: Torque) -> dict[str, np.ndarray]:
     """Return how much of each limit a motion (q, dq, ddq, jerk) takes, (N, n) each; above one where it passes it."""
     q, dq, ddq, jerk = motion
     half = (limits.upper - limits.lower) / 2
