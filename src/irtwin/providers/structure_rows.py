@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.providers.mesh_files import MeshCopy
@@ -145,8 +144,8 @@ def _dh_table(robot_id: str, robot: Robot, convention: str) -> Iterator[Base]:
         end_link=flange(robot),
         deviation_m=far,
         deviation_rad=turned,
-        **_place("base", _origin(table.base)),
-        **_place("tool", _origin(table.tool)),
+        **_place("base", Origin.of(table.base)),
+        **_place("tool", Origin.of(table.tool)),
     )
     for number, (joint, row) in enumerate(zip(table.joint_names, table.rows, strict=True), start=1):
         yield DHRow(
@@ -159,12 +158,6 @@ def _dh_table(robot_id: str, robot: Robot, convention: str) -> Iterator[Base]:
             d_m=row.d,
             theta_rad=row.theta,
         )
-
-
-def _origin(place: np.ndarray) -> Origin:
-    x, y, z = place[:3, 3].tolist()
-    roll, pitch, yaw = pin.rpy.matrixToRpy(place[:3, :3]).tolist()
-    return Origin((x, y, z), (roll, pitch, yaw))
 
 
 def _place(prefix: str, origin: Origin) -> dict[str, float]:

@@ -17,6 +17,7 @@ from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_frame, ranges
+from irtwin.robot.structure import six_numbers
 
 PARALLEL = 1e-5  # rad: axes nearer to parallel than this are taken as such, because files round their angles
 _POSES = 100  # at which a table is held against its robot
@@ -198,7 +199,6 @@ def _bodies(robot: Robot, chain: Sequence[int], table: ChainTable) -> list[Row]:
         at = at @ row_transform(row, table.convention)
         said, inertia = robot.joints[joint - 1], model.inertias[joint]
         body = pin.SE3(at).actInv(data.oMi[joint]).act(inertia)
-        moments = np.asarray(body.inertia)
         rows.append(
             replace(
                 row,
@@ -209,7 +209,7 @@ def _bodies(robot: Robot, chain: Sequence[int], table: ChainTable) -> list[Row]:
                 name=said.name,
                 mass=float(body.mass),
                 com=tuple(body.lever.tolist()),
-                inertia=tuple(moments[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),
+                inertia=six_numbers(body.inertia),
             )
         )
     return rows

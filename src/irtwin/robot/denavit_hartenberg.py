@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.errors import InputError
-from irtwin.robot.description import Robot
+from irtwin.robot.description import Joint, Robot
+from irtwin.robot.structure import Body, Connection, Origin, Structure, inertia_of, six_numbers
 from irtwin.robot.urdf import parse_urdf
+from irtwin.robot.urdf_text import urdf_text
 
 CONVENTIONS = ("standard", "modified")
 _NOMINAL = (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)  # kg m^2, of a link whose inertia nobody gave
@@ -105,28 +105,22 @@ def to_urdf(name: str, table: ChainTable) -> str:
     modified = table.convention == "modified"
     along_x = [screw_x(row.a, row.alpha) for row in table.rows]
     before = along_x if modified else [np.eye(4), *along_x[:-1]]
-    after = np.eye(4) if modified else along_x[-1]
-    root = Element("robot", name=name)
-    SubElement(root, "link", name="base_link")
-    parent, start = "base_link", table.base
     names = table.joint_names
+    bodies, connections = [Body("base_link", None, None, None)], []
+    start = table.base
     for number, row in enumerate(table.rows, start=1):
-        link = f"link_{number}"
-        _link(root, link, row, np.eye(4) if modified else along_x[number - 1])
-        origin = start @ before[number - 1] @ screw_z(row.d, row.theta)
-        bounded = bool(np.isfinite(row.lower) and np.isfinite(row.upper))
-        kind = "continuous" if row.kind == "revolute" and not bounded else row.kind
-        joint = _joint(root, names[number - 1], kind, parent, link, origin)
-        SubElement(joint, "axis", xyz="0 0 1")
-        if bounded or kind == "continuous":  # a joint that slides has all limits or none
-            limit = {"lower": row.lower, "upper": row.upper} if kind != "continuous" else {}
-            limit |= {"velocity": row.velocity, "effort": row.effort}
-            SubElement(joint, "limit", {key: repr(float(value)) for key, value in limit.items()})
-        parent, start = link, np.eye(4)
-    SubElement(root, "link", name="flange")
-    _joint(root, _free("flange_joint", names), "fixed", parent, "flange", after @ table.tool)
-    indent(root)
-    return tostring(root, encoding="unicode") + "\n"
+        bodies.append(_body(f"link_{number}", row, np.eye(4) if modified else along_x[number - 1]))
+        origin = Origin.of(start @ before[number - 1] @ screw_z(row.d, row.theta))
+        kind = "continuous" if row.kind == "revolute" and not _bounded(row) else row.kind
+        connections.append(
+            Connection(names[number - 1], kind, bodies[-2].name, bodies[-1].name, origin, (0.0, 0.0, 1.0))
+        )
+        start = np.eye(4)
+    end = Origin.of((start if modified else along_x[-1]) @ table.tool)
+    connections.append(Connection(_free("flange_joint", names), "fixed", bodies[-1].name, "flange", end, None))
+    bodies.append(Body("flange", None, None, None))
+    limits = (_limits(joint, row) for joint, row in zip(names, table.rows, strict=True))
+    return urdf_text(name, Structure(tuple(bodies), tuple(connections), ()), limits)
 
 
 def _free(name: str, taken: Sequence[str]) -> str:
@@ -134,28 +128,20 @@ def _free(name: str, taken: Sequence[str]) -> str:
     return name if name not in taken else _free(f"{name}_", taken)
 
 
-def _joint(root: Element, name: str, kind: str, parent: str, child: str, origin: np.ndarray) -> Element:
-    joint = SubElement(root, "joint", name=name, type=kind)
-    SubElement(joint, "origin", _origin(origin))
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=child)
-    return joint
+def _bounded(row: Row) -> bool:
+    return bool(np.isfinite(row.lower) and np.isfinite(row.upper))
 
 
-def _origin(place: np.ndarray) -> dict[str, str]:
-    return {"xyz": _words(place[:3, 3]), "rpy": _words(pin.rpy.matrixToRpy(place[:3, :3]))}
+def _limits(name: str, row: Row) -> Joint:
+    """Return a joint with a row's limits; one that slides has all of them or none."""
+    if row.kind == "prismatic" and not _bounded(row):
+        return Joint(name, row.kind)
+    lower, upper = (row.lower, row.upper) if _bounded(row) else (-np.inf, np.inf)
+    return Joint(name, row.kind, lower, upper, row.velocity or np.inf, row.effort or np.inf)
 
 
-def _words(values: np.ndarray) -> str:
-    return " ".join(repr(value + 0.0) for value in values.tolist())  # no -0.0
-
-
-def _link(root: Element, name: str, row: Row, frame: np.ndarray) -> None:
-    """Add a link whose row's frame lies at `frame` in the link's own, which turns with the joint."""
-    inertial = SubElement(SubElement(root, "link", name=name), "inertial")
-    place = frame.copy()
-    place[:3, 3] = frame[:3, :3] @ np.array(row.com) + frame[:3, 3]
-    SubElement(inertial, "origin", _origin(place))
-    SubElement(inertial, "mass", value=repr(float(row.mass)))
-    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    SubElement(inertial, "inertia", {key: repr(float(value)) for key, value in zip(keys, row.inertia, strict=True)})
+def _body(name: str, row: Row, frame: np.ndarray) -> Body:
+    """Return a link whose row's frame lies at `frame` in the link's own, which turns with the joint."""
+    turn = frame[:3, :3]
+    x, y, z = (turn @ np.array(row.com) + frame[:3, 3]).tolist()
+    return Body(name, float(row.mass), (x, y, z), six_numbers(turn @ inertia_of(row.inertia) @ turn.T))

@@ -9,9 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
-from irtwin.robot.structure import Connection, Origin, Solid, structure_of
-
-_FULL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # MuJoCo's order of an inertia's numbers
+from irtwin.robot.structure import Connection, Origin, Solid, six_numbers, structure_of
 
 
 def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
@@ -57,7 +55,7 @@ def _joint(body: Element, connection: Connection, limits: Joint, armature: float
 
 
 def _inertial(body: Element, inertia: pin.Inertia) -> None:
-    moments = _words(*(inertia.inertia[place] for place in _FULL))
+    moments = _words(*six_numbers(inertia.inertia))
     SubElement(body, "inertial", pos=_words(*inertia.lever), mass=repr(float(inertia.mass)), fullinertia=moments)
 
 

@@ -21,6 +21,19 @@ Colours = Mapping[str | None, Element | None]
 _SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ()}
 PRIMITIVES = ("box", "cylinder", "sphere")
 PURPOSES = ("visual", "collision")
+_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of an inertia: xx, yy, zz, xy, xz, yz
+
+
+def six_numbers(inertia: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    """Return the numbers xx, yy, zz, xy, xz, yz of an inertia (3, 3)."""
+    xx, yy, zz, xy, xz, yz = (float(inertia[place]) for place in _SIX)
+    return xx, yy, zz, xy, xz, yz
+
+
+def inertia_of(six: Sequence[float]) -> np.ndarray:
+    """Return the inertia (3, 3) of the numbers xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @dataclass(frozen=True)
@@ -29,6 +42,11 @@ class Origin:
 
     xyz: Three = (0.0, 0.0, 0.0)
     rpy: Three = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of(cls, transform: np.ndarray) -> Origin:
+        """Return the origin of a (4, 4) transform."""
+        return cls(_three(transform[:3, 3]), _three(pin.rpy.matrixToRpy(transform[:3, :3])))
 
     @property
     def transform(self) -> np.ndarray:
@@ -51,9 +69,7 @@ class Body:
     @property
     def spatial(self) -> pin.Inertia:
         """Its spatial inertia; zero where it has none."""
-        xx, yy, zz, xy, xz, yz = self.inertia or (0.0,) * 6
-        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return pin.Inertia(self.mass or 0.0, np.array(self.com or (0.0,) * 3), moments)
+        return pin.Inertia(self.mass or 0.0, np.array(self.com or (0.0,) * 3), inertia_of(self.inertia or (0.0,) * 6))
 
 
 @dataclass(frozen=True)
@@ -168,10 +184,9 @@ def _body(name: str, link: Element) -> Body:
     moments = inertial.find("inertia")
     turned = None
     if moments is not None:
-        xx, yy, zz, xy, xz, yz = (float(moments.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+        said = inertia_of([float(moments.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")])
         turn = origin.transform[:3, :3]
-        said = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-        turned = tuple(float(said[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+        turned = six_numbers(turn @ said @ turn.T)
     return Body(name, float(mass.get("value", "0")), origin.xyz, turned)
 
 

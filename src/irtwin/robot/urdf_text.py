@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
@@ -21,7 +21,8 @@ def urdf_text(name: str, structure: Structure, joints: Iterable[Joint]) -> str:
         _link(root, body, [solid for solid in structure.solids if solid.link == body.name])
     for connection in structure.connections:
         _joint(root, connection, limits.get(connection.name))
-    return tostring(root, encoding="unicode")
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"
 
 
 def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from irtwin.robot.structure import six_numbers
+
 if TYPE_CHECKING:
     import mujoco
 
 WORLD = "world"
 _SERVO = " by its servo"
 _MOST = 500  # links, base to flange: MuJoCo goes down the tree by recursion
-_UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # MuJoCo's order of an inertia's numbers
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def _body(parent: mujoco.MjsBody, link: Link, joint: Connection | None) -> mujoc
     body = parent.add_body(name=link.name, pos=place[:3, 3], quat=_quaternion(place))
     if link.mass:
         body.mass, body.ipos, body.explicitinertial = link.mass, link.centre, True
-        body.fullinertia = [link.inertia[at] for at in _UPPER]
+        body.fullinertia = six_numbers(link.inertia)
     for name, at in link.frames.items():
         body.add_site(name=name, pos=at)
     if joint is not None and joint.kind != "fixed":

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from irtwin.robot.structure import six_numbers
 from irtwin.simulator.model import Flange, Model
 from irtwin.simulator.model_file import Tag
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     import mujoco
 
 _OTHER_FORMS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia")  # of what `fullinertia` says
-_UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # its order
 
 
 def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> None:
@@ -47,7 +47,7 @@ def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Tag, dict[str
     whole, centre, inertia = together(model.compiled, model.flange, mass, off)
     told: dict[str, float | str | None] = dict.fromkeys(_OTHER_FORMS)
     told |= {"mass": float(whole), "pos": " ".join(map(repr, centre.tolist()))}
-    return {tag: told | {"fullinertia": " ".join(repr(float(inertia[at])) for at in _UPPER)}}
+    return {tag: told | {"fullinertia": " ".join(map(repr, six_numbers(inertia)))}}
 
 
 def together(

@@ -13,6 +13,7 @@ import scipy
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
+from irtwin.robot.structure import inertia_of
 from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
 from irtwin.simulator.model_file import ModelFile, Tag
@@ -29,6 +30,7 @@ _KNOWN = {  # where a word that SDF does not know would take a number away
     "inertial": {"mass", "pose", "inertia", "density", "auto_inertia_params", "fluid_added_mass"},
     "inertia": {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"},
 }
+_SIX = ("xx", "yy", "zz", "xy", "xz", "yz")  # of an inertia
 _NO_LIMIT = 1e16  # as SDF has it by itself
 _MODEL = "__model__"
 _BEFORE = (1, 4)  # the last version whose axes are said in the frame of the model
@@ -155,18 +157,15 @@ def _link(link: Element, frames: _Frames, source: str) -> Link:
         raise InputError(f"{where}: its inertia is that of its shapes (auto); give its mass and inertia")
     body = Element("inertial") if inertial is None else inertial
     within = _pose(body, where)
-    turn, moments = within[:3, :3], np.zeros((3, 3))
-    for row, first in enumerate("xyz"):
-        for column, second in enumerate("xyz"[row:], row):
-            value = _number(body, f"inertia/i{first}{second}", float(row == column), where)
-            moments[row, column] = moments[column, row] = value
+    turn = within[:3, :3]
+    six = [_number(body, f"inertia/i{axes}", float(axes[0] == axes[1]), where) for axes in _SIX]
     own = np.linalg.inv(place)
     return Link(
         name,
         place,
         _number(body, "mass", 1.0, where),
         within[:3, 3],
-        turn @ moments @ turn.T,
+        turn @ inertia_of(six) @ turn.T,
         {one: (own @ frames.place(one))[:3, 3] for one in frames.on.get(name, ())},
     )
 
