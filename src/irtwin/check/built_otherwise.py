@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from irtwin.robot.kinematics import joint_motions
+
 
 def tilted(model: pin.Model, by: tuple[float, float, float]) -> pin.Model:
     """Return the model with its base turned by a small vector (3,), rad."""
@@ -20,11 +22,8 @@ def turned_axes(model: pin.Model) -> Iterator[tuple[int, pin.Model]]:
 
     At zero all links stay where they are.
     """
-    data = pin.Data(model)
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    for joint in range(1, model.njoints):
-        column = pin.getJointJacobian(model, data, joint, pin.LOCAL).reshape(6, -1)[:, model.idx_vs[joint]]
-        axis = column[:3] + column[3:]  # a joint slides or turns
+    for joint, motion in enumerate(joint_motions(model), start=1):
+        axis = motion[:3] + motion[3:]  # a joint slides or turns
         normal = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         for about in (normal, np.cross(axis, normal)):
             turn = pin.SE3(pin.AngleAxis(np.pi / 2, about / np.linalg.norm(about)).matrix(), np.zeros(3))

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from irtwin.robot.kinematics import joint_motions
+
 _INERTIAS = np.zeros((6, 3, 3))  # a unit of each, in Pinocchio's order
 for _unit, (_row, _column) in zip(_INERTIAS, ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)), strict=True):
     _unit[_row, _column] = _unit[_column, _row] = 1.0
@@ -128,11 +130,8 @@ def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
 
 
 def _joints(model: pin.Model) -> list[_Joint]:
-    data = model.createData()
-    pin.computeJointJacobians(model, data, np.zeros(model.nq))
     found = []
-    for index in range(1, model.njoints):
-        axis = np.reshape(pin.getJointJacobian(model, data, index, pin.LOCAL), (6, -1))[:, index - 1].copy()
+    for index, axis in enumerate(joint_motions(model), start=1):
         across = pin.Motion(axis).action  # of the axis, times a motion
         parent = model.jointPlacements[index].toActionMatrixInverse()
         slides = not axis[3:].any()

@@ -16,7 +16,7 @@ import pinocchio as pin
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, link_frame, ranges
+from irtwin.robot.kinematics import flange, joint_motions, link_frame, ranges
 from irtwin.robot.structure import six_numbers
 
 PARALLEL = 1e-5  # rad: axes nearer to parallel than this are taken as such, because files round their angles
@@ -82,11 +82,10 @@ def _chain(robot: Robot, tip: str) -> tuple[list[int], np.ndarray]:
 def _axis(robot: Robot, joint: int) -> _Line:
     """Return a joint's axis at zero."""
     model, data = robot.model, robot.model.createData()
-    pin.computeJointJacobians(model, data, np.zeros(model.nq))
-    column = np.reshape(data.J, (6, -1))[:, joint - 1]  # Pinocchio gives one joint's as a vector
-    slides = robot.joints[joint - 1].kind == "prismatic"
-    direction = column[:3] if slides else column[3:]
-    return _Line(np.array(data.oMi[joint].translation), direction / np.linalg.norm(direction))
+    pin.forwardKinematics(model, data, np.zeros(model.nq))
+    motion, place = joint_motions(model)[joint - 1], data.oMi[joint]
+    direction = place.rotation @ (motion[:3] + motion[3:])  # it slides or turns
+    return _Line(np.array(place.translation), direction / np.linalg.norm(direction))
 
 
 def _first_frame(axis: _Line) -> np.ndarray:

@@ -235,7 +235,7 @@ class CollisionModel:
             self._geometry.removeCollisionPair(pairs[pair])
 
     def _random_poses(self) -> Iterable[np.ndarray]:
-        lower, upper = (np.array([getattr(joint, side) for joint in self._robot.joints]) for side in ("lower", "upper"))
+        lower, upper = self._robot.limits
         lower, upper = np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi)
         return np.asarray(np.random.default_rng(0).uniform(lower, upper, (_PROBES, len(lower))))
 

@@ -85,6 +85,11 @@ class Robot:
         """Names in the order of `q`."""
         return tuple(joint.name for joint in self.joints)
 
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the greatest positions of the joints, (n,) rad or m; infinite where there are none."""
+        return np.array([joint.lower for joint in self.joints]), np.array([joint.upper for joint in self.joints])
+
     def index(self, joint: str) -> int:
         """Return the column of `q` that belongs to the joint's name."""
         return self.joint_names.index(joint)

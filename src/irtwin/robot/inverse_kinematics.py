@@ -46,7 +46,7 @@ def solve(
     turns of a joint are one: the turn nearest to the start is given. Raises InputError on a start of another length or
     out of the limits, and on an unknown link.
     """
-    lower, upper = _limits(robot)
+    lower, upper = robot.limits
     near = np.clip(np.zeros(len(lower)), lower, upper) if start is None else _checked(robot, start, lower, upper)
     frame = link_frame(robot, link or flange(robot))
     search = _Search(robot, frame, pin.SE3(pose), lower, upper)
@@ -86,12 +86,6 @@ def _damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.nda
     count = slope.shape[1]
     stacked = np.vstack([slope, np.sqrt(damping) * np.eye(count)])
     return np.asarray(np.linalg.lstsq(stacked, np.append(value, np.zeros(count)))[0])
-
-
-def _limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    lower = np.array([joint.lower for joint in robot.joints])
-    upper = np.array([joint.upper for joint in robot.joints])
-    return lower, upper
 
 
 def _checked(robot: Robot, start: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

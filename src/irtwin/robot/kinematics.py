@@ -45,10 +45,17 @@ def placements(robot: Robot, q: np.ndarray, link: str | None = None) -> np.ndarr
     return result
 
 
+def joint_motions(model: pin.Model) -> np.ndarray:
+    """Return what a unit of each joint's speed makes of its body's motion, (n, 6): line, then turn, in its frame."""
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    jacobians = (pin.getJointJacobian(model, data, joint, pin.LOCAL) for joint in range(1, model.njoints))
+    return np.array([np.reshape(each, (6, -1))[:, joint] for joint, each in enumerate(jacobians)])
+
+
 def ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the greatest positions to draw, (n,) rad or m: within the limits, at most pi either way."""
-    lower = np.array([joint.lower for joint in robot.joints])
-    upper = np.array([joint.upper for joint in robot.joints])
+    lower, upper = robot.limits
     middle = np.clip(0.0, lower, upper)
     return np.maximum(lower, middle - np.pi), np.minimum(upper, middle + np.pi)
 

@@ -57,7 +57,7 @@ def home(robot: Robot, model: CollisionModel) -> np.ndarray:
 
 def _limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return the joints' limits, (n,) rad or m; a half turn, or half a metre, either way where there are none."""
-    lower, upper = (np.array([getattr(joint, side) for joint in robot.joints]) for side in ("lower", "upper"))
+    lower, upper = robot.limits
     free = np.array([0.5 if joint.kind == "prismatic" else np.pi for joint in robot.joints])
     return np.where(np.isfinite(lower), lower, -free), np.where(np.isfinite(upper), upper, free)
 

@@ -86,43 +86,38 @@ def whole(run: Run) -> PlayedStretch:
     return PlayedStretch(run, slice(None), float(run.signals.time[0]))
 
 
-def each(run: Run, seconds: float, most: int | None = None) -> list[PlayedStretch]:
+def each(run: Run, seconds: float, most: int) -> list[PlayedStretch]:
     """Return stretches of a run that do not overlap, of `most` at most, evenly spread; at least one."""
     time = run.signals.time
     lasts = float(time[-1] - time[0])
-    fit = max(1, int(lasts / seconds))
-    count = min(fit, most or fit)
+    count = min(max(1, int(lasts / seconds)), most)
     begins = time[0] + np.maximum((np.arange(count) + 0.5) * lasts / count - seconds / 2, 0.0)
     ends = [np.searchsorted(time, [begin - 1e-9, begin + seconds - 1e-9]) for begin in begins]
     return [PlayedStretch(run, slice(*rows), float(begin)) for rows, begin in zip(ends, begins, strict=True)]
 
 
-def play(
-    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch], step: float | None = None
-) -> list[list[np.ndarray]]:
+def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> list[list[np.ndarray]]:
     """Return, for each set of numbers (k, n) and each stretch, what the model does at its samples, as `measured`.
 
-    `step`, s, is that of the simulation, None the model's own. Joints that the robot lacks are told zero.
+    Joints that the robot lacks are told zero.
     """
-    step = step or servos.model.compiled.opt.timestep
-    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
-    played = _played(servos, numbers, stretches, steps, step)
+    played = _played(servos, numbers, stretches)
     return [[next(played) for _ in stretches] for _ in numbers]
 
 
-def _played(
-    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch], steps: int, step: float
-) -> Iterator[np.ndarray]:
+def _played(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     import mujoco
     from mujoco.rollout import rollout
 
+    step = servos.model.compiled.opt.timestep
+    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
     paired = any(one[NAMES.index("dead_band")].any() for one in numbers)
     compiled = servos.paired.compiled if paired else servos.model.compiled
     size = mujoco.mj_stateSize(compiled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
     states = [_state(servos, one, size) for one in stretches]
-    models = [servos.compiled(one, step, paired) for one in numbers]
+    models = [servos.compiled(one, paired) for one in numbers]
     efforts = _efforts(compiled, servos)
     pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
     at_once = max(1, _MOST // (steps * size))

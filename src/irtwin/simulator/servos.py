@@ -110,19 +110,15 @@ class Servos:
         changed = torque_limit != self.numbers[NAMES.index("torque_limit")]
         return np.array([np.where(changed, side * torque_limit, end) for side, end in zip((-1, 1), own, strict=True)])
 
-    def compiled(self, numbers: np.ndarray, step: float, paired: bool) -> mujoco.MjModel:
+    def compiled(self, numbers: np.ndarray, paired: bool) -> mujoco.MjModel:
         """Return the compiled model with numbers (k, n) of its own; offset and delay are the commands' to have.
 
         A dead band needs the model that is `paired`.
         """
         import mujoco
 
-        one, at, dof = (
-            copy.copy(self.paired.compiled if paired else self.model.compiled),
-            self.actuators,
-            self.model.speeds,
-        )
-        one.opt.timestep = step
+        one = copy.copy(self.paired.compiled if paired else self.model.compiled)
+        at, dof = self.actuators, self.model.speeds
         stiffness, damping, friction, holding, armature, _, _, limit, band = numbers[: len(OF_JOINTS)]
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if mass:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import joint_motions
 from irtwin.robot.structure import PURPOSES, Solid, structure_of
 
 _GREY = (0.7, 0.7, 0.72, 1.0)
@@ -45,15 +46,8 @@ def drawn_parts(robot: Robot, meshes: Collection[str] = ()) -> list[Part]:
 
 
 def joint_axes(robot: Robot) -> np.ndarray:
-    """Return each joint's axis in its own frame, (n, 3), from its motion subspace: the same at every position."""
-    data = robot.model.createData()
-    pin.computeJointJacobians(robot.model, data, np.zeros(len(robot.joints)))
-    axes = np.empty((len(robot.joints), 3))
-    for column, joint in enumerate(robot.joints):
-        jacobian = pin.getJointJacobian(robot.model, data, column + 1, pin.LOCAL).reshape(6, -1)  # flat of one joint
-        twist = jacobian[:, column]
-        axes[column] = twist[:3] if joint.kind == "prismatic" else twist[3:]
-    return axes
+    """Return each joint's axis in its own frame, (n, 3): the same at every position."""
+    return np.asarray(joint_motions(robot.model).reshape(-1, 2, 3).sum(axis=1))  # it slides or turns
 
 
 def meshes_missing(robot: Robot, meshes: Collection[str]) -> list[str]:
