@@ -167,7 +167,7 @@ def test_a_format_that_a_package_brings_is_imported(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(catalogue, "_registered", lambda: (Numbers,))
     np.savez(tmp_path / "run.npz", **good())
     found = bring([tmp_path / "run.npz"], tmp_path / "set", NAME, MAINS)
-    assert found.forms[0].form == ".npz, by tests"
+    assert found.forms[0].logs[0].form == ".npz, by tests"
     assert "read by a package" in found.said
     assert_same(read_data_set(tmp_path / "set"))
 

@@ -21,7 +21,7 @@ from irtwin.bring.meaning import Meaning
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
-from irtwin.bring.taken import Taken, TakenLogs, TakenRun, take
+from irtwin.bring.taken import TakenLogs, TakenRun, take
 from irtwin.bring.told import UserSaid, told
 from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
@@ -68,19 +68,10 @@ class Options:
 
 
 @dataclass(frozen=True)
-class LogsAlike:
-    """Logs of the same columns: their files, and what each column was taken for."""
-
-    files: tuple[Path, ...]
-    form: str
-    columns: tuple[Taken, ...]
-
-
-@dataclass(frozen=True)
 class Brought:
     """What was brought: forms of logs, and a line for each thing that was done in reading."""
 
-    forms: tuple[LogsAlike, ...]
+    forms: Sequence[LogsAlike]
     said: tuple[str, ...]
 
 
@@ -119,10 +110,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         for run_text, run in listed:
             pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
         (folder / "dataset.toml").write_text(text, encoding="utf-8")
-    shown = tuple(
-        LogsAlike(tuple(log.path for log in form.logs), form.logs[0].form, form.taken.columns) for form in forms
-    )
-    return Brought(shown, tuple(line for form in forms for line in form.said))
+    return Brought(forms, tuple(line for form in forms for line in form.said))
 
 
 def import_logs(files: Sequence[Path | str], out: Path | str, robot: Path | str | None = None, **said: Any) -> DataSet:
@@ -153,7 +141,7 @@ def _metered(files: Sequence[Path]) -> Robot:
     return Robot(re.sub(r"[^\w\-]+", "_", files[0].stem).strip("_") or "meter", (), (), "")
 
 
-class _Form:
+class LogsAlike:
     """Logs of the same columns, taken together: what one of them tells of a unit holds for all."""
 
     def __init__(self, logs: Sequence[Recording], robot: Robot, said: UserSaid, repair: bool) -> None:
@@ -164,7 +152,7 @@ class _Form:
         self.taken: TakenLogs = take(usable, means, robot, said)
 
 
-_Settled = tuple[UserSaid, list[_Form], tuple[str | None, str]]
+_Settled = tuple[UserSaid, list[LogsAlike], tuple[str | None, str]]
 
 
 def _settled(logs: Sequence[Recording], robot: Robot, options: Options, ask: Ask | None) -> _Settled:
@@ -203,7 +191,7 @@ def _questions(logs: Sequence[Recording], robot: Robot, options: Options, which:
 def _formed(logs: Sequence[Recording], robot: Robot, options: Options) -> _Settled:
     said = told(options.maps, options.gear_ratios, options.power_at, robot)
     said.check(name for log in logs for name in log.names)
-    forms = [_Form(group, robot, said, options.repair) for group in _of_one_form(logs)]
+    forms = [LogsAlike(group, robot, said, options.repair) for group in _of_one_form(logs)]
     return said, forms, _one_place(forms)
 
 
@@ -215,7 +203,7 @@ def _of_one_form(logs: Sequence[Recording]) -> list[list[Recording]]:
     return list(groups.values())
 
 
-def _one_place(forms: Sequence[_Form]) -> tuple[str | None, str]:
+def _one_place(forms: Sequence[LogsAlike]) -> tuple[str | None, str]:
     places = {form.taken.power_at: form.taken.power_at_why for form in forms if form.taken.power_at is not None}
     if len(places) > 1:
         files = " and ".join(f"{form.logs[0].path} ({form.taken.power_at})" for form in forms if form.taken.power_at)
@@ -237,7 +225,7 @@ def _topic(text: str) -> tuple[str, str]:
     return column, topic
 
 
-def _run_text(log: Recording, run: TakenRun, name: str, form: _Form, options: Options) -> RunText:
+def _run_text(log: Recording, run: TakenRun, name: str, form: LogsAlike, options: Options) -> RunText:
     time = run.columns["time"]
     lasts = f"{len(time)} samples, {time[-1] - time[0]:.4g} s at {1 / interval(time):.4g} Hz"
     text = RunText(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ class WayOut:
     @property
     def text(self) -> str:
         """The options as they are typed."""
-        return " ".join(f"{name} {_quoted(value)}" for name, value in self.options)
+        return " ".join(f"{name} {shlex.quote(value)}" for name, value in self.options)
 
 
 class DoubtError(InputError):
@@ -28,8 +29,3 @@ class DoubtError(InputError):
         self.question, self.answers = question, tuple(answers)
         ways = " or ".join(answer.text for answer in answers) or hint
         super().__init__(f"{question}; give {ways}")
-
-
-def _quoted(value: str) -> str:
-    plain = all(sign.isalnum() or sign in "_-+=:./@%" for sign in value)
-    return value if plain else "'" + value.replace("'", "'\\''") + "'"

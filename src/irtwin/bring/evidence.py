@@ -26,6 +26,7 @@ _NEAR = 1.5  # factor by which a speed may miss the derivative: units lie farthe
 _ALIKE = 0.8  # correlation of a speed and its position's
 _TORQUE = (0.1, 100.0)  # logged over that of the description's bodies
 _POWER = (0.3, 300.0)  # electrical over mechanical
+_TAKEN = (10.0, 50_000.0)  # W
 _WORKING = 1.0  # W: less mechanical power says nothing
 _SMOOTHED = 9  # samples
 _EVALUATED = 300  # samples of inverse dynamics
@@ -166,27 +167,18 @@ def torque(
     return UnitEvidence(clear[0] if len(clear) == 1 else None, tuple(fits), why)
 
 
-def power(robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray]) -> UnitEvidence:
-    """Electrical power (N,) as logged, against torque times speed; at rest, against what controllers take."""
-    done = np.concatenate([_done(robot, each) for each in motions])
-    return _by_power(float(np.quantile(done, 0.99)), float(np.quantile(np.concatenate(logged), 0.99)), "W")
+def power(robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray], si: str = "W") -> UnitEvidence:
+    """Electrical power (N,) as logged, or as a current, A, makes it with the voltage, V; against torque times speed.
 
-
-def supply_current(
-    robot: Robot, motions: Sequence[MeasuredRun], voltage: Sequence[np.ndarray], logged: Sequence[np.ndarray]
-) -> UnitEvidence:
-    """The supply's current (N,), by the power that it makes with the voltage, V."""
-    done = np.concatenate([_done(robot, each) for each in motions])
-    watts = np.concatenate([v * i for v, i in zip(voltage, logged, strict=True)])
-    return _by_power(float(np.quantile(done, 0.99)), float(np.quantile(watts, 0.99)), "A")
-
-
-def _by_power(done: float, taken: float, si: str) -> UnitEvidence:
+    At rest, against what controllers take.
+    """
+    done = float(np.quantile(np.concatenate([_done(robot, each) for each in motions]), 0.99))
+    taken = float(np.quantile(np.concatenate(logged), 0.99))
     if done >= _WORKING and taken > 0:
         fits = [unit for unit in units(si) if _POWER[0] <= taken * unit.factor / done <= _POWER[1]]
         why = f"by a check: it reaches {taken:.3g} where torque times speed reaches {done:.3g} W"
         return UnitEvidence(fits[0] if len(fits) == 1 else None, tuple(fits), why)
-    return _by_size(si, taken, {"W": (10.0, 50_000.0), "A": (10.0, 50_000.0)}[si])
+    return _by_size(si, taken, _TAKEN)
 
 
 def by_size(si: str, logged: Sequence[np.ndarray], bounds: tuple[float, float]) -> UnitEvidence:

@@ -90,11 +90,11 @@ def read_recording(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recor
     if path.is_dir() and not (path / BAG_FOLDER).exists():
         raise InputError(f"{path}: is a folder, and no bag of ROS 2; name the logs in it, as {path}/*.csv")
     if path.is_dir() or suffix in BAGS:
-        return _bag(path, robot, topics)
+        return replace(_by_source(path, robot, topics), form="ROS bag", is_bag=True)
     if suffix in SHEETS:
         return read_sheet(path)
     if suffix in registered():
-        return _of_package(path, robot, topics)
+        return _by_source(path, robot, topics)
     return _parquet(path) if suffix == ".parquet" else read_text(path)
 
 
@@ -217,17 +217,10 @@ def _is_binary(kind: pa.DataType) -> bool:
     return bool(pa.types.is_binary(kind) or pa.types.is_large_binary(kind) or pa.types.is_fixed_size_binary(kind))
 
 
-def _of_package(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
-    """Read a file by the source that an installed package brought for it."""
+def _by_source(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
+    """Read a file by its source, which an installed package may have brought."""
     source = source_of(path, robot, topics)
     table, said = source.read(source.columns(), repair=False)
     columns, texts = as_columns(path, table, (source.counted, source.first))
     form = f"{path.suffix.lower()}, by {type(source).__module__.partition('.')[0]}"
     return Recording(path, form, columns, texts, said=tuple(said), first=source.first, counted=source.counted)
-
-
-def _bag(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
-    source = source_of(path, robot, topics)
-    table, said = source.read(source.columns(), repair=False)
-    columns, texts = as_columns(path, table, ("joint state", 1))
-    return Recording(path, "ROS bag", columns, texts, said=tuple(said), counted="joint state", is_bag=True)

@@ -28,6 +28,7 @@ _WARM = (-30.0, 130.0)  # degC
 _MAINS = frozenset(["mains", "grid", "netz", "ac", "wall"])
 _BUS = frozenset(["bus", "dc", "dclink", "zwischenkreis"])
 _OF_POWER = ("power", "meter_voltage", "meter_current")
+Look = Callable[[list[np.ndarray], list[int], str], UnitEvidence]  # at values as logged, of joints, in an SI unit
 Units = dict[str, tuple[Unit, str]]  # by column: its unit, and how that was told
 
 
@@ -73,34 +74,24 @@ class _Taking:
         self.motions: list[MeasuredRun] = []
 
     def result(self) -> TakenLogs:
-        self._resolve(
-            "q", lambda joints, _: evidence.position([self.robot.joints[j] for j in joints], self._raw("q", joints))
-        )
-        self._resolve(
-            "command",
-            lambda joints, _: evidence.position([self.robot.joints[j] for j in joints], self._raw("command", joints)),
-        )
+        self._resolve("q", self._position)
+        self._resolve("command", self._position)
         positions = self._si("q")
         seconds, started = self._seconds(positions)
         self.motions = [MeasuredRun(*pair) for pair in zip(seconds, positions, strict=True)]
-        self._resolve("dq", lambda joints, si: evidence.rate(self.motions, self._raw("dq", joints), joints, si))
-        self._resolve("ddq", lambda joints, si: evidence.rate(self.motions, self._raw("ddq", joints), joints, si, 2))
-        self._resolve(
-            "torque",
-            lambda joints, si: evidence.torque(self.robot, self.motions, self._raw("torque", joints), joints, si),
-        )
+        self._resolve("dq", lambda raw, joints, si: evidence.rate(self.motions, raw, joints, si))
+        self._resolve("ddq", lambda raw, joints, si: evidence.rate(self.motions, raw, joints, si, 2))
+        self._resolve("torque", lambda raw, joints, si: evidence.torque(self.robot, self.motions, raw, joints, si))
         if self._of("torque"):
             torques = self._si("torque")
             self.motions = [
                 MeasuredRun(each.time, each.q, torque) for each, torque in zip(self.motions, torques, strict=True)
             ]
-        self._resolve("current", lambda joints, si: evidence.by_size(si, self._raw("current", joints), _CURRENT))
-        self._resolve(
-            "temperature", lambda joints, si: _warm(evidence.by_size(si, self._raw("temperature", joints), _WARM))
-        )
-        self._resolve("meter_voltage", lambda _, si: evidence.by_size(si, self._raw("meter_voltage"), _VOLTAGE))
+        self._resolve("current", lambda raw, _, si: evidence.by_size(si, raw, _CURRENT))
+        self._resolve("temperature", lambda raw, _, si: _warm(evidence.by_size(si, raw, _WARM)))
+        self._resolve("meter_voltage", lambda raw, _, si: evidence.by_size(si, raw, _VOLTAGE))
         self._resolve("meter_current", self._supply_current)
-        self._resolve("power", lambda _, si: evidence.power(self.robot, self.motions, self._raw("power")))
+        self._resolve("power", lambda raw, *_: evidence.power(self.robot, self.motions, raw))
         power_at, why = self._power_at()
         rows = tuple(self._row(each) for each in self.meanings)
         runs = tuple(
@@ -137,10 +128,10 @@ class _Taking:
             )
         return ratio
 
-    def _raw(self, field: str, joints: Sequence[int] | None = None) -> list[np.ndarray]:
+    def _raw(self, field: str, joints: Sequence[int]) -> list[np.ndarray]:
         """Return a channel of each log, in its own units: (N, joints), or (N,) of the whole robot's."""
         columns = self._of(field)
-        if joints is None:
+        if not CHANNELS[field].per_joint:
             return [self._values(log, columns[0]) for log in self.logs]
         return [np.column_stack([self._values(log, columns[joint]) for joint in joints]) for log in self.logs]
 
@@ -160,12 +151,13 @@ class _Taking:
         kind = "" if each.joint is None else self.robot.joints[self.robot.index(each.joint)].kind
         return CHANNELS[str(each.field)].unit_of(kind)
 
-    def _resolve(self, field: str, look: Callable[[list[int], str], UnitEvidence]) -> None:
+    def _resolve(self, field: str, look: Look) -> None:
         """Find the unit of each column of a channel; those of one quantity share it where they say none."""
         columns = self._of(field)
         for si in dict.fromkeys(self._si_unit(each) for each in columns):
             places = [place for place, each in enumerate(columns) if self._si_unit(each) == si]
-            self._share([columns[place] for place in places], si, lambda places=places, si=si: look(places, si))  # type: ignore[misc]
+            own = [columns[place] for place in places]
+            self._share(own, si, lambda places=places, si=si: look(self._raw(field, places), places, si))  # type: ignore[misc]
 
     def _share(self, columns: Sequence[Meaning], si: str, look: Callable[[], UnitEvidence]) -> None:
         said = sorted((each for each in columns if each.unit is not None), key=lambda each: not each.given)
@@ -193,13 +185,16 @@ class _Taking:
             answers.append(WayOut("leave it out", (("--map", f"{each.column}={LEFT_OUT}"),)))
         return DoubtError(f"{self.where}: column {each.column} ({CHANNELS[str(each.field)].label}) {question}", answers)
 
-    def _supply_current(self, _: list[int], si: str) -> UnitEvidence:
-        amperes = self._raw("meter_current")
+    def _position(self, raw: list[np.ndarray], joints: list[int], _: str) -> UnitEvidence:
+        return evidence.position([self.robot.joints[joint] for joint in joints], raw)
+
+    def _supply_current(self, amperes: list[np.ndarray], _: list[int], si: str) -> UnitEvidence:
         if not self._of("meter_voltage"):
             return evidence.by_size(si, amperes, _SUPPLY)
         column = self._of("meter_voltage")[0]
         volts = [self.units[column.column][0].to_si(log.columns[column.column]) for log in self.logs]
-        return evidence.supply_current(self.robot, self.motions, volts, amperes)
+        watts = [volt * ampere for volt, ampere in zip(volts, amperes, strict=True)]
+        return evidence.power(self.robot, self.motions, watts, si)
 
     def _seconds(self, positions: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[datetime | None]]:
         """Return the times of each log, s, and when it started where its times say that."""

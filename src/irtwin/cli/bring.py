@@ -167,12 +167,12 @@ def _show(brought: Brought) -> None:
     console = Console()
     wide = Console(width=None if console.is_terminal else _WIDE)
     for form in brought.forms:
-        files = ", ".join(file.name for file in form.files[:4]) + (" ..." if len(form.files) > 4 else "")
-        title = Text(printable(f"{files}: {form.form}"))
+        files = ", ".join(log.path.name for log in form.logs[:4]) + (" ..." if len(form.logs) > 4 else "")
+        title = Text(printable(f"{files}: {form.logs[0].form}"))
         table = Table("column", "channel", "unit", "conversion", "why", title=title)
         table.title_justify = "left"
         rows: dict[tuple[str, ...], list[Taken]] = {}
-        for each in form.columns:
+        for each in form.taken.columns:
             rows.setdefault((each.unit, each.conversion, each.why) if each.channel else ("", "", each.why), []).append(
                 each
             )
