@@ -34,7 +34,7 @@ def test_a_file_with_nothing_changed_is_the_same_bytes(tmp_path):
 
 def test_changed_numbers_alone_differ(tmp_path):
     file = read_model_file(model(tmp_path))
-    pan, lift = (file.tag(["joint"], "name", name) for name in ("pan", "lift"))
+    pan, lift = (file.element(["joint"], "name", name) for name in ("pan", "lift"))
     new = {pan: {"damping": 1.25}, lift: {"armature": 0.5}}
     expected = TEXT.replace("damping = '1.0'", "damping = '1.25'").replace('class="x" >', 'class="x" armature="0.5">')
     assert file.changed(new).decode() == expected
@@ -42,7 +42,7 @@ def test_changed_numbers_alone_differ(tmp_path):
 
 def test_an_element_takes_another_name_and_attributes_go(tmp_path):
     file = read_model_file(model(tmp_path))
-    changed = file.changed({file.tag(["joint"], "name", "lift"): {"": "freejoint", "class": None, "user": "1 2"}})
+    changed = file.changed({file.element(["joint"], "name", "lift"): {"": "freejoint", "class": None, "user": "1 2"}})
     assert changed.decode() == TEXT.replace(
         '<joint name="lift" class="x" ></joint>', '<freejoint name="lift" user="1 2"></freejoint>'
     )
@@ -52,15 +52,15 @@ def test_an_element_takes_another_name_and_attributes_go(tmp_path):
 def test_numbers_are_read_back_as_they_were(tmp_path_factory, value):
     folder = tmp_path_factory.mktemp("model")
     file = read_model_file(model(folder))
-    changed = file.changed({file.tag(["joint"], "name", "lift"): {"frictionloss": value}})
-    tags = read_model_file(model(folder, changed.decode())).tags
-    (lift,) = [tag for tag in tags if tag.attributes.get("name") == "lift"]
+    changed = file.changed({file.element(["joint"], "name", "lift"): {"frictionloss": value}})
+    elements = read_model_file(model(folder, changed.decode())).elements
+    (lift,) = [one for one in elements if one.attributes.get("name") == "lift"]
     assert float(lift.attributes["frictionloss"]) == value
 
 
 def test_an_element_of_another_file_is_not_changed(tmp_path):
     with pytest.raises(InputError, match=r'arm\.xml: has no <joint name="elbow"> of its own; give the file'):
-        read_model_file(model(tmp_path)).tag(["joint"], "name", "elbow")
+        read_model_file(model(tmp_path)).element(["joint"], "name", "elbow")
 
 
 @pytest.mark.parametrize(

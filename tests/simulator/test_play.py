@@ -39,8 +39,8 @@ def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(tmp_path):
 def test_stretches_do_not_overlap_and_are_spread(tmp_path):
     run = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(10, 1)}))[0].runs[0]
     assert [round(one.begin, 2) for one in each(run, 2.0, 2)] == [1.5, 6.49]
-    assert len(each(run, 0.5)) == 19
-    assert [len(one.time) for one in each(run, 60.0)] == [500]
+    assert len(each(run, 0.5, 60)) == 19
+    assert [len(one.time) for one in each(run, 60.0, 60)] == [500]
 
 
 def test_a_joint_by_itself_plays_nearly_as_the_whole_model(tmp_path):

@@ -13,9 +13,12 @@ from irtwin.errors import InputError
 _TAG = re.compile(rb"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
 
 
-@dataclass
+@dataclass(eq=False)
 class Element:
-    """An element of the bytes from `start` to `stop`, its start tag as far as `inside`."""
+    """An element of the bytes from `start` to `stop`, its start tag as far as `inside`.
+
+    One that is yet to come takes no bytes: it stands where it is to be put.
+    """
 
     tag: str
     attributes: dict[str, str]

@@ -8,8 +8,8 @@ import numpy as np
 
 from irtwin.document.document import Cause, Document
 from irtwin.effects.catalogue import catalogue
+from irtwin.robot.xml_elements import Element
 from irtwin.simulator.model import Model
-from irtwin.simulator.model_file import Tag
 from irtwin.twin.twin import Twin
 
 Key = tuple[str, str, str]  # effect, joint, name of a parameter
@@ -25,11 +25,11 @@ def written(model: Model, document: Document, off: Mapping[Key, float] | None = 
 
     `off`: what is added to a number, by effect, joint and name.
     """
-    changed: dict[Tag, dict[str, float]] = {}
+    changed: dict[Element, dict[str, float]] = {}
     for (effect, joint, name), robot in _numbers(document).items():
-        tag, attribute = model.file.number(model.called[joint], catalogue()[effect].changed_in_mjcf[name])
+        element, attribute = model.file.number(model.called[joint], catalogue()[effect].changed_in_mjcf[name])
         number = robot + (off or {}).get((effect, joint, name), 0.0)
-        changed.setdefault(tag, {})[attribute] = max(number, 0.0)
+        changed.setdefault(element, {})[attribute] = max(number, 0.0)
     return model.file.changed(changed)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.simulator.model_file import ModelFile, check_inside, read_xml, with_dynamics
+from irtwin.simulator.model_file import ModelFile, check_inside, read_xml
 from irtwin.simulator.sdf_file import SdfFile
 from irtwin.simulator.usd_file import ENDINGS, read_usd
 
@@ -18,11 +18,11 @@ def read_model_file(path: Path) -> ModelFile:
     if path.suffix.lower() in ENDINGS:
         return read_usd(path)
     file = read_xml(path)
-    match file.tags[0].element:
+    match file.elements[0].tag:
         case "robot":
-            return with_dynamics(file)  # files that it names are meshes: nobody loads them
+            return file  # files that it names are meshes: nobody loads them
         case "sdf":
-            return SdfFile(file.path, file.content, file.tags)  # the same
+            return SdfFile(file.path, file.content, file.elements)  # the same
         case "mujoco":
             check_inside(file, path.parent, {})
             return file

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice, takewhile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
-from irtwin.robot.xml_elements import outermost
+from irtwin.robot.xml_elements import Element, outermost
 
 if TYPE_CHECKING:
     import mujoco
@@ -22,59 +21,50 @@ _IN_URDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, 
 _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
 
 
-@dataclass(frozen=True, eq=False)
-class Tag:
-    """A start tag: its element, attributes, and the bytes of the file that it takes; none where it is yet to come."""
-
-    element: str
-    attributes: Mapping[str, str]
-    start: int
-    stop: int
+Changes = Mapping[Element, Mapping[str, float | str | None]]
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """The file's bytes and its start tags, in their order; files that it includes are not among them."""
+    """The file's bytes and its elements, in their order; those of files that it includes are not among them."""
 
     path: Path
     content: bytes
-    tags: tuple[Tag, ...]
+    elements: tuple[Element, ...]
 
-    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
-        """Return the file with attributes of tags changed; all else stays, byte for byte.
+    def changed(self, changes: Changes) -> bytes:
+        """Return the file with attributes of elements changed; all else stays, byte for byte.
 
         A number takes the place of the first one of several, a text that of all, None takes the attribute out. The key
         "" gives the element another name.
         """
         content = self.content
-        for tag in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
-            text, after = content[tag.start : tag.stop] or f"<{tag.element}/>".encode(), content[tag.stop :]
-            for attribute, value in changes[tag].items():
+        for own in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+            text, after = content[own.start : own.inside] or f"<{own.tag}/>".encode(), content[own.inside :]
+            for attribute, value in changes[own].items():
                 if attribute:
                     text = _with_attribute(text, attribute, repr(value) if isinstance(value, float) else value)
                 else:
-                    text = text.replace(f"<{tag.element}".encode(), f"<{value}".encode(), 1)
+                    text = text.replace(f"<{own.tag}".encode(), f"<{value}".encode(), 1)
                     if not text.endswith(b"/>"):
-                        after = after.replace(f"</{tag.element}".encode(), f"</{value}".encode(), 1)
-            content = content[: tag.start] + text + after
+                        after = after.replace(f"</{own.tag}".encode(), f"</{value}".encode(), 1)
+            content = content[: own.start] + text + after
         return content
 
-    def tag(self, elements: Sequence[str], key: str, value: str) -> Tag:
-        """Return the tag of one of some elements with an attribute's value.
+    def element(self, tags: Sequence[str], key: str, value: str) -> Element:
+        """Return the element of one of some tags with an attribute's value.
 
         Raises InputError where the file has none of its own: an included file may have it.
         """
-        for one in self.tags:
-            if one.element in elements and one.attributes.get(key) == value:
+        for one in self.elements:
+            if one.tag in tags and one.attributes.get(key) == value:
                 return one
-        raise InputError(
-            f'{self.path}: has no <{elements[0]} {key}="{value}"> of its own; give the file that defines it'
-        )
+        raise InputError(f'{self.path}: has no <{tags[0]} {key}="{value}"> of its own; give the file that defines it')
 
     @property
     def is_urdf(self) -> bool:
         """Whether it is a URDF."""
-        return any(tag.element == "robot" for tag in self.tags[:1])
+        return any(one.tag == "robot" for one in self.elements[:1])
 
     def holds(self, number: str) -> bool:
         """Return whether it has a place for a number, by what MJCF calls it."""
@@ -89,22 +79,21 @@ class ModelFile:
 
         return mujoco.MjSpec.from_file(str(self.path))
 
-    def number(self, joint: str, number: str) -> tuple[Tag, str]:
-        """Return the tag and the attribute that hold a joint's number."""
-        own = self.tag(["joint"], "name", joint)
+    def number(self, joint: str, number: str) -> tuple[Element, str]:
+        """Return the element and the attribute that hold a joint's number."""
+        own = self.element(["joint"], "name", joint)
         if not self.is_urdf:
             return own, number
-        after = self.tags[self.tags.index(own) + 1 :]
-        return next(one for one in after if one.element == "dynamics"), _IN_URDF[number]
+        dynamics = own.child("dynamics")
+        if dynamics is None:
+            dynamics = Element("dynamics", {}, own.inside, own.inside)  # yet to come
+            own.children.append(dynamics)
+        return dynamics, _IN_URDF[number]
 
-    def inertial(self, body: str) -> Tag | None:
-        """Return the tag of a body's own inertial, None where the file has none: included, or taken from geoms."""
-        of = ""
-        for one in self.tags:
-            of = one.attributes.get("name", "") if one.element == "body" else of
-            if one.element == "inertial" and of == body:
-                return one
-        return None
+    def inertial(self, body: str) -> Element | None:
+        """Return a body's own inertial, None where the file has none: included, or taken from geoms."""
+        own = (one for one in self.elements if one.tag == "body" and one.attributes.get("name") == body)
+        return next((one.child("inertial") for one in own), None)
 
 
 def read_xml(path: Path) -> ModelFile:
@@ -118,29 +107,17 @@ def read_xml(path: Path) -> ModelFile:
         raise InputError(f"{path}, line {error.lineno}, column {error.offset + 1}: {reason}; mend the XML") from error
     except ValueError as error:
         raise InputError(f"{path}, {error}") from error
-    return ModelFile(path, content, tuple(Tag(one.tag, one.attributes, one.start, one.inside) for one in whole.walk()))
-
-
-def with_dynamics(file: ModelFile) -> ModelFile:
-    """Return a URDF with a tag of <dynamics> that is yet to come in each joint that has none."""
-    tags: list[Tag] = []
-    for place, tag in enumerate(file.tags):
-        tags.append(tag)
-        if tag.element == "joint":
-            inside = takewhile(lambda one: one.element not in ("joint", "link"), islice(file.tags, place + 1, None))
-            if not any(one.element == "dynamics" for one in inside):
-                tags.append(Tag("dynamics", {}, tag.stop, tag.stop))
-    return replace(file, tags=tuple(tags))
+    return ModelFile(path, content, tuple(whole.walk()))
 
 
 def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
     """Raise InputError where a file, or one that it includes, names one outside the folder of the model."""
     seen[file.path] = None
     folders: dict[str, str] = {}
-    for tag in file.tags:
-        if tag.element == "compiler":
-            folders |= {"meshdir": tag.attributes.get("assetdir", ""), "texturedir": tag.attributes.get("assetdir", "")}
-            folders |= {key: tag.attributes[key] for key in ("meshdir", "texturedir") if key in tag.attributes}
+    for one in file.elements:
+        if one.tag == "compiler":
+            folders |= dict.fromkeys(("meshdir", "texturedir"), one.attributes.get("assetdir", ""))
+            folders |= {key: one.attributes[key] for key in ("meshdir", "texturedir") if key in one.attributes}
     for element, named in _files(file):
         place = folder / folders.get(_FOLDERS.get(element, ""), "") / named
         real = real_path(place)
@@ -153,10 +130,10 @@ def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
 
 
 def _files(file: ModelFile) -> Iterator[tuple[str, str]]:
-    for tag in file.tags:
-        for key, value in tag.attributes.items():
+    for one in file.elements:
+        for key, value in one.attributes.items():
             if key.startswith("file") and value:
-                yield tag.element, value
+                yield one.tag, value
 
 
 def _with_attribute(tag: bytes, name: str, value: str | None) -> bytes:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from irtwin.robot.structure import six_numbers
+from irtwin.robot.xml_elements import Element
 from irtwin.simulator.model import Flange, Model
-from irtwin.simulator.model_file import Tag
 
 if TYPE_CHECKING:
     import mujoco
@@ -39,15 +39,15 @@ def loaded(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarra
     return one
 
 
-def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Tag, dict[str, float | str | None]]:
+def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Element, dict[str, float | str | None]]:
     """Return what changes of the file: the inertial of the flange's body; nothing where the file says none."""
-    tag = model.file.inertial(model.compiled.body(model.flange.body).name)
-    if tag is None:
+    inertial = model.file.inertial(model.compiled.body(model.flange.body).name)
+    if inertial is None:
         return {}
     whole, centre, inertia = together(model.compiled, model.flange, mass, off)
     told: dict[str, float | str | None] = dict.fromkeys(_OTHER_FORMS)
     told |= {"mass": float(whole), "pos": " ".join(map(repr, centre.tolist()))}
-    return {tag: told | {"fullinertia": " ".join(map(repr, six_numbers(inertia)))}}
+    return {inertial: told | {"fullinertia": " ".join(map(repr, six_numbers(inertia)))}}
 
 
 def together(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
@@ -14,9 +14,10 @@ from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
 from irtwin.robot.structure import inertia_of
+from irtwin.robot.xml_elements import Element as XmlElement
 from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
-from irtwin.simulator.model_file import ModelFile, Tag
+from irtwin.simulator.model_file import Changes, ModelFile
 
 if TYPE_CHECKING:
     import mujoco
@@ -43,16 +44,16 @@ class SdfFile(ModelFile):
         """Return whether it has a place for a number, by what MJCF calls it."""
         return number in _IN_SDF
 
-    def number(self, joint: str, number: str) -> tuple[Tag, str]:
-        """Return the joint's tag, and the element of its <dynamics> that holds a number."""
-        return self.tag(["joint"], "name", joint), _IN_SDF[number]
+    def number(self, joint: str, number: str) -> tuple[XmlElement, str]:
+        """Return the joint, and the element of its <dynamics> that holds a number."""
+        return self.element(["joint"], "name", joint), _IN_SDF[number]
 
-    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
+    def changed(self, changes: Changes) -> bytes:
         """Return the file with numbers of joints changed; all else stays, byte for byte."""
         content = self.content
-        for tag in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
-            for name, value in changes[tag].items():
-                joint = next(one for one in outermost(content).walk() if one.start == tag.start)
+        for own in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+            for name, value in changes[own].items():
+                joint = next(one for one in outermost(content).walk() if one.start == own.start)
                 axis, text = joint.child("axis"), f"<{name}>{value!r}</{name}>"
                 assert axis is not None  # else it does not move
                 dynamics = axis.child("dynamics")

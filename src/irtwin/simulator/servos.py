@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 
 from irtwin.errors import InputError
+from irtwin.robot.xml_elements import Element
 from irtwin.simulator.model import Model, Paired, pair
-from irtwin.simulator.model_file import Tag
 from irtwin.simulator.payload import load, loaded_tag
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Servos:
 
         What the file has no place for stays out: a URDF's friction that creeps and armature, and gains that are told.
         """
-        changes: dict[Tag, dict[str, float | str | None]] = {}
+        changes: dict[Element, dict[str, float | str | None]] = {}
         file, differs = self.model.file, differs & self.held
         numbers = np.where(self.held, numbers, self.numbers)
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
@@ -169,15 +169,15 @@ class Servos:
             if own["holding"]:
                 of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
             for key in of_joint:
-                tag, attribute = file.number(joint, key)
-                changes.setdefault(tag, {})[attribute] = of_joint[key]
+                element, attribute = file.number(joint, key)
+                changes.setdefault(element, {})[attribute] = of_joint[key]
             if self.in_file[place] and any(own[name] for name in ("damping", *_IN_SERVO)):
-                tag = file.tag(["position", "general"], "joint", joint)
-                changes[tag] = self._of_servo(tag, place, told, own, float(in_servo[place]))
+                servo = file.element(["position", "general"], "joint", joint)
+                changes[servo] = self._of_servo(servo, place, told, own, float(in_servo[place]))
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if differs[NAMES.index("payload")].any():
             changes |= loaded_tag(self.model, float(mass), np.array(off[:3]))
-        option = next((tag for tag in file.tags if tag.element == "option"), None)
+        option = next((one for one in file.elements if one.tag == "option"), None)
         if option and differs[NAMES.index("tilt_x")].any():
             changes[option] = {"gravity": " ".join(map(repr, tilted(self.model.compiled, off[3:]).tolist()))}
         return file.changed(changes)
@@ -190,19 +190,19 @@ class Servos:
         return told + [part.replace("_", " ") for part in PARTS if lacks[row_of(part)].any()]
 
     def _of_servo(
-        self, tag: Tag, place: int, told: Mapping[str, float], own: Mapping[str, bool], damping: float
+        self, servo: Element, place: int, told: Mapping[str, float], own: Mapping[str, bool], damping: float
     ) -> dict[str, float | str | None]:
         """Return what changes of a servo's tag; only <general> holds an offset of commands."""
         changed: dict[str, float | str | None] = {}
         bias = f"{told['stiffness'] * told['offset']!r} {-told['stiffness']!r} {-damping!r}"
-        if tag.element == "general":
+        if servo.tag == "general":
             changed |= {"gainprm": told["stiffness"], "biasprm": bias}
         elif told["offset"]:
             kind = {"": "general", "kp": None, "kv": None, "dampratio": None, "inheritrange": None}
             changed |= {**kind, "gaintype": "fixed", "biastype": "affine"}
             changed |= {"gainprm": told["stiffness"], "biasprm": bias}
             compiled, at = self.model.compiled, self.actuators[place]
-            if compiled.actuator_ctrllimited[at] and "ctrlrange" not in tag.attributes:
+            if compiled.actuator_ctrllimited[at] and "ctrlrange" not in servo.attributes:
                 changed["ctrlrange"] = " ".join(map(repr, compiled.actuator_ctrlrange[at].tolist()))
         else:
             changed |= {"kp": told["stiffness"]} if own["stiffness"] else {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +14,9 @@ import scipy
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input, real_path
+from irtwin.robot.xml_elements import Element
 from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
-from irtwin.simulator.model_file import ModelFile, Tag
+from irtwin.simulator.model_file import Changes, ModelFile
 
 if TYPE_CHECKING:
     import mujoco
@@ -68,7 +69,7 @@ _FIRST_OF_OTHERS = "mjc:", "physxJoint:"  # where nobody said a number it is not
 
 
 class UsdFile(ModelFile):
-    """A USD file; its tags are its joints, and their drives of stiffness."""
+    """A USD file; its elements are its joints, and their drives of stiffness."""
 
     @cached_property
     def stage(self) -> Any:
@@ -86,7 +87,7 @@ class UsdFile(ModelFile):
         if out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
             raise InputError(f"{out}: is to be a layer over {self.path}; give a file beside that, and with its ending")
 
-    def changed(self, changes: Mapping[Tag, Mapping[str, float | str | None]]) -> bytes:
+    def changed(self, changes: Changes) -> bytes:
         """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes."""
         from pxr import Sdf
 
@@ -99,10 +100,10 @@ class UsdFile(ModelFile):
             for key in set(own.ListInfoKeys()) - _OF_LAYER:
                 root.SetInfo(key, own.GetInfo(key))
             layer.subLayerPaths.append(f"./{self.path.name}")
-            for tag, said in changes.items():
+            for element, said in changes.items():
                 for number, value in said.items():
                     if value is not None:  # of a range the end, as drives have no least
-                        self._put(layer, tag.attributes["path"], number, float(str(value).split()[-1]))
+                        self._put(layer, element.attributes["path"], number, float(str(value).split()[-1]))
             layer.Save()
             return place.read_bytes()
 
@@ -161,7 +162,7 @@ def read_usd(path: Path) -> UsdFile:
     try:
         _check_inside(path, path.parent, set())
         file = UsdFile(path, content, ())
-        return UsdFile(path, content, tuple(_tags(file.stage)))
+        return UsdFile(path, content, tuple(_elements(file.stage)))
     except Tf.ErrorException as error:
         raise InputError(f"{path}: is no USD that can be read ({_reason(error)})") from error
 
@@ -195,11 +196,11 @@ def _joints(stage: Any) -> Iterator[Any]:
             yield prim
 
 
-def _tags(stage: Any) -> Iterator[Tag]:
+def _elements(stage: Any) -> Iterator[Element]:
     for prim in _joints(stage):
         said = {"name": _name(prim), "joint": _name(prim), "path": str(prim.GetPath())}
-        yield Tag("joint", said, 0, 0)
-        yield Tag("position", said, 0, 0)
+        yield Element("joint", said, 0, 0)
+        yield Element("position", said, 0, 0)
 
 
 def _name(prim: Any) -> str:
