@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.bring.meaning import Meaning
+from irtwin.bring.column_name import Meaning
 from irtwin.bring.recording import Recording
 from irtwin.errors import InputError
 from irtwin.signals.holes import known_at

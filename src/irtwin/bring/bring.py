@@ -15,9 +15,9 @@ import pyarrow.parquet
 from irtwin.bring import rtde_names
 from irtwin.bring.aligned import aligned
 from irtwin.bring.choice import meanings
+from irtwin.bring.column_name import Meaning
 from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import DoubtError, WayOut
-from irtwin.bring.meaning import Meaning
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed

@@ -45,22 +45,32 @@ _CAMEL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")
 
 
 @dataclass(frozen=True)
-class Said:
-    """What a name says. `field` of Signals, None where it says none, with `why` it is not used; `by_unit`: its unit
-    alone tells the field; `words`: all but numbers and those that say measured; `weak`: a joint and a number, no more.
+class Meaning:
+    """What a column was taken for, and `why`; `field` of Signals, None where it is not used; `joint`: its name.
+
+    `words`: those of its name but those that say measured; `numbers`: those of its name; `weak`: it says a joint and no
+    channel; `given`: the user said it.
     """
 
+    column: str
     field: str | None
-    unit: Unit | None
-    words: tuple[str, ...]
-    numbers: tuple[int, ...]
-    measured: bool = False
+    joint: str | None = None
+    unit: Unit | None = None
+    unit_why: str = ""
     motor: bool = False
-    weak: bool = False
     why: str = ""
+    words: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
+    measured: bool = False
+    weak: bool = False
+    given: bool = False
+
+    def unused(self, why: str) -> Meaning:
+        """Return it as a column that is not used."""
+        return replace(self, field=None, joint=None, unit=None, why=why)
 
 
-def said_by(name: str, unit_text: str | None = None) -> Said:
+def said_by(name: str, unit_text: str | None = None) -> Meaning:
     """Return what a column's name says; `unit_text` is what the file says of its unit beside the name."""
     bare, text = _split(name)
     tokens = words_of(bare)
@@ -72,7 +82,7 @@ def said_by(name: str, unit_text: str | None = None) -> Said:
     unit = _unit(field, unit_text or text) if field is not None else None
     if unit is None and field is not None and (within := _unit_within(bare, field)) is not None:
         rest, unit = within
-        return replace(said_by(rest), unit=unit)
+        return replace(said_by(rest), column=name, unit=unit)
     measured, motor = bool(_MEASURED & set(words)), bool(_MOTOR & set(words))
     kept = tuple(word for word in words if word not in _MEASURED)
     weak = field is None and bool(words) and set(kept) <= _WEAK and len(numbers) == 1
@@ -84,7 +94,10 @@ def said_by(name: str, unit_text: str | None = None) -> Said:
     if weak:
         field = "q"  # as positions are often logged; their range is held against the joints' limits
     why = _unused(words, field)
-    return Said(None if why else field, unit, kept, numbers, measured, motor, weak, why)
+    return Meaning(
+        name, None if why else field, unit=unit, motor=motor, why=why, words=kept, numbers=numbers, measured=measured,
+        weak=weak,
+    )  # fmt: skip
 
 
 def _unused(words: tuple[str, ...], field: str | None) -> str:

@@ -2,46 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from irtwin.bring.column_name import said_by, word_set, words_of
+from irtwin.bring.column_name import Meaning, said_by, word_set, words_of
 from irtwin.bring.recording import Recording
 from irtwin.bring.rtde_names import JOINTS, PAYLOAD, is_rtde, variable
 from irtwin.bring.told import Target
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel, by_column
-from irtwin.signals.unit import Unit, unit_of
+from irtwin.signals.unit import unit_of
 
 _GEARED = ("q", "dq", "ddq", "torque")  # fields that may be of the motor's side of the gear
 _METER = word_set("robot bus supply dc main mains total grid netz ac system sum gesamt meter zwischenkreis")
 _GENERIC = word_set("joint axis link")  # words that tell no joint from another
 _ALONE = "it names a joint and nothing else, as positions do"
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """What a column was taken for; `field` of Signals, None where it is not used; `joint`: its name.
-
-    `words` and `numbers` are those of its name; `weak`: it says a joint and no channel; `given`: the user said it.
-    """
-
-    column: str
-    field: str | None
-    joint: str | None = None
-    unit: Unit | None = None
-    unit_why: str = ""
-    motor: bool = False
-    why: str = ""
-    words: tuple[str, ...] = ()
-    numbers: tuple[int, ...] = ()
-    measured: bool = False
-    weak: bool = False
-    given: bool = False
-
-    def unused(self, why: str) -> Meaning:
-        """Return it as a column that is not used."""
-        return replace(self, field=None, joint=None, unit=None, why=why)
 
 
 def first_meaning(name: str, recording: Recording, robot: Robot, target: Target | None) -> Meaning:
@@ -77,24 +52,17 @@ def _by_name(name: str, recording: Recording, robot: Robot) -> Meaning:
         by_definition = unit_of(unit, (unit,))
         return Meaning(name, field, joint, by_definition, "by RTDE's definition", why="RTDE's variable")
     exact = by_column(robot.joint_names).get(name)
-    unit_text = recording.units.get(name)
-    said_name = said_by(name, unit_text)
     if exact is not None:
         return _exact(name, exact, recording, robot)
-    meaning = Meaning(
-        name,
-        said_name.field,
-        None,
-        said_name.unit,
-        ("as the line of units says" if unit_text else "by its name") if said_name.unit else "",
-        said_name.motor and said_name.field in _GEARED,
-        said_name.why or (_ALONE if said_name.weak else "by its name"),
-        said_name.words,
-        said_name.numbers,
-        said_name.measured,
-        said_name.weak,
+    unit_text = recording.units.get(name)
+    meaning = said_by(name, unit_text)
+    return replace(
+        meaning,
+        joint=_joint_by_words(meaning, robot),
+        unit_why=("as the line of units says" if unit_text else "by its name") if meaning.unit else "",
+        motor=meaning.motor and meaning.field in _GEARED,
+        why=meaning.why or (_ALONE if meaning.weak else "by its name"),
     )
-    return replace(meaning, joint=_joint_by_words(meaning, robot))
 
 
 def _rtde_unused(name: str) -> str:

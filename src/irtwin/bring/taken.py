@@ -10,9 +10,9 @@ import numpy as np
 
 from irtwin.bring import evidence
 from irtwin.bring.aligned import Aligned
+from irtwin.bring.column_name import Meaning
 from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.evidence import MeasuredRun, UnitEvidence
-from irtwin.bring.meaning import Meaning
 from irtwin.bring.rtde_names import POWER_AT, is_rtde
 from irtwin.bring.told import LEFT_OUT, UserSaid
 from irtwin.errors import InputError

@@ -10,6 +10,7 @@ from irtwin.check.moving import Moving
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, columns_of
 from irtwin.signals.finding import LogFinding
+from irtwin.signals.motion import stretches
 from irtwin.signals.sampling import interval
 
 _JITTER = 0.3  # of the interval: median deviation of the times between samples
@@ -90,18 +91,14 @@ def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> LogFindin
     for each in values:
         for end in (each.max(), each.min()):
             at_end = each == end
-            if len(each) >= _FEWEST and at_end.mean() > _FLAT and _longest(at_end) >= _ROW and np.ptp(each) > 0:
+            longest = max((own.stop - own.start for own in stretches(at_end)), default=0)
+            if len(each) >= _FEWEST and at_end.mean() > _FLAT and longest >= _ROW and np.ptp(each) > 0:
                 share = float(at_end.mean())
                 say = f"{column} stays at {end:.4g} for {share:.1%} of the time, as if cut off there; widen its range"
                 return LogFinding(
                     "saturation", column, moving.names, False, False, {"at": float(end), "share": share}, say
                 )
     return None
-
-
-def _longest(holds: np.ndarray) -> int:
-    ends = np.flatnonzero(np.diff(np.concatenate([[0], holds.view(np.int8), [0]])))
-    return int((ends[1::2] - ends[::2]).max(initial=0))
 
 
 def _coarse(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:

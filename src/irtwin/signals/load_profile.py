@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.signals.channels import Samples
+from irtwin.signals.motion import stretches
 
 OFF, STANDBY, WORKING = "off", "standby", "working"
 _OFF = 0.02  # of what is drawn at work: less is off
@@ -83,9 +84,9 @@ def _levels(time: Samples, power: Samples) -> np.ndarray:
     if limit is not None:
         levels[on & (power < limit)] = 1
     least = max(_SHORTEST[0], _SHORTEST[1] * float(np.median(np.diff(time))))
-    for first, stop in _stretches(levels < 2):
-        if time[min(stop, len(time) - 1)] - time[first] < least:
-            levels[first:stop] = 2
+    for own in stretches(levels < 2):
+        if time[min(own.stop, len(time) - 1)] - time[own.start] < least:
+            levels[own] = 2
     low, high = power[levels == 1], power[levels == 2]
     if len(low) and len(high) and low.std() > _STEADY * (high.mean() - low.mean()):
         levels[levels == 1] = 2
@@ -106,21 +107,15 @@ def _between(power: Samples) -> float | None:
     return float(ordered[best] + ordered[best + 1]) / 2
 
 
-def _stretches(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and past-the-last index of each stretch of yes."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
-
-
 def _cycles(time: Samples, power: Samples, spent: Samples, working: np.ndarray) -> Cycles | None:
-    stretches = _stretches(working)
-    starts = np.array([first for first, _ in stretches if first > 0])
+    at_work = list(stretches(working))
+    starts = np.array([own.start for own in at_work if own.start > 0])
     if len(starts) > _FEWEST:
         periods, energies = np.diff(time[starts]), np.diff(spent[starts])
         if _alike(periods) and _alike(energies):
             return Cycles(len(periods), float(np.median(periods)), float(np.median(energies)))
-    first, stop = max(stretches, key=lambda one: one[1] - one[0], default=(0, 0))
-    return _repeating(time[first:stop], power[first:stop], spent[first:stop])
+    longest = max(at_work, key=lambda own: own.stop - own.start, default=slice(0, 0))
+    return _repeating(time[longest], power[longest], spent[longest])
 
 
 def _alike(values: np.ndarray) -> bool:
