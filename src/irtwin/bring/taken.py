@@ -164,15 +164,16 @@ class _Taking:
         seen = None if said and said[0].given else look()
         for each in columns:
             if each.unit is None and said:
-                self.units[each.column] = _known(said[0].unit), f"as {said[0].column}"
+                assert said[0].unit is not None  # that is what is said
+                self.units[each.column] = said[0].unit, f"as {said[0].column}"
             elif each.unit is None and seen is not None:
                 if seen.choice is None:
                     raise self._doubt(
                         each, f"could be in {_or(seen.allowed or units(si))}: {seen.why}", seen.allowed or units(si)
                     )
                 self.units[each.column] = seen.choice, seen.why
-            else:
-                unit = _known(each.unit)
+            elif each.unit is not None:
+                unit = each.unit
                 if seen is not None and unit not in seen.allowed:
                     question = f"is in {unit.name} {each.unit_why}, and cannot be: {seen.why}"
                     raise self._doubt(each, question, [*([seen.choice] if seen.choice else seen.allowed), unit])
@@ -270,12 +271,6 @@ class _Taking:
         why = each.why if unit_why in ("", each.why) else f"{each.why}; {unit.name} {unit_why}"
         channel = CHANNELS[each.field].column(str(each.joint))
         return Taken(each.column, channel, name, " ".join(steps) or "none", why)
-
-
-def _known(unit: Unit | None) -> Unit:
-    if unit is None:
-        raise TypeError("a unit that is said")
-    return unit
 
 
 def _or(choices: Sequence[Unit]) -> str:

@@ -174,16 +174,7 @@ def _bend_constraint(toppra: Any, path: BSpline, places: np.ndarray, limits: Mot
     bend = np.abs(path(places, 3)) / (_BEND * limits.jerk)
     bounds = np.column_stack([np.zeros(len(places)), np.maximum(bend.max(axis=1), 1e-9) ** (-2 / 3)])
 
-    class BendConstraint(toppra.constraint.LinearConstraint):  # type: ignore[misc]
-        def __init__(self) -> None:
-            super().__init__()
-            self.dof = path.c.shape[1]
-            self.set_discretization_type(toppra.constraint.DiscretizationType.Collocation)
-
-        def compute_constraint_params(self, *_: Any) -> Any:
-            return None, None, None, None, None, None, bounds
-
-    return BendConstraint()
+    return _constraint(toppra, path, (None, None, None, None, None, None, bounds))
 
 
 def _torque_constraint(toppra: Any, path: BSpline, places: np.ndarray, limits: MotionLimits, torque: Torque) -> Any:
@@ -202,17 +193,23 @@ def _torque_constraint(toppra: Any, path: BSpline, places: np.ndarray, limits: M
     bound = np.where(np.isfinite(limits.torque), limits.torque, 1e9)
     sides, bounds = np.vstack([np.eye(len(bound)), -np.eye(len(bound))]), np.concatenate([bound, bound])
 
-    class TorqueConstraint(toppra.constraint.LinearConstraint):  # type: ignore[misc]
+    return _constraint(toppra, path, (a, b, slow, sides, bounds, None, None))
+
+
+def _constraint(toppra: Any, path: BSpline, parameters: tuple[np.ndarray | None, ...]) -> Any:
+    """Return TOPP-RA's constraint of a, b, c, F, g and bounds of s'' and of s'^2; F and g are those of all places."""
+
+    class Given(toppra.constraint.LinearConstraint):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__()
-            self.dof = len(bound)
+            self.dof = path.c.shape[1]
             self.identical = True
             self.set_discretization_type(toppra.constraint.DiscretizationType.Collocation)
 
         def compute_constraint_params(self, *_: Any) -> Any:
-            return a, b, slow, sides, bounds, None, None
+            return parameters
 
-    return TorqueConstraint()
+    return Given()
 
 
 def _as_geometry(toppra: Any, path: BSpline) -> Any:

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import Connection, Origin, Solid, six_numbers, structure_of
+from irtwin.robot.xml_elements import words
 
 
 def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
@@ -38,7 +39,7 @@ def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
                 _geom(body, solid)
     motors = SubElement(root, "actuator")
     for joint in robot.joints:
-        limits = {"ctrlrange": _words(-joint.effort, joint.effort)} if np.isfinite(joint.effort) else {}
+        limits = {"ctrlrange": words(-joint.effort, joint.effort)} if np.isfinite(joint.effort) else {}
         SubElement(motors, "motor", {"name": joint.name, "joint": joint.name} | limits)
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
@@ -47,33 +48,29 @@ def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
 def _joint(body: Element, connection: Connection, limits: Joint, armature: float | None) -> None:
     kind = "slide" if connection.kind == "prismatic" else "hinge"
     assert connection.axis is not None
-    said = {"name": connection.name, "type": kind, "axis": _words(*connection.axis)}
+    said = {"name": connection.name, "type": kind, "axis": words(*connection.axis)}
     if np.isfinite(limits.lower) and np.isfinite(limits.upper):
-        said["range"] = _words(limits.lower, limits.upper)
+        said["range"] = words(limits.lower, limits.upper)
     numbers = {"damping": connection.damping, "frictionloss": connection.friction, "armature": armature}
     SubElement(body, "joint", said | {name: repr(value) for name, value in numbers.items() if value})
 
 
 def _inertial(body: Element, inertia: pin.Inertia) -> None:
-    moments = _words(*six_numbers(inertia.inertia))
-    SubElement(body, "inertial", pos=_words(*inertia.lever), mass=repr(float(inertia.mass)), fullinertia=moments)
+    moments = words(*six_numbers(inertia.inertia))
+    SubElement(body, "inertial", pos=words(*inertia.lever), mass=repr(float(inertia.mass)), fullinertia=moments)
 
 
 def _geom(body: Element, solid: Solid) -> None:
     half = [0.5 * size for size in solid.size]
     sizes = {"box": half, "cylinder": [solid.size[0], *half[1:]], "sphere": solid.size}[solid.kind]
-    geom = {"type": solid.kind, "size": _words(*sizes), "conaffinity": "0"} | _place(solid.origin)
+    geom = {"type": solid.kind, "size": words(*sizes), "conaffinity": "0"} | _place(solid.origin)
     if solid.purpose == "visual":
         geom |= {"contype": "0", "group": "2"}
     if solid.colour is not None:
-        geom["rgba"] = _words(*solid.colour)
+        geom["rgba"] = words(*solid.colour)
     SubElement(body, "geom", geom)
 
 
 def _place(origin: Origin) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(origin.transform[:3, :3]).coeffs()
-    return {"pos": _words(*origin.xyz), "quat": _words(w, x, y, z)}
-
-
-def _words(*values: float) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    return {"pos": words(*origin.xyz), "quat": words(w, x, y, z)}

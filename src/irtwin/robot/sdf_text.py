@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import Connection, Origin, Solid, structure_of
+from irtwin.robot.xml_elements import words
 
 _MOMENTS = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
 
@@ -48,7 +49,7 @@ def _joint(model: Element, connection: Connection, limits: Joint) -> None:
     _say(joint, parent=connection.parent, child=connection.child)
     axis = SubElement(joint, "axis")
     assert connection.axis is not None
-    _say(axis, xyz=_words(*connection.axis))
+    _say(axis, xyz=words(*connection.axis))
     known = {name: getattr(limits, name) for name in ("lower", "upper", "effort", "velocity")}
     _say(SubElement(axis, "limit"), **{name: repr(value) for name, value in known.items() if np.isfinite(value)})
     _say(SubElement(axis, "dynamics"), damping=repr(connection.damping), friction=repr(connection.friction))
@@ -56,7 +57,7 @@ def _joint(model: Element, connection: Connection, limits: Joint) -> None:
 
 def _inertial(link: Element, body: pin.Inertia) -> None:
     inertial = SubElement(link, "inertial")
-    _say(inertial, pose=_words(*body.lever, 0, 0, 0), mass=repr(float(body.mass)))
+    _say(inertial, pose=words(*body.lever, 0, 0, 0), mass=repr(float(body.mass)))
     moments = {name: repr(float(body.inertia[row, column])) for name, row, column in _MOMENTS}
     _say(SubElement(inertial, "inertia"), **moments)
 
@@ -66,24 +67,20 @@ def _shape(link: Element, solid: Solid, number: int) -> None:
     _pose(shape, solid.origin, solid.link)
     kind = SubElement(SubElement(shape, "geometry"), solid.kind)
     if solid.kind == "mesh":
-        _say(kind, uri=solid.file or "", scale=_words(*solid.size))
+        _say(kind, uri=solid.file or "", scale=words(*solid.size))
     elif solid.kind == "box":
-        _say(kind, size=_words(*solid.size))
+        _say(kind, size=words(*solid.size))
     else:
         _say(kind, **dict(zip(("radius", "length"), map(repr, solid.size), strict=False)))  # a sphere has no length
     if solid.colour is not None and solid.purpose == "visual":
-        _say(SubElement(shape, "material"), ambient=_words(*solid.colour), diffuse=_words(*solid.colour))
+        _say(SubElement(shape, "material"), ambient=words(*solid.colour), diffuse=words(*solid.colour))
 
 
 def _pose(element: Element, origin: Origin, beside: str | None = None) -> None:
     pose = SubElement(element, "pose", {} if beside is None else {"relative_to": beside})
-    pose.text = _words(*origin.xyz, *origin.rpy)
+    pose.text = words(*origin.xyz, *origin.rpy)
 
 
 def _say(element: Element, **texts: str) -> None:
     for name, text in texts.items():
         SubElement(element, name).text = text
-
-
-def _words(*values: float) -> str:
-    return " ".join(repr(float(value)) for value in values)

@@ -9,6 +9,7 @@ import numpy as np
 
 from irtwin.robot.description import Joint
 from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure
+from irtwin.robot.xml_elements import words
 
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
@@ -31,7 +32,7 @@ def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:
         inertial = SubElement(link, "inertial")
         SubElement(inertial, "mass", value=repr(body.mass))
         if body.com is not None:
-            SubElement(inertial, "origin", xyz=_words(body.com))
+            SubElement(inertial, "origin", xyz=words(*body.com))
         if body.inertia is not None:
             SubElement(inertial, "inertia", dict(zip(_MOMENTS, map(repr, body.inertia), strict=True)))
     for solid in solids:
@@ -39,15 +40,15 @@ def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:
         _origin(shape, solid.origin)
         SubElement(SubElement(shape, "geometry"), solid.kind, _sizes(solid))
         if solid.colour is not None:
-            rgba = _words(solid.colour)  # its name too: readers take two materials of one name for the same
+            rgba = words(*solid.colour)  # its name too: readers take two materials of one name for the same
             SubElement(SubElement(shape, "material", name=f"rgba {rgba}"), "color", rgba=rgba)
 
 
 def _sizes(solid: Solid) -> dict[str, str]:
     if solid.kind == "box":
-        return {"size": _words(solid.size)}
+        return {"size": words(*solid.size)}
     if solid.kind == "mesh":
-        return {"filename": solid.file or "", "scale": _words(solid.size)}
+        return {"filename": solid.file or "", "scale": words(*solid.size)}
     return dict(zip(("radius", "length"), map(repr, solid.size), strict=False))  # a sphere has no length
 
 
@@ -57,7 +58,7 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
     SubElement(joint, "parent", link=connection.parent)
     SubElement(joint, "child", link=connection.child)
     if connection.axis is not None:
-        SubElement(joint, "axis", xyz=_words(connection.axis))
+        SubElement(joint, "axis", xyz=words(*connection.axis))
     if connection.damping or connection.friction:
         SubElement(joint, "dynamics", damping=repr(connection.damping), friction=repr(connection.friction))
     if limits is not None:
@@ -68,8 +69,4 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
 
 
 def _origin(element: Element, origin: Origin) -> None:
-    SubElement(element, "origin", xyz=_words(origin.xyz), rpy=_words(origin.rpy))
-
-
-def _words(values: Sequence[float]) -> str:
-    return " ".join(map(repr, values))
+    SubElement(element, "origin", xyz=words(*origin.xyz), rpy=words(*origin.rpy))

@@ -79,6 +79,11 @@ def with_child(content: bytes, element: Element, tag: str, text: str) -> bytes:
     return before + own[:place].rstrip() + gap + text.encode() + gap + own[place:] + after
 
 
+def words(*values: float) -> str:
+    """Return numbers as an attribute says them, to their last digit."""
+    return " ".join(repr(float(value)) for value in values)
+
+
 def numbers(text: str | None, count: int, where: str) -> tuple[float, ...]:
     """Return so many finite numbers of an attribute. Raises InputError, naming `where`, on anything else."""
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
@@ -216,11 +215,9 @@ def _number(element: Element, path: str, otherwise: float, where: str) -> float:
 
 def _check_words(root: Element, source: str) -> None:
     """Raise InputError where an element with numbers has one that SDF does not know: it would be lost unseen."""
-    for name, word in _unknown(root):
-        raise InputError(f"{source}: <{name}> has <{word}>, which SDF does not know; it has {', '.join(_KNOWN[name])}")
-
-
-def _unknown(root: Element) -> Iterator[tuple[str, str]]:
     for name, known in _KNOWN.items():
-        for element in root.iter(name):
-            yield from ((name, one.tag) for one in element if one.tag not in known and ":" not in one.tag)
+        for one in (one for element in root.iter(name) for one in element):
+            if one.tag not in known and ":" not in one.tag:
+                raise InputError(
+                    f"{source}: <{name}> has <{one.tag}>, which SDF does not know; it has {', '.join(known)}"
+                )
