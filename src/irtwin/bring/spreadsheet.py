@@ -77,9 +77,7 @@ def _rows(path: Path, sheet: Any, unpacking: Unpacking) -> list[tuple[Any, ...]]
         if all(cell is None for cell in row):
             blank += 1
         else:
-            rows += [
-                (),
-            ] * blank
+            rows += [()] * blank
             rows.append(row)
             blank, width = 0, max(width, len(row))
         unpacking.take(_BYTES * (1 + len(rows) * width - held), place, _REMEDY)

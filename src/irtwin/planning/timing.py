@@ -34,13 +34,9 @@ _BEND = 0.5  # share of the jerk limit that the path's own bends may take
 
 
 @dataclass(frozen=True)
-class MotionLimits:
-    """What a motion of n joints must keep to, (n,) each: rad, rad/s, rad/s^2, rad/s^3, N m (m, N where they slide)."""
+class MotionLimits(JointLimits):
+    """What a motion of n joints must keep to besides, (n,) each: rad/s^3, N m (m, N where they slide)."""
 
-    lower: np.ndarray
-    upper: np.ndarray
-    speed: np.ndarray
-    acceleration: np.ndarray
     jerk: np.ndarray
     torque: np.ndarray  # infinite where the URDF says none
 
@@ -50,7 +46,7 @@ class MotionLimits:
         limits = JointLimits.of(robot)
         jerk = limits.acceleration / FULL_ACCELERATION_AFTER
         torque = np.array([joint.effort for joint in robot.joints])
-        return cls(limits.lower, limits.upper, limits.speed, limits.acceleration, jerk, torque)
+        return cls(**vars(limits), jerk=jerk, torque=torque)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def usd_text(robot: Robot, armature: Mapping[str, float]) -> str:
         {base: base},
         {base: np.eye(4)},
         {base: np.eye(4)},
-    )  # links, of each; in the world; in these
+    )  # links of each; in the world; in these
     bodies: dict[str, list[str]] = {base: [*_place(np.eye(4)), *_mass(structure.bodies[0].spatial)]}
     fixed = _prim("PhysicsFixedJoint", "world_to_base", [f"rel physics:body1 = </{whole}/{names[base]}>"])
     connections = [fixed]

@@ -85,11 +85,11 @@ class DataSet:
     folder: Path
     robot: Robot
     runs: tuple[Run, ...]
-    effects: tuple[str, ...] | None
-    ambient_temperature: float | None  # degC
-    power_at: str | None
-    simulated: bool
-    notes: Mapping[str, Any]
+    effects: tuple[str, ...] | None = None
+    ambient_temperature: float | None = None  # degC
+    power_at: str | None = None
+    simulated: bool = False
+    notes: Mapping[str, Any] = field(default_factory=dict)
     repairs: tuple[str, ...] = ()
     findings: tuple[LogFinding, ...] = ()
     urdf: Path | None = None  # the file that describes the robot, beside which its meshes lie
@@ -174,11 +174,6 @@ def read_log(
         folder=file.parent,
         robot=robot,
         runs=tuple(_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)),
-        effects=None,
-        ambient_temperature=None,
-        power_at=None,
-        simulated=False,
-        notes={},
         repairs=tuple(dropped),
         findings=tuple(sampled),
     )

@@ -21,26 +21,13 @@ SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
 _LEAST, _LEAST_OF_TORQUE = 2e-4, 1e-3  # rad (m); share of a joint's torque
 _BEGUN, _LOOKS = 50.0, 3.0  # times that, and independent samples, before either is known
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
-_STEP = {
-    "offset": 0.002,
-    "delay": 0.004,
-    "dead_band": 0.001,
-    **dict.fromkeys(OF_ROBOT[1:], 0.01),
-}  # of a difference quotient; 0.05 of the others, in the chart
-_FARTHEST = {
-    "offset": 0.05,
-    "delay": 0.02,
-    "dead_band": 0.01,
-    **dict.fromkeys(OF_ROBOT[1:], 0.05),
-}  # that one step goes; 1 of the others
-_LIKELY = {
-    "offset": 0.1,
-    "delay": 0.05,
-    "armature": 0.5,
-    "dead_band": 0.02,
-    "payload": 9.0,
-    **dict.fromkeys(OF_ROBOT[1:], 0.2),
-}  # standard deviation from the simulator's; 3 of the others
+# of a difference quotient; 0.05 of the others, in the chart
+_STEP = {"offset": 0.002, "delay": 0.004, "dead_band": 0.001} | dict.fromkeys(OF_ROBOT[1:], 0.01)
+# that one step goes; 1 of the others
+_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01} | dict.fromkeys(OF_ROBOT[1:], 0.05)
+# standard deviation from the simulator's; 3 of the others
+_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5, "dead_band": 0.02, "payload": 9.0}
+_LIKELY |= dict.fromkeys(OF_ROBOT[1:], 0.2)
 _TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
 _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there

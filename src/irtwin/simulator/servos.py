@@ -39,13 +39,8 @@ _IN_SERVO = ("stiffness", "offset", "delay", "torque_limit")  # and damping, of 
 _UNLIMITED = np.array([[-1e12], [1e12]])  # N m
 _FARTHEST = 2 * np.pi  # rad that a joint is off: a servo without limit gives no more torque than there
 HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more: the most that MuJoCo takes
-_NEAR_ZERO = {
-    "stiffness": 0.01,
-    "damping": 0.1,
-    "friction": 0.1,
-    "armature": 0.01,
-    "torque_limit": 0.01,
-}  # times inertia, s^-2, s^-1, s^-2, 1, s^-2
+# times inertia, s^-2, s^-1, s^-2, 1, s^-2
+_NEAR_ZERO = {"stiffness": 0.01, "damping": 0.1, "friction": 0.1, "armature": 0.01, "torque_limit": 0.01}
 _LIGHT = 0.01  # of the arm's mass: a payload near zero
 
 
