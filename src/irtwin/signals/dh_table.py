@@ -17,20 +17,8 @@ from irtwin.signals.toml_file import TomlTable, shown
 
 DH_KEYS = ("convention", "base", "tool", "row")
 ROW_KEYS = (
-    "name",
-    "type",
-    "a",
-    "alpha",
-    "d",
-    "theta",
-    "lower",
-    "upper",
-    "velocity",
-    "effort",
-    "mass",
-    "com",
-    "inertia",
-)
+    "name", "type", "a", "alpha", "d", "theta", "lower", "upper", "velocity", "effort", "mass", "com", "inertia",
+)  # fmt: skip
 _TYPES = ("revolute", "continuous", "prismatic")
 _FARTHEST = 1e3  # m, or rad
 _MOST_ROWS = 100
