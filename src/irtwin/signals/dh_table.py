@@ -69,8 +69,9 @@ def _row(robot: TomlTable, number: int, values: Any) -> Row:
         effort=table.number("effort", least=0.0) or 0.0,
         name=table.text("name"),
     )
-    mass, com = table.number("mass", least=0.0), _numbers(table, "com", 3, "m: x, y, z in the row's frame")
-    inertia = _numbers(table, "inertia", 6, "kg m^2: xx, yy, zz, xy, xz, yz about the centre of mass")
+    mass, com = table.number("mass", least=0.0), table.numbers("com", 3, "3 numbers (m: x, y, z in the row's frame)")
+    about = "kg m^2: xx, yy, zz, xy, xz, yz about the centre of mass"
+    inertia = table.numbers("inertia", 6, f"6 numbers ({about})")
     if mass is None and (com or inertia):
         raise InputError(f"{table.file}: {table.name} mass is missing; com and inertia say nothing without it")
     if inertia and min(inertia[:3]) < 0:
@@ -107,18 +108,7 @@ def _within(table: TomlTable, key: str) -> float:
 
 def _placement(table: TomlTable, key: str) -> np.ndarray:
     """Return the (4, 4) transform of six numbers x, y, z, roll, pitch, yaw; the identity where they are absent."""
-    six = _numbers(table, key, 6, "x, y, z in m and roll, pitch, yaw in rad")
+    six = table.numbers(key, 6, "6 numbers (x, y, z in m and roll, pitch, yaw in rad)")
     if six is None:
         return np.eye(4)
     return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(np.array(six[3:])), np.array(six[:3])).homogeneous)
-
-
-def _numbers(table: TomlTable, key: str, count: int, meaning: str) -> Any:
-    """Return a tuple of so many numbers; None where the key is absent."""
-    value = table.values.get(key)
-    if value is None:
-        return None
-    if not (isinstance(value, list) and len(value) == count):
-        raise InputError(f"{table.file}: {table.name} {key} should be {count} numbers ({meaning}), not {shown(value)}")
-    parts = (TomlTable(table.file, f"{table.name} {key}", {"part": part}).number("part") for part in value)
-    return tuple(0.0 if part is None else part for part in parts)

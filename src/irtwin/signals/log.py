@@ -423,12 +423,7 @@ def _piece(run: Run, number: int, signals: Signals) -> Run:
 
 
 def _centre(table: TomlTable) -> tuple[float, float, float]:
-    value = table.values.get("payload_com", [0.0, 0.0, 0.0])
-    if not (isinstance(value, list) and len(value) == 3):
-        raise InputError(f"{table.file}: {table.name} payload_com should be three numbers in m")
-    x, y, z = (
-        TomlTable(table.file, f"{table.name} payload_com", {"part": part}).number("part") or 0.0 for part in value
-    )
+    x, y, z = table.numbers("payload_com", 3, "three numbers in m") or (0.0, 0.0, 0.0)
     return x, y, z
 
 

@@ -41,6 +41,16 @@ class TomlTable:
             raise InputError(f"{self.file}: {self.name} {key} should be a number{bound}, not {shown(value)}")
         return float(value)
 
+    def numbers(self, key: str, count: int, what: str) -> Any:
+        """Return a tuple of so many numbers, None where none are. Raises InputError, saying `what` they should be."""
+        value = self.values.get(key)
+        if value is None:
+            return None
+        if not (isinstance(value, list) and len(value) == count):
+            raise InputError(f"{self.file}: {self.name} {key} should be {what}, not {shown(value)}")
+        parts = (TomlTable(self.file, f"{self.name} {key}", {"part": part}).number("part") for part in value)
+        return tuple(0.0 if part is None else part for part in parts)
+
     def check_keys(self, known: Sequence[str]) -> None:
         """Raise InputError on a key that is none of these, naming the nearest."""
         for key in self.values:
