@@ -247,7 +247,7 @@ def _torques(carried: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -
     carried: (m, 6, N), what a unit of each axis' speed makes of the body's motion; speed, acceleration: (6, N) of the
     body, the latter less gravity. Mass acts along the line alone, inertia about the turn alone.
     """
-    a = acceleration[:3] + _times(_skew(speed[3:]), speed[:3])
+    a = acceleration[:3] + np.cross(speed[3:], speed[:3], axis=0)
     found = np.empty((len(carried), 10, speed.shape[1]))
     np.einsum("mkn,kn->mn", carried[:, :3], a, out=found[:, 0])
     np.einsum("mkn,kpn->mpn", carried, _by_first_moments(a, speed[3:], acceleration[3:]), out=found[:, 1:4])
@@ -288,7 +288,3 @@ def _skew(vector: np.ndarray) -> np.ndarray:
     x, y, z = vector
     none = np.zeros_like(x)
     return np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
-
-
-def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("ikn,kn->in", matrix, vector))
