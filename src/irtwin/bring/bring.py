@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -103,13 +102,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         described, name, [run for run, _ in listed], origin=origin, power_at=power_at[0], power_at_why=power_at[1],
         gear_ratios=dict(said.gear_ratios),
     )  # fmt: skip
-    with _new_folder(out) as folder:
-        (folder / "runs").mkdir()
-        if described.urdf:
-            (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
-        for run_text, run in listed:
-            pa.parquet.write_table(pa.table(dict(run.columns)), folder / run_text.file)
-        (folder / "dataset.toml").write_text(text, encoding="utf-8")
+    _write(out, described, text, {run_text.file: pa.table(dict(run.columns)) for run_text, run in listed})
     return Brought(forms, tuple(line for form in forms for line in form.said))
 
 
@@ -129,11 +122,7 @@ def init(out: Path, robot: str | None, name: str | None) -> None:
     _check_place(out)
     described, origin = (None, "put it beside this file") if robot is None else robot_of(robot)
     text = data_set_text(described, name or (described.name if described else "NAME"), (), origin=origin)
-    with _new_folder(out) as folder:
-        (folder / "runs").mkdir()
-        if described is not None:
-            (folder / "robot.urdf").write_text(described.urdf, encoding="utf-8")
-        (folder / "dataset.toml").write_text(text, encoding="utf-8")
+    _write(out, described, text, {})
 
 
 def _metered(files: Sequence[Path]) -> Robot:
@@ -280,15 +269,18 @@ def _check_place(out: Path) -> None:
         raise InputError(f"{out}: is not empty; name a new folder for the data set")
 
 
-@contextmanager
-def _new_folder(out: Path) -> Iterator[Path]:
-    """Give a folder that becomes `out` at the end, whole or not at all."""
+def _write(out: Path, robot: Robot | None, text: str, runs: Mapping[str, pa.Table]) -> None:
+    """Write a data set, whole or not at all; `runs`: by their files in it."""
     try:
         out.absolute().parent.mkdir(parents=True, exist_ok=True)
         with working_folder(out.absolute().parent, _PREFIX) as folder:
             made = folder / "data_set"
-            made.mkdir()
-            yield made
+            (made / "runs").mkdir(parents=True)
+            if robot is not None and robot.urdf:
+                (made / "robot.urdf").write_text(robot.urdf, encoding="utf-8")
+            for file, table in runs.items():
+                pa.parquet.write_table(table, made / file)
+            (made / "dataset.toml").write_text(text, encoding="utf-8")
             made.replace(out)
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror}); choose another place") from error
