@@ -21,3 +21,8 @@ class WorkspaceFault(InputError):
 
 class GraphBehind(UserWarning):
     """The graph that answers lacks some of what the database holds, or of what follows from it: one line says why."""
+
+
+def first_line(error: BaseException) -> str:
+    """Return what a library said of a fault, short enough for a message; its kind where it said nothing."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

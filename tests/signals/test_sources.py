@@ -14,14 +14,14 @@ import pyarrow.feather
 import pytest
 from tests.signals.test_log import ROBOT, columns
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import check_file
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sources import catalogue
 from irtwin.signals.sources.bag_source import BagSource
 from irtwin.signals.sources.csv_source import CsvSource
 from irtwin.signals.sources.parquet_source import ParquetSource
-from irtwin.signals.sources.source import MOST_VALUES, Source, first_line
+from irtwin.signals.sources.source import MOST_VALUES, Source
 
 CONTRIBUTING = Path(__file__).parents[2] / "CONTRIBUTING.md"
 

@@ -38,7 +38,8 @@ def robot_of(said: str) -> tuple[Robot, str]:
     names = ", ".join(known[name][0] for name in near or sorted(known))
     more = "" if _installed() else '; pip install "irtwin[robots]" brings others, as ur10 and panda'
     raise InputError(
-        f"{said}: there is no such file, and no robot of that name; there {_are(near)} {names[:500]}{more}"
+        f"{said}: there is no such file, and no robot of that name; there {'is' if len(near) == 1 else 'are'} "
+        f"{names[:500]}{more}"
     )
 
 
@@ -95,7 +96,3 @@ def _home(file: Path) -> str:
 
 def _plain(name: str) -> str:
     return "".join(sign for sign in name.lower() if sign.isalnum())
-
-
-def _are(near: list[str]) -> str:
-    return "are" if len(near) != 1 else "is"

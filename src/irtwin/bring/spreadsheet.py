@@ -12,10 +12,10 @@ import pyarrow as pa
 from irtwin.bring.head import LOOKED_AT, head_of
 from irtwin.bring.recording import Recording, as_columns
 from irtwin.bring.workbook_parts import check_parts
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import Unpacking, check_file
 from irtwin.signals.samples import FEWEST
-from irtwin.signals.sources.source import MOST_COLUMNS, first_line
+from irtwin.signals.sources.source import MOST_COLUMNS
 
 _MOST_ROWS = 1 << 20  # Excel's own limit
 _BYTES = 8  # of a cell, blank ones between others included, and of a row

@@ -13,7 +13,7 @@ import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import read_input, real_path
 
 FORMATS = (".stl", ".obj", ".dae")
@@ -81,7 +81,7 @@ def read_mesh(content: bytes, suffix: str, where: str) -> Mesh:
             read = trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], resolver=None).to_mesh()
             points, faces = np.asarray(read.vertices, float) * metres, np.asarray(read.faces, np.int64)
     except _DAMAGED as error:
-        raise InputError(f"{where}: is no mesh that can be read ({_first_line(error)}); export it again") from error
+        raise InputError(f"{where}: is no mesh that can be read ({first_line(error)}); export it again") from error
     in_space = points.shape[1:] == (3,)  # a damaged OBJ file may hold pairs
     if not len(faces) or not in_space or not np.isfinite(points).all() or np.abs(points).max() > 1e6:
         raise InputError(f"{where}: holds no triangles of finite size; export it again")
@@ -113,7 +113,7 @@ def _check_collada(content: bytes, where: str) -> float:
     try:
         root: Element = SafeXml.fromstring(content, forbid_dtd=True)
     except (ParseError, DefusedXmlException, LookupError, ValueError) as error:
-        raise InputError(f"{where}: is no DAE that can be read ({_first_line(error)}); export it again") from error
+        raise InputError(f"{where}: is no DAE that can be read ({first_line(error)}); export it again") from error
     instances = len(root.findall(f".//{_COLLADA}instance_geometry"))
     if root.find(f".//{_COLLADA}instance_node") is not None or instances > _MOST_INSTANCES:
         raise InputError(f"{where}: repeats its parts by instances; export it as one mesh")
@@ -127,7 +127,3 @@ def _check_collada(content: bytes, where: str) -> float:
 
 def _shown(name: str) -> str:
     return name[:200].replace("\0", "\\0")
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, ParseError
 from defusedxml import DefusedXmlException
 from defusedxml import ElementTree as SafeXml
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import read_text
 from irtwin.robot.description import Joint, Link, Robot
 from irtwin.robot.structure import PRIMITIVES, colours_of, origin_of, solids_of
@@ -42,12 +42,8 @@ def parse_urdf(text: str, source: str = "URDF") -> Robot:
     try:
         order = list(robot.model.names)[1:]
     except (ValueError, RuntimeError) as error:
-        raise InputError(f"{source}: Pinocchio cannot build this robot: {_first_line(error)}") from error
+        raise InputError(f"{source}: Pinocchio cannot build this robot: {first_line(error)}") from error
     return replace(robot, joints=tuple(joints[name] for name in order))
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
 
 
 def _parse(text: str, source: str) -> Element:
@@ -62,7 +58,7 @@ def _parse(text: str, source: str) -> Element:
     except DefusedXmlException as error:
         raise InputError(f"{source}: contains a DTD or an entity; remove the <!DOCTYPE ...>") from error
     except (LookupError, ValueError) as error:
-        raise InputError(f"{source}: not readable as XML ({_first_line(error)}); save the URDF as UTF-8") from error
+        raise InputError(f"{source}: not readable as XML ({first_line(error)}); save the URDF as UTF-8") from error
     if root.tag != "robot":
         raise InputError(f"{source}: the outermost element is <{root.tag}>, not <robot>; expand xacro files first")
     return root

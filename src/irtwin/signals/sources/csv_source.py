@@ -10,9 +10,9 @@ from typing import ClassVar, NamedTuple
 import pyarrow as pa
 import pyarrow.csv
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import as_text, read_input
-from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS, Source, first_line
+from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS, Source
 
 _LARGEST = 1_000_000_000  # bytes; held in memory while it is read
 _OTHERS = {b";": "semicolons", b"\t": "tabs", b"|": "bars"}

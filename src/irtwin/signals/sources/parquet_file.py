@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet
 from pyarrow.parquet import ColumnChunkMetaData, ParquetFile
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.input_file import Unpacking, check_file
-from irtwin.signals.sources.source import LONGEST_NAME, check_names, check_values, first_line
+from irtwin.signals.sources.source import LONGEST_NAME, check_names, check_values
 
 _BYTES = 8  # of a value that is read
 _PAGE = 1000  # bytes that a page counts for beside what it holds: pages without any would take time without end

@@ -77,8 +77,3 @@ def check_values(path: Path, rows: int, columns: int) -> None:
         raise InputError(
             f"{path}: {rows} samples of {columns} columns; a run may have {MOST_VALUES:,} values: cut it into several"
         )
-
-
-def first_line(error: Exception) -> str:
-    """Return what a library said of a fault, short enough for a message."""
-    return str(error).strip().partition("\n")[0][:200]
