@@ -129,7 +129,8 @@ def _rows(
 
 def _to_next(at: np.ndarray, axis: _Line) -> tuple[float, float, float, float]:
     """Return theta, d, a, alpha from a frame on one axis to one whose z is on the next; theta in -pi/2 to pi/2."""
-    point, direction = _seen(at, axis)
+    turn = at[:3, :3].T  # the axis, seen from the frame
+    point, direction = turn @ (axis.point - at[:3, 3]), turn @ axis.direction
     theta, sine = 0.0, float(np.hypot(direction[0], direction[1]))
     if sine < PARALLEL:
         distance = float(np.hypot(point[0], point[1]))
@@ -163,11 +164,6 @@ def _at_end(at: np.ndarray, end: np.ndarray) -> tuple[float, float, float, float
     along = float(np.hypot(local[0, 0], local[1, 0]))
     theta = float(np.arctan2(local[1, 0], local[0, 0])) if along > PARALLEL else 0.0
     return theta, float(local[2, 3]), 0.0, 0.0
-
-
-def _seen(at: np.ndarray, axis: _Line) -> tuple[np.ndarray, np.ndarray]:
-    turn = at[:3, :3].T
-    return turn @ (axis.point - at[:3, 3]), turn @ axis.direction
 
 
 def _quarter(angle: float) -> float:

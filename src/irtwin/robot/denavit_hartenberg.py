@@ -68,7 +68,8 @@ class ChainTable:
 
 def row_transform(row: Row, convention: str, position: float = 0.0) -> np.ndarray:
     """Return a row's (4, 4) transform at a joint position, rad or m."""
-    along_x, along_z = screw_x(row.a, row.alpha), _moved(row, position)
+    slid, turned = (position, 0.0) if row.kind == "prismatic" else (0.0, position)
+    along_x, along_z = screw_x(row.a, row.alpha), screw_z(row.d + slid, row.theta + turned)
     return np.asarray(along_x @ along_z if convention == "modified" else along_z @ along_x)
 
 
@@ -82,12 +83,6 @@ def screw_z(d: float, theta: float) -> np.ndarray:
     """Return Trans_z(d) Rot_z(theta), (4, 4)."""
     c, s = np.cos(theta), np.sin(theta)
     return np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, d], [0.0, 0.0, 0.0, 1.0]])
-
-
-def _moved(row: Row, position: float) -> np.ndarray:
-    if row.kind == "prismatic":
-        return screw_z(row.d + position, row.theta)
-    return screw_z(row.d, row.theta + position)
 
 
 def from_table(name: str, table: ChainTable) -> Robot:
