@@ -46,7 +46,8 @@ class Origin:
     @classmethod
     def of(cls, transform: np.ndarray) -> Origin:
         """Return the origin of a (4, 4) transform."""
-        return cls(_three(transform[:3, 3]), _three(pin.rpy.matrixToRpy(transform[:3, :3])))
+        angles = pin.rpy.matrixToRpy(transform[:3, :3])
+        return cls(_three(transform[:3, 3] + 0.0), _three(angles + 0.0))  # no -0.0
 
     @property
     def transform(self) -> np.ndarray:
