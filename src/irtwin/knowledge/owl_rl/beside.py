@@ -169,9 +169,6 @@ class Beside:
     def _join(self) -> None:
         """Note what follows from several facts, of which some were followed since this was last asked."""
         followed, self._followed = self._followed, {}
-        for conjunction in self._schema.conjunctions:
-            if conjunction.concluded is not None and not followed.keys().isdisjoint(conjunction.keys):
-                self._put_subjects(*conjunction.concluded, self._of_all(conjunction.keys))
         for predicate, end in self._schema.single:
             if predicate in followed or predicate in self._schema.by_object:
                 self._refuse_several(predicate, end)
@@ -184,15 +181,6 @@ class Beside:
                 fact for join in self._schema.joins for fact in join(self._facts, new)
             ).items():
                 self._put(key, some)
-
-    def _of_all(self, keys: Iterable[tuple[Number, Number]]) -> set[Number]:
-        """Return the subjects that have all of some predicates and objects, some of it beside the ontology."""
-        groups: list[AbstractSet[Number]] = []
-        for key in keys:
-            own, of_ontology = self._known.get(key), self._schema.known(key)
-            groups.append(of_ontology if own is None else own | of_ontology if of_ontology else own)
-        groups.sort(key=len)
-        return set(groups[0]).intersection(*groups[1:])
 
     def _refuse_several(self, predicate: Number, end: int) -> None:
         """Raise Equality where several objects of a subject (or the other way round) are to be one."""
@@ -229,23 +217,14 @@ class Beside:
             raise not_of(self._use(self._terms.number(literal)), literal.datatype.value)
 
     def _refuse_contradictions(self) -> None:
-        for conjunction in self._schema.conjunctions:
-            if conjunction.concluded is None and any(key in self._known for key in conjunction.keys):
-                for subject in self._of_all(conjunction.keys):
-                    self._refuse(
-                        conjunction.rule.name, [subject if it == SUBJECT else it for it in conjunction.culprits]
-                    )
         for rule, join in self._schema.contradictions:
             for culprits in join(self._facts, self._new):
-                self._refuse(rule.name, culprits)
+                raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
         for key, some in self._known.items():
             if isinstance(key, tuple) and key[0] == self._type and datatypes.is_datatype(iri := self._iri(key[1])):
                 for number in some & self._terms.values.keys():  # dt-not-type
                     if iri not in datatypes.datatypes_of(self._terms.values[number]):
                         raise not_of(self._use(number), iri)
-
-    def _refuse(self, rule: str, culprits: Iterable[Number]) -> None:
-        raise contradiction(rule, ", ".join(map(self._name, culprits)))
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""

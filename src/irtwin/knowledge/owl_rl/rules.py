@@ -164,10 +164,11 @@ class _Writer:
         else:
             self._loop(index)
 
-    def _cost(self, index: int) -> tuple[int, int]:
+    def _cost(self, index: int) -> tuple[int, bool, bool, int]:
         subject, predicate, object = self._left[index]
         open_ends = sum(self._is_open(term) for term in {subject, object})
-        return (open_ends + 3 * self._is_open(predicate), index)
+        by_constant = self._bound.isdisjoint((subject, object))  # which fits more facts than a variable's value does
+        return (open_ends + 3 * self._is_open(predicate), by_constant, index != self._new, index)
 
     def _loop(self, index: int) -> None:
         subject, predicate, object = self._left.pop(index)

@@ -2,15 +2,14 @@
 
 Nearly all that OWL 2 RL concludes of individuals follows from one fact and the ontology: a type of a domain, an
 inverse, a class above a class. It is the same for all facts with that predicate, or of that type, so it is worked out
-once and kept as a table. Of what joins several facts, two forms are kept as tables too: what is of several classes at
-once, and properties with one value. The rest stay loops, as long as the ontology gives them anything to do.
+once and kept as a table. Of what joins several facts, properties with one value are kept apart. The rest stay loops, as
+long as the ontology gives them anything to do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from typing import Any
 
 from pyoxigraph import Triple
@@ -25,28 +24,16 @@ Key = Number | tuple[Number, Number]  # a predicate, or a predicate and an objec
 _NOTHING: frozenset[Any] = frozenset()
 
 
-@dataclass(frozen=True)
-class SchemaConjunction:
-    """What follows of a subject that has all of some predicates and objects: `concluded`, or where it finds a
-    contradiction `culprits`, in which SUBJECT stands for the subject.
-    """
-
-    rule: DatalogRule
-    keys: tuple[tuple[Number, Number], ...]
-    concluded: tuple[Number, Number] | None
-    culprits: tuple[Number, ...]
-
-
 class Schema:
     """An ontology, closed. Contradiction where it contradicts itself.
 
-    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `conjunctions` those from
-    several facts of one subject; `single` the predicates by which a subject has one object (SUBJECT), or an object one
-    subject (OBJECT). `joins` are the loops of the other rules, and `contradictions` those that find one; `looked_at`
-    are the predicates of the facts that these loops look at, with the objects where these are known, and None for any.
-    `by_object` are the predicates whose facts are told apart by their objects. `reads_values` tells whether rules ask
-    of which datatypes a literal is. `unfit` says in words why facts cannot be closed by all that, None where they can:
-    terms of the ontology are the same, and the rules of equality are left out here.
+    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `single` the predicates by
+    which a subject has one object (SUBJECT), or an object one subject (OBJECT). `joins` are the loops of the other
+    rules, and `contradictions` those that find one; `looked_at` are the predicates of the facts that these loops look
+    at, with the objects where these are known, and None for any. `by_object` are the predicates whose facts are told
+    apart by their objects. `reads_values` tells whether rules ask of which datatypes a literal is. `unfit` says in
+    words why facts cannot be closed by all that, None where they can: terms of the ontology are the same, and the rules
+    of equality are left out here.
     """
 
     def __init__(self, triples: Iterable[Triple]):
@@ -57,7 +44,6 @@ class Schema:
         forms = self.closure.terms.forms
         self.hidden = {number for number, terms in enumerate(forms) if terms and is_hidden(terms[0])}
         self.table: dict[Key, list[Fact]] = {}
-        self.conjunctions: list[SchemaConjunction] = []
         self.single: set[tuple[Number, int]] = set()
         self.joins: list[Join] = []
         self.contradictions: list[tuple[DatalogRule, Join]] = []
@@ -68,8 +54,7 @@ class Schema:
         for rule in self._program.rules:
             if not any(predicate == "owl:sameAs" for _, predicate, _ in rule.body):
                 self._take(rule)
-        keys = [*self.table, *(key for conjunction in self.conjunctions for key in conjunction.keys)]
-        self.by_object = {key[0] for key in keys if isinstance(key, tuple)} | {self._program.type}
+        self.by_object = {key[0] for key in self.table if isinstance(key, tuple)} | {self._program.type}
 
     def known(self, key: Key) -> AbstractSet[Any]:
         """Return what the ontology knows by a key: subjects, or by a predicate alone pairs of subject and object."""
@@ -103,11 +88,6 @@ class Schema:
                 return
         values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
         self.reads_values |= any(self._is_datatype(pattern[2]) for of_one in values for pattern in of_one)
-        conjunctions = [self._conjunction(rule, *both) for both in zip(values, bindings, strict=True)]
-        if None not in conjunctions:
-            each = {(frozenset(it.keys), it.concluded): it for it in filter(None, conjunctions)}
-            self.conjunctions += each.values()
-            return
         single = [self._one_value(rule, patterns, of_one) for of_one in values]
         if None not in single:
             self.single.update(filter(None, single))
@@ -147,26 +127,6 @@ class Schema:
         numbers = {term: ends[value] if isinstance(value, str) else value for term, value in values.items()}
         facts = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
         return (predicate if isinstance(object, str) else (predicate, object)), facts
-
-    def _conjunction(
-        self, rule: DatalogRule, patterns: list[tuple[Number | Term, ...]], bound: dict[Term, Number]
-    ) -> SchemaConjunction | None:
-        """Return what a rule concludes of a subject that fits all patterns; None where it is no such rule."""
-        subjects = {pattern[0] for pattern in patterns}
-        keys = tuple((p, o) for _, p, o in patterns if not isinstance(p, str) and not isinstance(o, str))
-        decided = all(term in bound for pair in rule.unequal for term in pair)
-        if len(subjects) != 1 or len(keys) != len(patterns) or not decided or len(rule.head) > 1:
-            return None
-        (subject,) = subjects
-        if not isinstance(subject, str):
-            return None
-        if not rule.head:
-            named = [self._value(term, bound) for term in rule.culprits]
-            return SchemaConjunction(rule, keys, None, tuple(SUBJECT if isinstance(it, str) else it for it in named))
-        s, p, o = (self._value(term, bound) for term in rule.head[0])
-        if s != subject or isinstance(p, str) or isinstance(o, str):
-            return None
-        return SchemaConjunction(rule, keys, (p, o), ())
 
     def _one_value(
         self, rule: DatalogRule, patterns: list[Pattern], values: list[tuple[Number | Term, ...]]
