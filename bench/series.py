@@ -1,4 +1,4 @@
-"""How long windows of a long series take by SPARQL, beside plain DuckDB.
+"""How long windows of a long series take by SPARQL.
 
 python bench/series.py [SAMPLES]      10^7 if not given
 """
@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import duckdb
 import numpy as np
 import pyarrow as pa
 
@@ -48,9 +47,6 @@ def main(samples: int) -> None:
                 text = f"SELECT (series:{call}(<urn:run>, 'power', {window[0]}, {window[1]}) AS ?value) {{}}"
                 assert graph.query(text)[0]["value"] is not None
                 print(f"series:{call} over {name}: {least(lambda text=text: graph.query(text)):.1f} ms")
-        plain = f"""SELECT sum((time - t) * (power + p)) / 2 FROM (SELECT time, power, lag(time) OVER () t,
-            lag(power) OVER () p FROM '{folder}/{path}' WHERE time BETWEEN {0.01 * end} AND {0.99 * end})"""
-        print(f"DuckDB alone, integral over nearly all of it: {least(lambda: duckdb.sql(plain).fetchall(), 3):.1f} ms")
 
 
 if __name__ == "__main__":

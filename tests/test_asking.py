@@ -95,7 +95,7 @@ cli.cli(["query", "robots"], standalone_mode=False)
 
 def test_asking_imports_nothing_that_it_does_not_need(tmp_path: Path) -> None:
     """The physics and the readers of series take longer to import than a query to answer."""
-    heavy = {"numpy", "scipy", "pinocchio", "pyarrow", "duckdb", "rdflib", "sqlalchemy", "starlette", "jinja2"}
+    heavy = {"numpy", "scipy", "pinocchio", "pyarrow", "rdflib", "sqlalchemy", "starlette", "jinja2"}
     with KnowledgeGraph(tmp_path / "graph") as graph:
         graph.update('INSERT DATA { id:robot irt:Note "mine" }')
     code = f"""

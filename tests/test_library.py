@@ -66,7 +66,7 @@ def test_a_diagnosis_alone_imports_no_graph_database_or_page(tmp_path):
     imported, named, diagnosed = map(set, json.loads(done.stdout))
     assert not imported & {"numpy", "scipy", "pinocchio", "pyarrow"}
     assert not [name for name in named if name.startswith(("scipy.special", "scipy.linalg", "mujoco"))]
-    heavy = {"sqlalchemy", "pyoxigraph", "rdflib", "pyshacl", "owlready2", "jinja2", "starlette", "duckdb"}
+    heavy = {"sqlalchemy", "pyoxigraph", "rdflib", "pyshacl", "owlready2", "jinja2", "starlette"}
     assert not diagnosed & {*heavy, "scipy.stats", "scipy.signal"}
     assert gap.exists()
 

@@ -1,4 +1,4 @@
-"""Windows of a series: what DuckDB says agrees with numpy on all samples."""
+"""Windows of a series: what row groups say agrees with all samples."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from irtwin.storage import files
 from irtwin.storage.files import inside
 
 FOLDER = "series"
-ROW_GROUP = 122_880  # rows; DuckDB's own size, of which it reads those that a window needs
+ROW_GROUP = 122_880  # rows; those are read that a window needs
 
 
 @dataclass(frozen=True)

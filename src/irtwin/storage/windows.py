@@ -1,23 +1,22 @@
-"""Channels of a series over a window of its time, read by DuckDB: two columns, and the row groups that are needed."""
+"""Channels of a series over a window of its time: two columns are read, of the row groups that are needed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property, lru_cache
+import math
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from irtwin.errors import InputError
 from irtwin.packing import extremes
 from irtwin.storage.files import inside
-
-if TYPE_CHECKING:
-    import duckdb  # a tenth of a second to import, for those who ask for samples
 
 MOST_SAMPLES = 10_000
 MOST_DRAWN = 2_000  # of a curve: more than a screen is wide
@@ -34,32 +33,32 @@ class SeriesWindows:
 
     def __init__(self, file: Path) -> None:
         """Read a file's metadata. InputError where there is no such file, or it is damaged."""
-        self._file = str(file)
+        self._file = file
         if not file.is_file():
             raise InputError(f"{file}: the series is missing; ingest the data set again")
         try:
-            told = pq.read_metadata(file)
-            names = told.schema.to_arrow_schema().names
-            time, count = names.index("time"), told.num_row_groups
-            groups = [told.row_group(number).column(time).statistics for number in range(count)]
+            self._metadata = pq.read_metadata(file)
+            names = self._metadata.schema.to_arrow_schema().names
+            time, count = names.index("time"), self._metadata.num_row_groups
+            groups = [self._metadata.row_group(number).column(time).statistics for number in range(count)]
             self._groups = [(float(group.min), float(group.max)) for group in groups]  # s, of the row groups
-        except (pa.ArrowException, OSError, ValueError, AttributeError) as error:
-            raise InputError(_damaged(self._file)) from error
+            self.begin = self._groups[0][0]  # time of the first sample, s
+        except (pa.ArrowException, OSError, ValueError, AttributeError, IndexError) as error:
+            raise self._damaged() from error
         self.channels = tuple(name for name in names if name != "time")
-
-    @cached_property
-    def begin(self) -> float:
-        """Time of the first sample, s."""
-        (first,) = self._fetch(lambda: self._run("SELECT min(time) FROM read_parquet(?)").fetchone())
-        return float(first)
 
     def mean(self, channel: str, start: float, end: float) -> float | None:
         """Return the mean of the samples in a window."""
-        return self._number("fsum(value) / nullif(count(value), 0)", channel, start, end)
+        pieces = [values for _, values in self._pieces(channel, start, end)]
+        count = sum(map(len, pieces))
+        return math.fsum(float(values.sum()) for values in pieces) / count if count else None
 
     def extreme(self, which: Extreme, channel: str, start: float, end: float) -> float | None:
         """Return the least or the greatest sample in a window."""
-        return self._number(f"{which}(value)", channel, start, end)
+        least_or_greatest = min if which == "min" else max
+        found = (getattr(values, which)() for _, values in self._pieces(channel, start, end) if len(values))
+        extreme = least_or_greatest(found, default=None)
+        return None if extreme is None else float(extreme)
 
     def integral(self, channel: str, start: float, end: float) -> float | None:
         """Return the integral over time by the trapezoidal rule, channel's unit times s, over what of it was recorded.
@@ -74,7 +73,7 @@ class SeriesWindows:
 
     def samples(self, channel: str, start: float, end: float) -> list[tuple[float, float]]:
         """Return time and value of the samples in a window. Raises InputError for more than `MOST_SAMPLES`."""
-        time, values = self._samples(channel, start, end, MOST_SAMPLES + 1)
+        time, values = self._samples(channel, start, end)
         if len(time) > MOST_SAMPLES:
             raise InputError(
                 f"the window holds more than {MOST_SAMPLES:,} samples: give a shorter window, or ask for the mean"
@@ -94,67 +93,48 @@ class SeriesWindows:
 
     def _before(self, channel: str, at: float) -> float:
         """Return the time of the last sample up to a moment, that moment where there is none."""
-        near = max((begin for begin, _ in self._groups if begin <= at), default=at)  # else all groups would be read
-        time = self._number("max(time)", channel, near, at) or self._number("max(time)", channel, -np.inf, at)
-        return at if time is None else time
+        groups = [number for number, (begin, _) in enumerate(self._groups) if begin <= at]
+        times = (time for time, _ in self._read(channel, reversed(groups), -np.inf, at) if len(time))
+        return next((float(time[-1]) for time in times), at)
 
     def _after(self, channel: str, at: float) -> float:
         """Return the time of the first sample from a moment on, likewise."""
-        near = min((end for _, end in self._groups if end >= at), default=at)
-        time = self._number("min(time)", channel, at, near) or self._number("min(time)", channel, at, np.inf)
-        return at if time is None else time
+        groups = [number for number, (_, end) in enumerate(self._groups) if end >= at]
+        times = (time for time, _ in self._read(channel, groups, at, np.inf) if len(time))
+        return next((float(time[0]) for time in times), at)
 
-    def _number(self, what: str, channel: str, start: float, end: float) -> float | None:
-        """Return a number of a window's samples, None where it holds none."""
-        text = f"SELECT {what} FROM ({self._samples_of(channel)})"
-        (number,) = self._fetch(lambda: self._run(text, float(start), float(end)).fetchone())
-        return None if number is None else float(number)
+    def _samples(self, channel: str, start: float, end: float) -> tuple[Floats, Floats]:
+        pieces = [(np.empty(0), np.empty(0)), *self._pieces(channel, start, end)]
+        time, values = map(np.concatenate, zip(*pieces, strict=True))
+        return time, values
 
-    def _samples(self, channel: str, start: float, end: float, most: int | None = None) -> tuple[Floats, Floats]:
-        limit = "" if most is None else f" LIMIT {most}"
-        text = f"{self._samples_of(channel)}{limit}"  # in the order of the file, which is that of time
-        columns: dict[str, Any] = self._fetch(lambda: self._run(text, float(start), float(end)).fetchnumpy())
-        return columns["time"], columns["value"].astype(np.float64, copy=False)
+    def _pieces(self, channel: str, start: float, end: float) -> Iterator[tuple[Floats, Floats]]:
+        """Yield times and values of a window's samples, (N,) each, by row groups."""
+        groups = [number for number, (begin, last) in enumerate(self._groups) if begin <= end and last >= start]
+        return self._read(channel, groups, start, end)
 
-    def _samples_of(self, channel: str) -> str:
-        """Return the query of a window's samples. InputError where there is no such channel."""
+    def _read(self, channel: str, groups: Iterable[int], start: float, end: float) -> Iterator[tuple[Floats, Floats]]:
+        """Yield the samples of some row groups in a window. InputError for no such channel, or a damaged file."""
         if channel not in self.channels:
             raise InputError(f"there is no channel {channel!r}; there are {', '.join(self.channels)}")
-        value = '"' + channel.replace('"', '""') + '"::DOUBLE'  # of yes and no, 1 and 0
-        return f"SELECT time, {value} AS value FROM read_parquet(?) WHERE time BETWEEN ? AND ? AND isfinite({value})"
-
-    def _fetch(self, ask: Callable[[], Any]) -> Any:
-        """Return what a query finds. Raises InputError where the file is damaged."""
-        import duckdb
-
         try:
-            return ask()
-        except duckdb.Error as error:
-            raise InputError(_damaged(self._file)) from error
+            with pq.ParquetFile(self._file, metadata=self._metadata) as file:
+                for group in groups:
+                    table = file.read_row_group(group, ["time", channel], use_threads=False)
+                    time, values = (pc.cast(table[name], pa.float64()).to_numpy() for name in ("time", channel))
+                    kept = (time >= start) & (time <= end) & np.isfinite(values)
+                    yield time[kept], values[kept]
+        except (pa.ArrowException, OSError) as error:
+            raise self._damaged() from error
 
-    def _run(self, text: str, *values: float) -> duckdb.DuckDBPyConnection:
-        return _connection().execute(text, [self._file, *values])
-
-
-def _damaged(file: str) -> str:
-    return f"{file}: the series is damaged; run its data set again"
+    def _damaged(self) -> InputError:
+        return InputError(f"{self._file}: the series is damaged; run its data set again")
 
 
 @lru_cache(maxsize=256)
 def open_series(workspace: Path, path: str) -> SeriesWindows:
     """Return a series by its path in a workspace, which says its content: it never becomes another."""
     return SeriesWindows(inside(workspace, path))
-
-
-@lru_cache(maxsize=1)
-def _database() -> duckdb.DuckDBPyConnection:
-    import duckdb
-
-    return duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False})
-
-
-def _connection() -> duckdb.DuckDBPyConnection:
-    return _database().cursor()  # one for each thread
 
 
 def _until(time: Floats, values: Floats, at: float) -> float:
