@@ -12,6 +12,7 @@ from rdflib.plugins.sparql.algebra import translateQuery
 from rdflib.plugins.sparql.parser import parseQuery
 from rdflib.plugins.sparql.parserutils import CompValue
 
+from irtwin.knowledge.rdflib_terms import from_rdflib
 from irtwin.knowledge.rules.rule import Rule, group_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import PREFIXES
@@ -73,11 +74,5 @@ def _unified(pattern: tuple[Any, Any, Any], triple: Triple) -> _Bound | None:
 
 
 def _value(term: Any, known: _Bound) -> _Term | None:
-    if isinstance(term, rdflib.Variable | rdflib.BNode):
-        return known.get(str(term))
-    if isinstance(term, rdflib.URIRef):
-        return NamedNode(str(term))
-    if isinstance(term, rdflib.Literal):
-        datatype = None if term.datatype is None else NamedNode(str(term.datatype))
-        return Literal(str(term), language=term.language) if term.language else Literal(str(term), datatype=datatype)
-    return None  # a property path
+    """Return the value of a term; None of a variable that has none, and of a property path."""
+    return known.get(str(term)) if isinstance(term, rdflib.Variable | rdflib.BNode) else from_rdflib(term)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
 
 import owlrl
 import rdflib
-from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+from pyoxigraph import Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl.closure import Contradiction, says_something
-from irtwin.knowledge.owl_rl.terms import Node
+from irtwin.knowledge.rdflib_terms import from_rdflib, to_rdflib
 
 MOST_TRIPLES = 300_000
 SECONDS_PER_TRIPLE = 1e-3  # measured from 4,000 to 80,000 triples
@@ -49,35 +48,15 @@ def _truisms() -> frozenset[Triple]:
 
 def _closed(triples: Iterable[Triple]) -> set[Triple]:
     graph = rdflib.Graph()
-    for triple in triples:
-        graph.add((_to_rdflib(triple.subject), _to_rdflib(triple.predicate), _to_rdflib(triple.object)))
+    for subject, predicate, object in triples:
+        graph.add((to_rdflib(subject), to_rdflib(predicate), to_rdflib(object)))
     owlrl.DeductiveClosure(owlrl.OWLRL_Semantics).expand(graph)
     for error in graph.objects(None, _ERRORS.error):
         if not str(error).startswith(_ILL_TYPED):
             raise Contradiction(f"statements contradict each other, owlrl finds: {error}")
     said = (statement for statement in graph if not {*statement} & {_ERRORS.error, _ERRORS.ErrorMessage})
     return {
-        Triple(*map(_from_rdflib, statement))
+        Triple(*map(from_rdflib, statement))
         for statement in said
         if isinstance(statement[1], rdflib.URIRef) and not isinstance(statement[0], rdflib.Literal)
     }
-
-
-def _to_rdflib(term: Node) -> Any:
-    if isinstance(term, NamedNode):
-        return rdflib.URIRef(term.value)
-    if isinstance(term, BlankNode):
-        return rdflib.BNode(term.value)
-    assert isinstance(term, Literal)
-    if term.language:
-        return rdflib.Literal(term.value, lang=term.language)
-    return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
-
-
-def _from_rdflib(term: Any) -> Any:
-    if isinstance(term, rdflib.URIRef):
-        return NamedNode(str(term))
-    if isinstance(term, rdflib.BNode):
-        return BlankNode(str(term))
-    datatype = None if term.datatype is None else NamedNode(str(term.datatype))
-    return Literal(str(term), language=term.language) if term.language else Literal(str(term), datatype=datatype)

@@ -14,15 +14,16 @@ from itertools import product
 from typing import Any, cast
 
 import rdflib
-from pyoxigraph import BlankNode, Literal, NamedNode, QuerySolutions, Triple
+from pyoxigraph import NamedNode, QuerySolutions, RdfFormat, Triple, parse
 from rdflib.namespace import OWL, RDF, RDFS, XSD
 from rdflib.paths import MulPath, SequencePath
 
+from irtwin.knowledge.rdflib_terms import to_rdflib
 from irtwin.knowledge.rules.conjunction import TURNED, Comparison, NoConjunction, Pattern, conjunction, joined_to
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.swrl import FACETS, NAMESPACE
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, shorten
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES, shorten
 
 MOST_VALUES = 10  # of what a rule looks up in all of the graph: each makes a SWRL rule of its own
 
@@ -31,6 +32,7 @@ VARIABLE = "urn:swrl:var#"  # as Protégé calls them
 _DOUBLES = (XSD.double, XSD.float)
 _WHOLE = (XSD.integer, XSD.int, XSD.long, XSD.nonNegativeInteger, XSD.positiveInteger)
 _FACET_OF = {sign: name for name, sign in FACETS.items()}
+_PROLOGUE = "".join(f"PREFIX {name}: <{iri}> " for name, iri in (PREFIXES | {"swrl": NAMESPACE}).items())
 
 
 @dataclass
@@ -47,7 +49,7 @@ def as_swrl(graph: KnowledgeGraph, rules: Iterable[Rule]) -> Written:
     for rule in rules:
         try:
             for imp in _imps(rule, model):
-                written.triples |= imp
+                written.triples |= {quad.triple for quad in parse(_PROLOGUE + imp, format=RdfFormat.TURTLE)}
         except NoConjunction as why:
             written.left_out.append((rule, str(why)))
     return written
@@ -79,11 +81,11 @@ class _Model:
             QuerySolutions, self._graph.answer(f"SELECT DISTINCT * WHERE {{ {text} }} LIMIT {MOST_VALUES + 1}")
         )
         names = [variable.value for variable in answer.variables]
-        return [dict(zip(names, map(_of_rdflib, row), strict=True)) for row in answer]
+        return [dict(zip(names, map(to_rdflib, row), strict=True)) for row in answer]
 
 
-def _imps(rule: Rule, model: _Model) -> Iterator[set[Triple]]:
-    """Yield a rule as triples, once for each value that it looks up in all of the graph and each conclusion.
+def _imps(rule: Rule, model: _Model) -> Iterator[str]:
+    """Yield a rule in Turtle, once for each value that it looks up in all of the graph and each conclusion.
 
     SWRL lets a rule conclude several things, but Openllet then draws one of them.
     """
@@ -108,14 +110,13 @@ def _bound(patterns: Iterable[Pattern], row: dict[str, Any]) -> list[Pattern]:
 
 
 class _Imp:
-    """One SWRL rule in the making."""
+    """One SWRL rule in the making, in Turtle."""
 
     def __init__(self, model: _Model):
         self._model = model
-        self._made = set[Triple]()
         self._variables = set[str]()
 
-    def body(self, patterns: list[Pattern], comparisons: list[Comparison]) -> list[Any]:
+    def body(self, patterns: list[Pattern], comparisons: list[Comparison]) -> list[str]:
         """Return the atoms of patterns, each with what its value is compared to."""
         values = [object for _, predicate, object in patterns if self._model.is_a(predicate, OWL.DatatypeProperty)]
         limits: dict[Any, list[tuple[str, rdflib.Literal]]] = {}
@@ -131,7 +132,7 @@ class _Imp:
                 raise NoConjunction("it looks for one value twice, and no class does")
         return [self._atom(pattern, limits) for pattern in patterns]
 
-    def head(self, pattern: Pattern) -> BlankNode:
+    def head(self, pattern: Pattern) -> str:
         """Return the atom of what a rule concludes: a class or link of individuals that it knows."""
         subject, predicate, object = pattern
         variables = {str(it) for it in (subject, object) if isinstance(it, rdflib.Variable)}
@@ -139,89 +140,60 @@ class _Imp:
             raise NoConjunction("it concludes values, or what has no name before")
         return self._atom(pattern, {})
 
-    def written(self, rule: Rule, body: list[Any], head: BlankNode) -> set[Triple]:
+    def written(self, rule: Rule, body: list[str], head: str) -> str:
         """Return the rule with its label and comment."""
-        imp = self._node("Imp", {"body": self._atoms(body), "head": self._atoms([head])})
-        self._made.add(Triple(imp, _iri(RDFS.label), Literal(rule.label, language="en")))
+        words = f"rdfs:label {rdflib.Literal(rule.label, lang='en').n3()} ; "
         if rule.comment:
-            self._made.add(Triple(imp, _iri(RDFS.comment), Literal(rule.comment, language="en")))
-        for name in self._variables:
-            self._made.add(Triple(NamedNode(VARIABLE + name), _iri(RDF.type), NamedNode(NAMESPACE + "Variable")))
-        return self._made
+            words += f"rdfs:comment {rdflib.Literal(rule.comment, lang='en').n3()} ; "
+        variables = "".join(f"<{VARIABLE}{name}> a swrl:Variable . " for name in self._variables)
+        return f"{variables}[] a swrl:Imp ; {words}swrl:body {_atoms(body)} ; swrl:head {_atoms([head])} ."
 
-    def _atom(self, pattern: Pattern, limits: dict[Any, list[tuple[str, rdflib.Literal]]]) -> BlankNode:
+    def _atom(self, pattern: Pattern, limits: dict[Any, list[tuple[str, rdflib.Literal]]]) -> str:
         subject, predicate, object = pattern
         if _is_type(predicate) and isinstance(object, rdflib.URIRef):
-            return self._class_atom(subject, _iri(object))
+            return self._class_atom(subject, object.n3())
         if self._is_object_property(predicate):
-            ends = {"argument1": self._term(subject), "argument2": self._term(object)}
-            return self._node("IndividualPropertyAtom", {"propertyPredicate": _iri(predicate), **ends})
+            ends = f"swrl:argument1 {self._term(subject)} ; swrl:argument2 {self._term(object)}"
+            return f"[ a swrl:IndividualPropertyAtom ; swrl:propertyPredicate {predicate.n3()} ; {ends} ]"
         if not self._model.is_a(predicate, OWL.DatatypeProperty):
             name = shorten(str(predicate)) if isinstance(predicate, rdflib.URIRef) else "a path"
             raise NoConjunction(f"{name} is no property of individuals or of data in OWL")
-        restriction = BlankNode()
-        self._say(restriction, RDF.type, _iri(OWL.Restriction))
-        self._say(restriction, OWL.onProperty, _iri(predicate))
         if isinstance(object, rdflib.Literal):
-            self._say(restriction, OWL.hasValue, _literal(object))
+            values = f"owl:hasValue {object.n3()}"
         else:
-            self._say(restriction, OWL.someValuesFrom, self._range(predicate, limits.get(object, [])))
-        return self._class_atom(subject, restriction)
+            values = f"owl:someValuesFrom {self._range(predicate, limits.get(object, []))}"
+        return self._class_atom(subject, f"[ a owl:Restriction ; owl:onProperty {predicate.n3()} ; {values} ]")
 
-    def _range(self, predicate: Any, limits: list[tuple[str, rdflib.Literal]]) -> NamedNode | BlankNode:
+    def _range(self, predicate: Any, limits: list[tuple[str, rdflib.Literal]]) -> str:
         """Return the values of a property's datatype within limits."""
         if not limits:
-            return _iri(RDFS.Literal)
-        datatype = rdflib.URIRef(self._model.ranges.get(str(predicate), ""))
-        facets: list[Any] = []
+            return "rdfs:Literal"
+        datatype, facets = rdflib.URIRef(self._model.ranges.get(str(predicate), "")), ""
         for sign, limit in limits:
             datatype, value = _comparable(datatype, limit)
-            facet = BlankNode()
-            self._say(facet, XSD[_FACET_OF[sign]], value)
-            facets.append(facet)
-        node = BlankNode()
-        self._say(node, RDF.type, _iri(RDFS.Datatype))
-        self._say(node, OWL.onDatatype, _iri(datatype))
-        self._say(node, OWL.withRestrictions, self._list(facets))
-        return node
+            facets += f"[ xsd:{_FACET_OF[sign]} {value.n3()} ] "
+        return f"[ a rdfs:Datatype ; owl:onDatatype {datatype.n3()} ; owl:withRestrictions ( {facets}) ]"
 
-    def _class_atom(self, subject: Any, kind: NamedNode | BlankNode) -> BlankNode:
-        return self._node("ClassAtom", {"classPredicate": kind, "argument1": self._term(subject)})
+    def _class_atom(self, subject: Any, kind: str) -> str:
+        return f"[ a swrl:ClassAtom ; swrl:classPredicate {kind} ; swrl:argument1 {self._term(subject)} ]"
 
     def _is_object_property(self, predicate: Any) -> bool:
         return self._model.is_a(predicate, OWL.ObjectProperty)
 
-    def _term(self, term: Any) -> NamedNode:
+    def _term(self, term: Any) -> str:
         if isinstance(term, rdflib.Variable):
             self._variables.add(str(term))
-            return NamedNode(VARIABLE + str(term))
+            return f"<{VARIABLE}{term}>"
         if isinstance(term, rdflib.URIRef):
-            return _iri(term)
+            return term.n3()
         raise NoConjunction("it speaks of an individual without a name")
 
-    def _atoms(self, atoms: list[Any]) -> NamedNode | BlankNode:
-        return self._list(atoms, kind=NamedNode(NAMESPACE + "AtomList"))
 
-    def _list(self, items: list[Any], kind: NamedNode | None = None) -> NamedNode | BlankNode:
-        rest: NamedNode | BlankNode = _iri(RDF.nil)
-        for item in reversed(items):
-            cell = BlankNode()
-            if kind is not None:
-                self._say(cell, RDF.type, kind)
-            self._say(cell, RDF.first, item)
-            self._say(cell, RDF.rest, rest)
-            rest = cell
-        return rest
-
-    def _node(self, kind: str, properties: dict[str, Any]) -> BlankNode:
-        node = BlankNode()
-        self._say(node, RDF.type, NamedNode(NAMESPACE + kind))
-        for name, value in properties.items():
-            self._made.add(Triple(node, NamedNode(NAMESPACE + name), value))
-        return node
-
-    def _say(self, subject: BlankNode, predicate: rdflib.URIRef, object: Any) -> None:
-        self._made.add(Triple(subject, _iri(predicate), object))
+def _atoms(atoms: list[str]) -> str:
+    """Return a list of atoms, each cell of which says that it is one."""
+    if not atoms:
+        return "rdf:nil"
+    return f"[ a swrl:AtomList ; rdf:first {atoms[0]} ; rdf:rest {_atoms(atoms[1:])} ]"
 
 
 def _is_type(predicate: Any) -> bool:
@@ -232,27 +204,12 @@ def _is_type(predicate: Any) -> bool:
     return bool(predicate == RDF.type)
 
 
-def _comparable(datatype: rdflib.URIRef, limit: rdflib.Literal) -> tuple[rdflib.URIRef, Literal]:
+def _comparable(datatype: rdflib.URIRef, limit: rdflib.Literal) -> tuple[rdflib.URIRef, rdflib.Literal]:
     """Return the datatype and limit that OWL compares as SPARQL does: of numbers, doubles are apart from the others."""
     if datatype in _DOUBLES:
-        return datatype, Literal(str(float(limit)), datatype=_iri(datatype))
+        return datatype, rdflib.Literal(str(float(limit)), datatype=datatype, normalize=False)
     if datatype in (*_WHOLE, XSD.decimal):
-        return XSD.decimal, Literal(f"{Decimal(str(limit)):f}", datatype=_iri(XSD.decimal))
+        return XSD.decimal, rdflib.Literal(f"{Decimal(str(limit)):f}", datatype=XSD.decimal, normalize=False)
     if datatype == XSD.dateTime == limit.datatype:
-        return datatype, _literal(limit)
+        return datatype, limit
     raise NoConjunction(f"no data range compares {shorten(str(datatype)) or 'values of no datatype'} with {limit.n3()}")
-
-
-def _iri(term: rdflib.URIRef) -> NamedNode:
-    return NamedNode(str(term))
-
-
-def _literal(term: rdflib.Literal) -> Literal:
-    datatype = None if term.datatype is None else _iri(term.datatype)
-    return Literal(str(term), language=term.language) if term.language else Literal(str(term), datatype=datatype)
-
-
-def _of_rdflib(term: Any) -> Any:
-    if isinstance(term, Literal):
-        return rdflib.Literal(term.value, datatype=rdflib.URIRef(term.datatype.value), normalize=False)
-    return rdflib.URIRef(term.value) if isinstance(term, NamedNode) else rdflib.BNode(term.value)
