@@ -46,6 +46,14 @@ def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
     assert report.rows == ({"ok": True},)
 
 
+def test_a_property_of_listed_texts_leads_to_no_individual() -> None:
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    said = NamedNode(ID + "saving_action/one"), NamedNode(term("Compared_For")), Literal("piece")
+    graph.change((), [Quad(*said, NamedNode(GRAPH_SOURCE + "own"))])
+    assert [one.message for one in validate(graph) if one.property == term("Compared_For")] == []
+
+
 # what is wrong with an individual, and how it is told; a list is wrong at once
 BROKEN = [
     [

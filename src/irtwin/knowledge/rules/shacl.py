@@ -8,7 +8,7 @@ from pyoxigraph import BlankNode, Literal, NamedNode
 
 from irtwin.knowledge.rules.rule import SHACL, Rule, start_of_body
 from irtwin.knowledge.shacl.shapes import Node, Shapes
-from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
+from irtwin.knowledge.vocabulary import RDFS, SH, shorten
 
 _TARGETS = {
     "targetClass": "{{ $this rdf:type/rdfs:subClassOf* {} }}",
@@ -41,8 +41,8 @@ def _rule(shapes: Shapes, shape: Node, rule: Node) -> Rule:
     construct = _set_wise(shapes, rule, constructs[0].value, focus)
     return Rule(
         name=name,
-        label=_text(shapes, named, "label") or shorten(name),
-        comment=_text(shapes, named, "comment"),
+        label=shapes.text(named, RDFS + "label") or shorten(name),
+        comment=shapes.text(named, RDFS + "comment"),
         order=(_number(shapes, shape), _number(shapes, rule)),
         construct=construct,
         language=SHACL,
@@ -50,9 +50,7 @@ def _rule(shapes: Shapes, shape: Node, rule: Node) -> Rule:
 
 
 def _targets(shapes: Shapes, shape: Node) -> list[str]:
-    targets = [form.format(value) for name, form in _TARGETS.items() for value in shapes.values(shape, name)]
-    if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(shapes.values(shape, RDF + "type")):
-        targets.append(_TARGETS["targetClass"].format(shape))
+    targets = [_TARGETS[name].format(value) for name, value in shapes.targets(shape)]
     if not targets or shapes.values(shape, "target"):
         raise shapes.fault(
             shape, "its rule needs sh:targetClass, sh:targetNode, sh:targetSubjectsOf or sh:targetObjectsOf"
@@ -64,11 +62,7 @@ def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
     body = start_of_body(construct)
     if body is None:
         raise shapes.fault(rule, "its sh:construct is no CONSTRUCT { ... } WHERE { ... }")
-    prefixes = "".join(
-        f"PREFIX {_value(shapes, it, 'prefix')}: <{_value(shapes, it, 'namespace')}>\n"
-        for ontology in shapes.values(rule, "prefixes")
-        for it in shapes.values(ontology, "declare")
-    )
+    prefixes = "".join(f"PREFIX {name}: <{space}>\n" for name, space in shapes.prefixes(rule).items())
     return f"{prefixes}{construct[:body]} {focus} {construct[body:]}"
 
 
@@ -78,13 +72,3 @@ def _number(shapes: Shapes, node: Node) -> Decimal:
         return Decimal(order.value) if isinstance(order, Literal) else Decimal(0)
     except InvalidOperation as error:
         raise shapes.fault(node, f"sh:order {order} is no number") from error
-
-
-def _text(shapes: Shapes, node: Node, name: str) -> str:
-    literal = shapes.value(node, RDFS + name)
-    return literal.value if isinstance(literal, Literal) else ""
-
-
-def _value(shapes: Shapes, node: Node, name: str) -> str:
-    value = shapes.value(node, name)
-    return value.value if isinstance(value, NamedNode | Literal) else ""

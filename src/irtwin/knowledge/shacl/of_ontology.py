@@ -9,9 +9,10 @@ Terms of other vocabularies, as their rdfs:isDefinedBy says, are left to these.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from typing import TypeGuard
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+from pyoxigraph import Literal, NamedNode, RdfFormat, Triple, parse
 
 from irtwin.knowledge.shacl.shapes import Shapes
 from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
@@ -19,8 +20,8 @@ from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
 _OWN = "https://w3id.org/irtwin/shapes/"
 _TYPE = RDF + "type"
 SUB_CLASS_OF = NamedNode(RDFS + "subClassOf")
+_PROLOGUE = f"PREFIX sh: <{SH}> PREFIX rdf: <{RDF}> PREFIX rdfs: <{RDFS}>\n"
 Classes = tuple[str, ...]  # IRIs; what is meant is of one of them
-Term = NamedNode | BlankNode | Literal
 
 
 def with_ontology(by_hand: Iterable[Triple], ontology: Iterable[Triple]) -> set[Triple]:
@@ -31,13 +32,15 @@ def with_ontology(by_hand: Iterable[Triple], ontology: Iterable[Triple]) -> set[
     written = set(by_hand)
     terms = _Ontology(Shapes(ontology, "the ontology"), Shapes(written, "rules/shapes.ttl"))
     closed = {
-        triple: set(_one_of(triple.subject, terms.catalogues[triple.object.value]))
+        triple: Triple(triple.subject, NamedNode(SH + "in"), _name("members", triple.object.value))
         for triple in written
         if triple.predicate.value == SH + "class"
         and isinstance(triple.object, NamedNode)
         and triple.object.value in terms.catalogues
     }
-    return (written - closed.keys()).union(terms.domains(), terms.ranges(), terms.members(), *closed.values())
+    told = _PROLOGUE + "\n".join(chain(terms.domains(), terms.ranges(), terms.members()))
+    of_ontology = {quad.triple for quad in parse(told, format=RdfFormat.TURTLE)}
+    return (written - closed.keys()).union(closed.values(), of_ontology)
 
 
 class _Ontology:
@@ -50,40 +53,35 @@ class _Ontology:
             one.value: individuals for one in self._classes if (individuals := self._individuals(one.value))
         }
 
-    def domains(self) -> Iterator[Triple]:
-        """Yield that what has a property is said to be of its domain."""
+    def domains(self) -> Iterator[str]:
+        """Yield in Turtle that what has a property is said to be of its domain."""
         properties: dict[Classes, list[str]] = {}
         for name in self._properties("domain"):
             properties.setdefault(self._classes_of(name, "domain"), []).append(name)
         for classes, names in properties.items():
-            shape = _shape("domain", *classes)
-            yield from _is(shape, f"is not said to be {self._named(classes)}, though only one has such properties")
-            yield from (_triple(shape, "targetSubjectsOf", NamedNode(name)) for name in names)
-            yield from _of_classes(shape, classes)
+            message = f"is not said to be {self._named(classes)}, though only one has such properties"
+            targets = ", ".join(f"<{name}>" for name in names)
+            yield _shape("domain", classes, message, f"sh:targetSubjectsOf {targets} ; {_of_classes(classes)}")
 
-    def ranges(self) -> Iterator[Triple]:
+    def ranges(self) -> Iterator[str]:
         """Yield that the values of a property are said to be of its range, where no shape by hand asks for more."""
         for name in self._properties("range"):
             classes = self._classes_of(name, "range")
-            if not {NamedNode(one) for one in classes} <= self._classes or self._is_asked_by_hand(name):
+            of_classes = classes and {NamedNode(one) for one in classes} <= self._classes
+            if not of_classes or self._is_asked_by_hand(name):
                 continue  # values that are literals, or asked for in better words
             members = [each for one in classes for each in self.catalogues.get(one, ())]
-            shape, value = _shape("range", name), _shape("value", name)
             message = f"{shorten(name)} leads to {self._named(classes)}{' of the ontology' if members else ''}"
-            yield Triple(shape, NamedNode(_TYPE), NamedNode(SH + "NodeShape"))
-            yield _triple(shape, "targetSubjectsOf", NamedNode(name))
-            yield _triple(shape, "property", value)
-            yield _triple(value, "path", NamedNode(name))
-            yield _triple(value, "message", Literal(message))
-            yield from _one_of(value, members) if members else _of_classes(value, classes)
+            of_range, value = _name("range", name), _name("value", name)
+            yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
+            fits = _one_of(classes, members) if members else _of_classes(classes)
+            yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; {fits} ."
 
-    def members(self) -> Iterator[Triple]:
+    def members(self) -> Iterator[str]:
         """Yield that a catalogue has no individuals but those of the ontology."""
         for name, individuals in self.catalogues.items():
-            shape = _shape("catalogue", name)
-            yield from _is(shape, f"is not in the ontology, which lists every {self._label(name)} ({shorten(name)})")
-            yield _triple(shape, "targetClass", NamedNode(name))
-            yield from _one_of(shape, individuals)
+            message = f"is not in the ontology, which lists every {self._label(name)} ({shorten(name)})"
+            yield _shape("catalogue", (name,), message, f"sh:targetClass <{name}> ; {_one_of((name,), individuals)}")
 
     def _properties(self, end: str) -> list[str]:
         return sorted(one.value for one in self._said.having(RDFS + end) if self._is_own(one))
@@ -99,11 +97,8 @@ class _Ontology:
         cell_or_class = self._said.value(NamedNode(name), RDFS + end)
         if isinstance(cell_or_class, NamedNode):
             return (cell_or_class.value,)
-        classes, cell = list[str](), self._said.value(cell_or_class, OWL + "unionOf")
-        while isinstance(first := self._said.value(cell, RDF + "first"), NamedNode):
-            classes.append(first.value)
-            cell = self._said.value(cell, RDF + "rest")
-        return tuple(classes)
+        members = self._said.items(self._said.value(cell_or_class, OWL + "unionOf"))
+        return tuple(one.value for one in members if isinstance(one, NamedNode))
 
     def _is_asked_by_hand(self, name: str) -> bool:
         """Whether shapes by hand ask for the class of a property's values, of all that may have the property."""
@@ -138,44 +133,30 @@ class _Ontology:
         return " or ".join(f"{_article(self._label(one))} {self._label(one)} ({shorten(one)})" for one in classes)
 
     def _label(self, name: str) -> str:
-        label = self._said.value(NamedNode(name), RDFS + "label")
-        return label.value if isinstance(label, Literal) else shorten(name)
+        return self._said.text(NamedNode(name), RDFS + "label") or shorten(name)
 
 
-def _shape(kind: str, *names: str) -> NamedNode:
+def _name(kind: str, *names: str) -> NamedNode:
     return NamedNode(_OWN + "/".join((kind, *(shorten(name).replace(":", "-") for name in names))))
 
 
-def _is(shape: NamedNode, message: str) -> Iterator[Triple]:
-    yield Triple(shape, NamedNode(_TYPE), NamedNode(SH + "NodeShape"))
-    yield _triple(shape, "message", Literal(message))
+def _shape(kind: str, names: Classes, message: str, constraint: str) -> str:
+    return f"{_name(kind, *names)} a sh:NodeShape ; sh:message {Literal(message)} ; {constraint} ."
 
 
-def _triple(shape: NamedNode | BlankNode, name: str, value: Term) -> Triple:
-    return Triple(shape, NamedNode(SH + name), value)
+def _of_classes(classes: Classes) -> str:
+    """Return that a value is of one of some classes: of their union, which each of them is below."""
+    if len(classes) == 1:
+        return f"sh:class <{classes[0]}>"
+    union = _name("union", *classes)
+    return f"sh:class {union} . " + " . ".join(f"<{one}> rdfs:subClassOf {union}" for one in classes)
 
 
-def _of_classes(shape: NamedNode, classes: Classes) -> Iterator[Triple]:
-    """Yield that a value is of one of some classes: of their union, which each of them is below."""
-    union = NamedNode(classes[0]) if len(classes) == 1 else _shape("union", *classes)
-    yield _triple(shape, "class", union)
-    for one in classes[1:] and classes:
-        yield Triple(NamedNode(one), SUB_CLASS_OF, union)
-
-
-def _one_of(shape: NamedNode | BlankNode | Triple, members: Sequence[str]) -> Iterator[Triple]:
-    """Yield that a value is one of some individuals."""
-    assert not isinstance(shape, Triple)
-    return _list(shape, "in", [NamedNode(one) for one in members])
-
-
-def _list(shape: NamedNode | BlankNode, name: str, items: Sequence[Term]) -> Iterator[Triple]:
-    cells: list[NamedNode | BlankNode] = [BlankNode() for _ in items]
-    ends = [*cells, NamedNode(RDF + "nil")]
-    yield _triple(shape, name, ends[0])
-    for item, cell, rest in zip(items, cells, ends[1:], strict=True):
-        yield Triple(cell, NamedNode(RDF + "first"), item)
-        yield Triple(cell, NamedNode(RDF + "rest"), rest)
+def _one_of(classes: Classes, members: Sequence[str]) -> str:
+    """Return that a value is one of some individuals, which a list with a name holds."""
+    members_of = _name("members", *classes)
+    first, *others = (f"<{one}>" for one in members)
+    return f"sh:in {members_of} . {members_of} rdf:first {first} ; rdf:rest ( {' '.join(others)} )"
 
 
 def _article(label: str) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.vocabulary import SH, shorten
+from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
 
 Node = NamedNode | BlankNode | Literal | Triple
+
+_TARGETS = ("targetClass", "targetNode", "targetSubjectsOf", "targetObjectsOf")
+_CLASSES = {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")}
 
 
 class Shapes:
@@ -44,6 +47,31 @@ class Shapes:
     def value(self, node: object, name: str) -> Node | None:
         """Return the one value of a property, or None."""
         return next(iter(self.values(node, name)), None)
+
+    def text(self, node: object, name: str) -> str:
+        """Return the text of a property's value; an empty one where it has none, or is no literal."""
+        literal = self.value(node, name)
+        return literal.value if isinstance(literal, Literal) else ""
+
+    def items(self, cell: object) -> list[Node]:
+        """Return the members of a list, by its first cell."""
+        members = []
+        while (first := self.value(cell, RDF + "first")) is not None:
+            members.append(first)
+            cell = self.value(cell, RDF + "rest")
+        return members
+
+    def targets(self, shape: object) -> Iterator[tuple[str, Node]]:
+        """Yield the targets of a shape, each after the name of its property; a shape that is a class has itself."""
+        for name in _TARGETS:
+            yield from ((name, value) for value in self.values(shape, name))
+        if _CLASSES.intersection(self.values(shape, RDF + "type")):
+            yield "targetClass", shape  # type: ignore[misc]
+
+    def prefixes(self, node: object) -> dict[str, str]:
+        """Return the prefixes that a query's sh:prefixes declare, with their namespaces."""
+        declared = (it for ontology in self.values(node, "prefixes") for it in self.values(ontology, "declare"))
+        return {self.text(it, "prefix"): self.text(it, "namespace") for it in declared}
 
     def is_deactivated(self, node: object) -> bool:
         """Whether a shape or rule is switched off."""

@@ -13,7 +13,7 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 
 from irtwin.knowledge.shacl.shapes import Node, Shapes
-from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF, RDFS, SH, XSD
+from irtwin.knowledge.vocabulary import PREFIXES, RDF, RDFS, SH, XSD
 
 _KIND = "?_kind"
 _THIS = "?this"
@@ -71,15 +71,12 @@ class _Writer:
                 conditions = ["false"]
             if conditions:
                 yield f"SELECT DISTINCT $this {{ {focus} FILTER(!COALESCE({' && '.join(conditions)}, false)) }}"
-            for text in self._selects(shape):
+            for text in map(self._select, self._shapes.values(shape, "sparql")):
                 yield f"SELECT DISTINCT $this {{ {focus} {{ {text} }} }}"
 
     def _targets(self, shape: Node) -> Iterator[str]:
-        for name, form in _TARGETS.items():
-            for value in self._shapes.values(shape, name):
-                yield form.format(self._of_kind(_KIND, value) if name == "targetClass" else value)
-        if {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")} & set(self._shapes.values(shape, RDF + "type")):
-            yield _TARGETS["targetClass"].format(self._of_kind(_KIND, shape))
+        for name, value in self._shapes.targets(shape):
+            yield _TARGETS[name].format(self._of_kind(_KIND, value) if name == "targetClass" else value)
 
     def _of_kind(self, variable: str, kind: Node) -> str:
         """Return what is true of a variable that is a class, or below it."""
@@ -109,7 +106,7 @@ class _Writer:
         if name == "node":
             return " && ".join(self._conditions(value, node)) or "true"
         if name == "or":
-            either = [" && ".join(self._conditions(one, node)) or "true" for one in self._list(value)]
+            either = [" && ".join(self._conditions(one, node)) or "true" for one in self._shapes.items(value)]
             return f"({' || '.join(f'COALESCE({one}, false)' for one in either)})"
         if name == "class":
             kind = self._name()
@@ -117,7 +114,7 @@ class _Writer:
         if name == "datatype":
             return f"(datatype({node}) = {value} && {self._well_formed(value, node)})"
         if name == "in":
-            return self._is_in(node, self._list(value))
+            return self._is_in(node, self._shapes.items(value))
         if name in _COMPARED and isinstance(value, Literal):
             return f"{node} {_COMPARED[name]} {value}"
         if name == "minLength" and isinstance(value, Literal):
@@ -150,16 +147,10 @@ class _Writer:
                     keeps = self._condition(short, value, one)
                     yield f"NOT EXISTS {{ {node} {path} {one} FILTER(!COALESCE({keeps}, false)) }}"
 
-    def _selects(self, shape: Node) -> Iterator[str]:
-        for constraint in self._shapes.values(shape, "sparql"):
-            text = self._shapes.value(constraint, "select")
-            prefixes = {
-                (self._text(declared, "prefix"), self._text(declared, "namespace"))
-                for ontology in self._shapes.values(constraint, "prefixes")
-                for declared in self._shapes.values(ontology, "declare")
-            }
-            known = isinstance(text, Literal) and all(PREFIXES.get(name) == space for name, space in prefixes)
-            yield text.value if known and isinstance(text, Literal) else ""
+    def _select(self, constraint: Node) -> str:
+        """Return a constraint's query; an empty one, which suspects all, where its prefixes are not the usual ones."""
+        known = self._shapes.prefixes(constraint).items() <= PREFIXES.items()
+        return self._shapes.text(constraint, "select") if known else ""
 
     def _path(self, path: Node | None) -> str:
         if isinstance(path, NamedNode):
@@ -167,7 +158,7 @@ class _Writer:
         inverse = self._shapes.value(path, "inversePath")
         if isinstance(inverse, NamedNode):
             return f"^{inverse}"
-        ways = self._list(self._shapes.value(path, "alternativePath"))
+        ways = self._shapes.items(self._shapes.value(path, "alternativePath"))
         if ways:
             return f"({'|'.join(map(self._path, ways))})"
         raise _Unknown("path")
@@ -182,17 +173,6 @@ class _Writer:
         if not all(isinstance(one, NamedNode) or _is_plain(one) for one in items):
             raise _Unknown("in")  # numbers are equal to others that are written otherwise
         return f"{node} IN ({', '.join(map(str, items))})"
-
-    def _list(self, cell: Node | None) -> list[Node]:
-        members = []
-        while (first := self._shapes.value(cell, RDF + "first")) is not None:
-            members.append(first)
-            cell = self._shapes.value(cell, RDF + "rest")
-        return members
-
-    def _text(self, node: Node, name: str) -> str:
-        literal = self._shapes.value(node, name)
-        return literal.value if isinstance(literal, Literal) else ""
 
     def _name(self) -> str:
         return f"?_v{next(self._numbers)}"
