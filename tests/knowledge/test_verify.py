@@ -114,7 +114,7 @@ def test_a_joints_limits_cite_the_file_that_describes_the_robot(filled: Path) ->
     graph.update("""INSERT DATA { irt:Lower_Limit irt:told_in "URDF" . <urn:j> irt:joint_of <urn:r> .
         <urn:s> irt:source_of <urn:r> ; irt:Source_Kind "data set" ; irt:File "dataset.toml" ; irt:Checksum "1" ;
         irt:Data_Folder "/data" }""")
-    assert told_in(graph, "urn:j", term("Lower_Limit")).file == "dataset.toml"
+    assert told_in(graph, "urn:j", term("Lower_Limit"))["file"] == "dataset.toml"
 
 
 @pytest.mark.parametrize("kind", ["data/runs/work.csv", "data/dataset.toml", "data/robot.urdf", "twin", "series"])

@@ -22,6 +22,7 @@ from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
+from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.tariff import ELECTRICITY
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
@@ -103,16 +104,13 @@ class Explainer:
         if iri in self._told:
             return Explanation(what, _ABOVE)
         self._told.add(iri)
-        kept = provenance.file_of(self._graph, iri)
         makers = provenance.makers(self._graph, iri)
         used = [thing for maker in makers for thing in provenance.used_by(self._graph, maker["activity"])]
         return Explanation(
             what,
             " and ".join(map(_maker, makers)) or self._known_from(iri),
             (*map(self.individual, dict.fromkeys(used)), *self._runs_recorded_as(iri)),
-            file=kept.file,
-            checksum=kept.checksum,
-            folder=kept.folder,
+            **provenance.file_of(self._graph, iri),
         )
 
     def _runs_recorded_as(self, series: str) -> Iterator[Explanation]:
@@ -120,10 +118,8 @@ class Explainer:
         for run in provenance.recorded_of(self._graph, series):
             if run in self._told:
                 continue
-            kept = provenance.file_of(self._graph, run)
-            yield Explanation(
-                shorten(run, self._graph.base), self._known_from(run), (), None, kept.file, kept.checksum, kept.folder
-            )
+            what, file = shorten(run, self._graph.base), provenance.file_of(self._graph, run)
+            yield Explanation(what, self._known_from(run), **file)
 
     def _known_from(self, run: str) -> str:
         return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
@@ -141,9 +137,8 @@ class Explainer:
             near = self._file_near(triple)
             maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
             subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
-            behind = provenance.behind(self._graph, subject) if near.file is None and subject is not None else []
-            made_of = tuple(map(self.individual, behind))
-            return Explanation(what, maker, made_of, None, near.file, near.checksum, near.folder)
+            behind = provenance.behind(self._graph, subject) if not near and subject is not None else []
+            return Explanation(what, maker, tuple(map(self.individual, behind)), **near)
         if name == GRAPH_ONTOLOGY:
             module = _module(triple, self._graph.resources.of("ontology"))
             if module is None and triple.subject == ELECTRICITY:
@@ -208,15 +203,13 @@ class Explainer:
     def _is_individual(self, term: object) -> TypeGuard[NamedNode]:
         return isinstance(term, NamedNode) and term.value.startswith(self._graph.base)
 
-    def _file_near(self, triple: Triple) -> provenance.File:
+    def _file_near(self, triple: Triple) -> Row:
         """Return the file that says a triple: a data set's, or else that of the subject, or of the object."""
-        ends = [term.value for term in (triple.subject, triple.object) if isinstance(term, NamedNode)]
+        told: Row = {}
         if isinstance(triple.subject, NamedNode):
             told = provenance.told_in(self._graph, triple.subject.value, triple.predicate.value)
-            if told.file is not None:
-                return told
-        files = (provenance.file_of(self._graph, end) for end in ends)
-        return next((one for one in files if one.file is not None), provenance.File())
+        ends = (term.value for term in (triple.subject, triple.object) if isinstance(term, NamedNode))
+        return told or next(filter(None, (provenance.file_of(self._graph, end) for end in ends)), {})
 
 
 def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[Statement]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from pyoxigraph import Literal, NamedNode, Triple
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -83,24 +81,14 @@ WHERE {
 }"""
 
 
+_PLAN = "SELECT ?kind { ?thing a ?kind FILTER(?kind IN (irt:Planned_Run, irt:Planned_Series)) }"
+
 _FARTHEST = 4  # steps: a shape, its link, its robot, and the file that describes that
-
-
-@dataclass(frozen=True)
-class File:
-    """A file and its SHA-256; its path begins in the workspace, or in the `folder` of a data set."""
-
-    file: str | None = None
-    checksum: str | None = None
-    folder: str | None = None
 
 
 def makers(graph: KnowledgeGraph, thing: str) -> list[Row]:
     """Return the activities that made a thing, each with its provider, software and when it finished."""
     return list(graph.query(_MAKERS, {"thing": thing}))
-
-
-_PLAN = "SELECT ?kind { ?thing a ?kind FILTER(?kind IN (irt:Planned_Run, irt:Planned_Series)) }"
 
 
 def activity(graph: KnowledgeGraph, iri: str) -> Row:
@@ -123,9 +111,9 @@ def is_planned(graph: KnowledgeGraph, thing: str) -> bool:
     return bool(list(graph.query(_PLAN, {"thing": thing})))
 
 
-def file_of(graph: KnowledgeGraph, thing: str) -> File:
-    """Return the file that a thing is kept in, as far as it is known."""
-    return File(**next(iter(graph.query(_FILES, {"thing": thing})), {}))
+def file_of(graph: KnowledgeGraph, thing: str) -> Row:
+    """Return `file`, `checksum` and `folder` of what a thing is kept in, as explanations have them; {} if unknown."""
+    return next(iter(graph.query(_FILES, {"thing": thing})), {})
 
 
 def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
@@ -138,7 +126,7 @@ def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
         leads_to = (row["next"] for node in nodes for row in graph.query(_NEXT, {"thing": node}))
         nodes = [node for node in dict.fromkeys(leads_to) if node.startswith(graph.base) and node not in seen]
         seen.update(nodes)
-        if in_files := [node for node in nodes if file_of(graph, node).file is not None]:
+        if in_files := [node for node in nodes if file_of(graph, node)]:
             return in_files
     return []
 
@@ -165,6 +153,6 @@ def _same(written: str, term: NamedNode | Literal) -> bool:
         return False
 
 
-def told_in(graph: KnowledgeGraph, thing: str, property: str) -> File:
-    """Return the file of a data set that says a property of a thing, where one does."""
-    return File(**next(iter(graph.query(_TOLD_IN, {"thing": thing, "property": property})), {}))
+def told_in(graph: KnowledgeGraph, thing: str, property: str) -> Row:
+    """Return the file of a data set that says a property of a thing, as `file_of`."""
+    return next(iter(graph.query(_TOLD_IN, {"thing": thing, "property": property})), {})
