@@ -34,6 +34,7 @@ _SQL_VERSIONS = {
     *("SQL2008", "Oracle", "MySQL", "MSSQLServer", "HSQLDB", "PostgreSQL", "DB2", "Informix", "Ingres"),
     *("Progress", "SybaseASE", "SybaseSQLAnywhere", "Virtuoso", "Firebird"),
 }
+_SHORTCUTS = {RR + name for name in ("subject", "predicate", "object", "graph")}
 _Parsed = TypeVar("_Parsed")
 
 
@@ -51,7 +52,10 @@ def read_document(path: Path) -> MappingDocument:
 
 
 class _Graph:
-    """The triples of a document, by subject and property."""
+    """The triples of a document, by subject and property.
+
+    A shortcut such as rr:object stands beside the rr:objectMap with the rr:constant that it is short for.
+    """
 
     def __init__(self, triples: Iterable[tuple[Node, NamedNode, Node]]) -> None:
         self.properties: dict[Node, dict[str, list[Node]]] = {}
@@ -59,6 +63,12 @@ class _Graph:
             values = self.properties.setdefault(subject, {}).setdefault(predicate.value, [])
             if value not in values:
                 values.append(value)
+        for properties in list(self.properties.values()):
+            for name in _SHORTCUTS & properties.keys():
+                maps: list[Node] = [BlankNode() for _ in properties[name]]
+                for node, value in zip(maps, properties[name], strict=True):
+                    self.properties[node] = {f"{RR}constant": [value]}
+                properties[f"{name}Map"] = maps + properties.get(f"{name}Map", [])
 
     def objects(self, node: Node, name: str) -> list[Node]:
         """Return the values of a node's property rr:NAME, as they come in the document."""
@@ -80,7 +90,7 @@ class _Reader:
         nodes: dict[Node, None] = {}  # in the document's order, so that each reading gives the same statements
         for node, properties in self.graph.properties.items():
             typed = NamedNode(f"{RR}TriplesMap") in properties.get(_RDF_TYPE, [])
-            if typed or any(RR + name in properties for name in ("logicalTable", "subjectMap", "subject")):
+            if typed or any(RR + name in properties for name in ("logicalTable", "subjectMap")):
                 nodes[node] = None
             nodes |= dict.fromkeys(self.graph.objects(node, "parentTriplesMap"))
         if not nodes:
@@ -116,54 +126,40 @@ class _Reader:
             return LogicalTable(where, table=self.parsed(parse_table, name, where))
         return LogicalTable(where, query=query)
 
-    def subject(self, node: Node, where: str) -> tuple[Node | None, TermMap]:
-        """Return the subject map's node (None for the shortcut rr:subject) and the map."""
-        maps = self.maps(node, "subject", where)
+    def subject(self, node: Node, where: str) -> tuple[Node, TermMap]:
+        """Return the subject map's node and the map."""
+        maps = self.graph.objects(node, "subjectMap")
         if len(maps) != 1:
             self.fault(where, f"has {len(maps)} subject maps; give one rr:subjectMap or rr:subject")
-        kind, item = maps[0]
-        where = f"{where}, subject map"
-        if kind == "constant":
-            return None, self.constant(item, where, TermType.IRI)
         allowed = (TermType.IRI, TermType.BLANK_NODE)
-        return item, self.term_map(item, where, allowed, extra="class graph graphMap")
+        return maps[0], self.term_map(maps[0], f"{where}, subject map", allowed, extra="class graph graphMap")
 
-    def classes(self, node: Node | None, where: str) -> tuple[NamedNode, ...]:
-        classes = [] if node is None else self.graph.objects(node, "class")
-        return tuple(self.iri(item, f"{where}, rr:class") for item in classes)
+    def classes(self, node: Node, where: str) -> tuple[NamedNode, ...]:
+        return tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.objects(node, "class"))
 
-    def graphs(self, node: Node | None, where: str) -> tuple[TermMap, ...]:
-        where = f"{where}, graph map"
-        maps = [] if node is None else self.maps(node, "graph", where)
-        return tuple(self.shortcut_or_map(kind, item, where) for kind, item in maps)
+    def graphs(self, node: Node, where: str) -> tuple[TermMap, ...]:
+        return self.iri_maps(node, "graph", f"{where}, graph map")
 
     def predicate_object_map(self, node: Node, where: str) -> PredicateObjectMap:
         allowed = "predicate predicateMap object objectMap graph graphMap"
         self.only(node, f"{where}, predicate-object map", allowed)
-        predicates = self.maps(node, "predicate", where)
-        objects = self.maps(node, "object", where)
-        name = next((_label(item) for kind, item in predicates if kind == "constant"), _label(node))
-        if not predicates or not objects:
+        objects = self.graph.objects(node, "objectMap")
+        name = next(map(_label, self.graph.objects(node, "predicate")), _label(node))
+        if not self.graph.objects(node, "predicateMap") or not objects:
             self.fault(where, f"predicate-object map {name} needs a predicate and an object")
         return PredicateObjectMap(
-            predicates=tuple(
-                self.shortcut_or_map(kind, item, f"{where}, predicate map of {name}") for kind, item in predicates
-            ),
-            objects=tuple(self.object_map(kind, item, f"{where}, object map of {name}") for kind, item in objects),
+            predicates=self.iri_maps(node, "predicate", f"{where}, predicate map of {name}"),
+            objects=tuple(self.object_map(item, f"{where}, object map of {name}") for item in objects),
             graphs=self.graphs(node, f"{where}, {name}"),
         )
 
-    def object_map(self, kind: str, node: Node, where: str) -> TermMap | Join:
-        if kind == "constant":
-            return self.constant(node, where)
+    def object_map(self, node: Node, where: str) -> TermMap | Join:
         if self.graph.objects(node, "parentTriplesMap"):
             return self.join(node, where)
         return self.term_map(node, where, tuple(TermType), extra="datatype language")
 
-    def shortcut_or_map(self, kind: str, node: Node, where: str) -> TermMap:
-        if kind == "constant":
-            return self.constant(node, where, TermType.IRI)
-        return self.term_map(node, where, (TermType.IRI,))
+    def iri_maps(self, node: Node, name: str, where: str) -> tuple[TermMap, ...]:
+        return tuple(self.term_map(item, where, (TermType.IRI,)) for item in self.graph.objects(node, f"{name}Map"))
 
     def join(self, node: Node, where: str) -> Join:
         self.only(node, where, "parentTriplesMap joinCondition")
@@ -227,11 +223,6 @@ class _Reader:
         if required is not None or not isinstance(node, Literal):
             self.fault(where, f"the constant {_label(node)} must be an IRI{'' if required else ' or a literal'}")
         return TermMap(where, TermType.LITERAL, constant=node)
-
-    def maps(self, node: Node, name: str, where: str) -> list[tuple[str, Node]]:
-        """Return the term maps given by rr:NAMEMap and by the shortcut rr:NAME, with which of them it is."""
-        shortcuts = [("constant", item) for item in self.graph.objects(node, name)]
-        return shortcuts + [("map", item) for item in self.graph.objects(node, f"{name}Map")]
 
     def only(self, node: Node, where: str, allowed: str) -> None:
         """Refuse R2RML properties that do not belong here: misspelt ones would be silently ignored."""
