@@ -11,10 +11,11 @@ import math
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -192,8 +193,9 @@ def _insert(connection: Connection, table: Table, archive: Path, file: Path) -> 
             f"{archive}: has no table {table.name}: made by another irtwin version; restore it with that one"
         )
     try:
-        for rows in _in_chunks(_row(table, archive, line) for line in _lines(file)):
-            connection.execute(insert(table), rows)
+        rows = (_row(table, archive, line) for line in _lines(file))
+        while chunk := list(islice(rows, _AT_ONCE)):
+            connection.execute(insert(table), chunk)
     except (ValueError, TypeError, SQLAlchemyError) as error:
         reason = str(error).splitlines()[0][:500]
         raise InputError(
@@ -218,17 +220,6 @@ def _row(table: Table, archive: Path, line: bytes) -> dict[str, Any]:
     row |= {name: datetime.fromisoformat(row[name]) for name in moments}
     check_row(table, row)
     return row
-
-
-def _in_chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
-    chunk: list[dict[str, Any]] = []
-    for row in rows:
-        chunk.append(row)
-        if len(chunk) == _AT_ONCE:
-            yield chunk
-            chunk = []
-    if chunk:
-        yield chunk
 
 
 def _read_quads(archive: Path, file: Path) -> Iterator[Quad]:

@@ -66,9 +66,11 @@ class KnowledgeGraph:
         workspace: Path | None = None,
         resources: Resources | None = None,
         base: str | None = None,
+        *,
+        read_only: bool = False,
     ):
         self._store: Store | SparqlServer
-        self._read_only = False
+        self._read_only = read_only
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self._resources = resources
         self._base = base
@@ -77,14 +79,15 @@ class KnowledgeGraph:
         self.folder = None if place is None or is_url(place) else Path(place)
         if self.folder is None:
             self._store = Store() if place is None else SparqlServer(str(place))
-            self._answers = answers_of(self._store)
-            return
-        check_files(self.folder)
-        with told(self.folder):
-            self._store = Store(str(self.folder))
+        elif read_only:
+            self._store = Store.read_only(str(self.folder))
+        else:
+            check_files(self.folder)
+            with told(self.folder):
+                self._store = Store(str(self.folder))
+            for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
+                old.unlink(missing_ok=True)
         self._answers = answers_of(self._store)
-        for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
-            old.unlink(missing_ok=True)
 
     @classmethod
     def of_workspace(cls, place: Workspace) -> Self:
@@ -99,14 +102,7 @@ class KnowledgeGraph:
 
         Raises OSError or RuntimeError where that process changed the files just now.
         """
-        graph = cls.__new__(cls)
-        graph.folder, graph._read_only = path, True
-        graph._store = Store.read_only(str(path))
-        graph._workspace, graph._resources, graph._base = workspace or path.parent, resources, None
-        graph._answers = answers_of(graph._store)
-        graph._says_first = False
-        graph.asserted_since = 0
-        return graph
+        return cls(path, workspace, resources, read_only=True)
 
     def __enter__(self) -> Self:
         """Return the graph; leaving the block closes it."""
