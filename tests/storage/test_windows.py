@@ -55,7 +55,7 @@ def test_mean_and_extremes_are_those_of_the_samples(series: Known, one: float, o
     file, power = series
     start, end = sorted((one, other))
     inside = power[(start <= TIME) & (end >= TIME) & np.isfinite(power)]
-    found = [file.mean("power", start, end), *(file.extreme(which, "power", start, end) for which in ("min", "max"))]
+    found = [file.mean("power", start, end), file.min("power", start, end), file.max("power", start, end)]
     if len(inside) == 0:
         assert found == [None, None, None]
     else:
@@ -97,7 +97,7 @@ def test_samples_and_names_that_need_quotes(series: Known) -> None:
     found = file.samples("power", TIME[98], TIME[101])
     expected = [(TIME[i], power[i]) for i in range(98, 102) if np.isfinite(power[i])]
     assert found == expected
-    assert file.extreme("max", 'odd "name', 0, 1e9) == 999
+    assert file.max('odd "name', 0, 1e9) == 999
     assert file.integral('odd "name', TIME[3], TIME[4]) == pytest.approx(3.5 * (TIME[4] - TIME[3]))
 
 
@@ -105,7 +105,7 @@ def test_samples_and_names_that_need_quotes(series: Known) -> None:
     "ask",
     [
         lambda file: file.mean("powr", 0, 1),
-        lambda file: file.extreme("min", "time", 0, 1),
+        lambda file: file.min("time", 0, 1),
         lambda file: file.integral('power" FROM x --', 0, 1),
         lambda file: file.samples("", 0, 1),
     ],

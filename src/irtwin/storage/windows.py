@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,6 @@ from irtwin.storage.files import inside
 
 MOST_SAMPLES = 10_000
 MOST_DRAWN = 2_000  # of a curve: more than a screen is wide
-Extreme = Literal["min", "max"]
 Floats = npt.NDArray[np.float64]
 
 
@@ -53,12 +51,13 @@ class SeriesWindows:
         count = sum(map(len, pieces))
         return math.fsum(float(values.sum()) for values in pieces) / count if count else None
 
-    def extreme(self, which: Extreme, channel: str, start: float, end: float) -> float | None:
-        """Return the least or the greatest sample in a window."""
-        least_or_greatest = min if which == "min" else max
-        found = (getattr(values, which)() for _, values in self._pieces(channel, start, end) if len(values))
-        extreme = least_or_greatest(found, default=None)
-        return None if extreme is None else float(extreme)
+    def min(self, channel: str, start: float, end: float) -> float | None:
+        """Return the least sample in a window."""
+        return min((float(values.min()) for _, values in self._pieces(channel, start, end)), default=None)
+
+    def max(self, channel: str, start: float, end: float) -> float | None:
+        """Return the greatest sample in a window."""
+        return max((float(values.max()) for _, values in self._pieces(channel, start, end)), default=None)
 
     def integral(self, channel: str, start: float, end: float) -> float | None:
         """Return the integral over time by the trapezoidal rule, channel's unit times s, over what of it was recorded.
@@ -94,14 +93,12 @@ class SeriesWindows:
     def _before(self, channel: str, at: float) -> float:
         """Return the time of the last sample up to a moment, that moment where there is none."""
         groups = [number for number, (begin, _) in enumerate(self._groups) if begin <= at]
-        times = (time for time, _ in self._read(channel, reversed(groups), -np.inf, at) if len(time))
-        return next((float(time[-1]) for time in times), at)
+        return next((float(time[-1]) for time, _ in self._read(channel, reversed(groups), -np.inf, at)), at)
 
     def _after(self, channel: str, at: float) -> float:
         """Return the time of the first sample from a moment on, likewise."""
         groups = [number for number, (_, end) in enumerate(self._groups) if end >= at]
-        times = (time for time, _ in self._read(channel, groups, at, np.inf) if len(time))
-        return next((float(time[0]) for time in times), at)
+        return next((float(time[0]) for time, _ in self._read(channel, groups, at, np.inf)), at)
 
     def _samples(self, channel: str, start: float, end: float) -> tuple[Floats, Floats]:
         pieces = [(np.empty(0), np.empty(0)), *self._pieces(channel, start, end)]
@@ -114,7 +111,10 @@ class SeriesWindows:
         return self._read(channel, groups, start, end)
 
     def _read(self, channel: str, groups: Iterable[int], start: float, end: float) -> Iterator[tuple[Floats, Floats]]:
-        """Yield the samples of some row groups in a window. InputError for no such channel, or a damaged file."""
+        """Yield the samples of those row groups that have any in a window, as `_pieces`.
+
+        InputError for a channel that is not there, or a damaged file.
+        """
         if channel not in self.channels:
             raise InputError(f"there is no channel {channel!r}; there are {', '.join(self.channels)}")
         try:
@@ -123,7 +123,8 @@ class SeriesWindows:
                     table = file.read_row_group(group, ["time", channel], use_threads=False)
                     time, values = (pc.cast(table[name], pa.float64()).to_numpy() for name in ("time", channel))
                     kept = (time >= start) & (time <= end) & np.isfinite(values)
-                    yield time[kept], values[kept]
+                    if kept.any():
+                        yield time[kept], values[kept]
         except (pa.ArrowException, OSError) as error:
             raise self._damaged() from error
 
