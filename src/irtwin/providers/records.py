@@ -50,6 +50,15 @@ from irtwin.storage.schema import (
 from irtwin.twin.files import from_json
 from irtwin.twin.twin import Twin
 
+# Of a joint: its limits and data sheet, by the columns that hold them; a limit that is infinite has no value there.
+_LIMITS = {
+    "lower": "lower_limit_rad", "upper": "upper_limit_rad", "velocity": "speed_limit_rad_s",
+    "effort": "torque_limit_nm",
+}  # fmt: skip
+_SHEET = {
+    "acceleration": "acceleration_limit_rad_s2", "gear_ratio": "gear_ratio", "rotor_inertia": "rotor_inertia_kg_m2",
+    "torque_constant": "torque_constant_nm_a", "winding_resistance": "winding_resistance_ohm",
+}  # fmt: skip
 _HAVE_TERMS = {*log.ROBOT_KEYS} - {"torque_scale_uncertainty"}  # keys of [robot] that are no notes in the graph
 
 
@@ -220,25 +229,12 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
 def _with_sheets(robot: description.Robot, row: Robot, sheets: Mapping[str, Joint]) -> description.Robot:
     """Return a robot with the limits and data sheets that rows say."""
 
-    def limit(value: float | None, none: float = math.inf) -> float:
-        return none if value is None else value
+    def said(sheet: Joint) -> dict[str, Any]:
+        none = dict.fromkeys(_LIMITS, math.inf) | {"lower": -math.inf}
+        values = {name: getattr(sheet, column) for name, column in (_LIMITS | _SHEET).items()}
+        return {name: none.get(name) if value is None else value for name, value in values.items()}
 
-    joints = tuple(
-        replace(
-            joint,
-            lower=limit(sheet.lower_limit_rad, -math.inf),
-            upper=limit(sheet.upper_limit_rad),
-            velocity=limit(sheet.speed_limit_rad_s),
-            effort=limit(sheet.torque_limit_nm),
-            acceleration=sheet.acceleration_limit_rad_s2,
-            gear_ratio=sheet.gear_ratio,
-            rotor_inertia=sheet.rotor_inertia_kg_m2,
-            torque_constant=sheet.torque_constant_nm_a,
-            winding_resistance=sheet.winding_resistance_ohm,
-        )
-        for joint in robot.joints
-        for sheet in [sheets[joint.name]]
-    )
+    joints = tuple(replace(joint, **said(sheets[joint.name])) for joint in robot.joints)
     return replace(robot, joints=joints, manufacturer=row.manufacturer, type=row.type, weight=row.weight_kg)
 
 
@@ -361,24 +357,10 @@ def _movement(robot: description.Robot) -> str:
 
 
 def _joint_row(robot_id: str, place: int, joint: description.Joint) -> Joint:
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    return Joint(
-        robot_id=robot_id,
-        name=joint.name,
-        position=place,
-        kind=joint.kind,
-        lower_limit_rad=finite(joint.lower),
-        upper_limit_rad=finite(joint.upper),
-        speed_limit_rad_s=finite(joint.velocity),
-        acceleration_limit_rad_s2=joint.acceleration,
-        torque_limit_nm=finite(joint.effort),
-        gear_ratio=joint.gear_ratio,
-        rotor_inertia_kg_m2=joint.rotor_inertia,
-        torque_constant_nm_a=joint.torque_constant,
-        winding_resistance_ohm=joint.winding_resistance,
-    )
+    limits = {column: getattr(joint, name) for name, column in _LIMITS.items()}
+    finite = {column: limit for column, limit in limits.items() if math.isfinite(limit)}
+    sheet = {column: getattr(joint, name) for name, column in _SHEET.items()}
+    return Joint(robot_id=robot_id, name=joint.name, position=place, kind=joint.kind, **finite, **sheet)
 
 
 def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = None) -> Run:

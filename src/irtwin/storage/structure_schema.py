@@ -26,7 +26,20 @@ class Link(Base):
     inertia_yz_kg_m2: Mapped[float | None]
 
 
-class LinkJoint(Base):
+class _Placed(Base):
+    """What lies in a frame: its own, as the frame sees it."""
+
+    __abstract__ = True
+
+    origin_x_m: Mapped[float]
+    origin_y_m: Mapped[float]
+    origin_z_m: Mapped[float]
+    origin_roll_rad: Mapped[float]
+    origin_pitch_rad: Mapped[float]
+    origin_yaw_rad: Mapped[float]
+
+
+class LinkJoint(_Placed):
     """How a joint, moving or fixed, holds one link to another: its frame at zero in the parent's, and its axis."""
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
@@ -34,18 +47,12 @@ class LinkJoint(Base):
     kind: Mapped[str]  # "fixed" for one that mimics another, too
     parent_link: Mapped[str]
     child_link: Mapped[str]
-    origin_x_m: Mapped[float]
-    origin_y_m: Mapped[float]
-    origin_z_m: Mapped[float]
-    origin_roll_rad: Mapped[float]
-    origin_pitch_rad: Mapped[float]
-    origin_yaw_rad: Mapped[float]
     axis_x: Mapped[float | None]  # of length one, in the joint's own frame; none of a fixed joint
     axis_y: Mapped[float | None]
     axis_z: Mapped[float | None]
 
 
-class LinkShape(Base):
+class LinkShape(_Placed):
     """A shape of a link: sizes by its kind."""
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
@@ -65,12 +72,6 @@ class LinkShape(Base):
     scale_y: Mapped[float | None]
     scale_z: Mapped[float | None]
     colour: Mapped[str | None]  # red, green, blue and opacity, 0 to 1
-    origin_x_m: Mapped[float]
-    origin_y_m: Mapped[float]
-    origin_z_m: Mapped[float]
-    origin_roll_rad: Mapped[float]
-    origin_pitch_rad: Mapped[float]
-    origin_yaw_rad: Mapped[float]
 
 
 class DHTable(Base):
