@@ -198,24 +198,22 @@ def _run_energy(
     start = int(np.argmax(held_out(role, motion)))
     judged = whole if start == 0 else validate(twin, [motion.part(start, len(motion.time))])[0]
     power = twin.power(motion) if motion.power is None else motion.power
-    at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
-    standby = sum(share.energy for share in shares if share.effect in at_rest)
-    electrical = any(effect.electrical_loss for effect in twin.stack.effects)
+    standby = sum(share.energy for share in shares if share.effect in twin.at_rest)
     energy = whole.modelled_energy if whole.measured_energy is None else whole.measured_energy
     return schema.RunEnergy(
         run_id=run.run_id,
         twin_id=twin_id,
         part=role.part,
         energy_consumption_j=None if run.role == SIMULATED else energy,
-        energy_from="measured" if motion.power is not None else "modelled" if electrical else "mechanical",
+        energy_from=twin.energy_from if motion.power is None else "measured",
         run_power_w=float(np.mean(power)),
         peak_power_w=float(np.max(power)),
         measured_energy_j=whole.measured_energy,
         modelled_energy_j=whole.modelled_energy,
         energy_error_percent=None if role.part == APART else judged.energy_error,
         power_rmse_w=None if role.part == APART else judged.power_rmse,
-        standby_energy_j=standby if at_rest else None,
-        standby_share=standby / whole.modelled_energy if at_rest and whole.modelled_energy > 0 else None,
+        standby_energy_j=standby if twin.at_rest else None,
+        standby_share=standby / whole.modelled_energy if twin.at_rest and whole.modelled_energy > 0 else None,
         returned_energy_j=returned_energy(twin, motion),
     )
 

@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import live_schema, schema
 from irtwin.storage.database import Workspace
-from irtwin.twin.gap_watch import ROBOT, GapWatch, PlaceState, Windows, band
+from irtwin.twin.gap_watch import ROBOT, GapWatch, Windows, band
 from irtwin.twin.so_far import EnergySoFar, WatchedStretch
 from irtwin.twin.twin import Twin
 
@@ -119,13 +118,12 @@ class LiveEnergy:
         }
 
     def _run_energy(self) -> Values | None:
-        so_far, known = self.so_far, self.known
-        measured = so_far.measured
+        so_far, known, measured = self.so_far, self.known, self.so_far.measured
         if not so_far.seconds or (known is None and measured is None):
             return None
         row: Values = {}
         if known is not None:
-            at_rest = self._drawn_at_rest
+            at_rest = known.twin.at_rest
             standby = sum(value for (effect, _), value in so_far.ledger.items() if effect in at_rest)
             row = {
                 "twin_id": known.twin_id,
@@ -139,22 +137,11 @@ class LiveEnergy:
         taken = so_far.modelled if measured is None else measured
         return row | {
             "energy_consumption_j": taken if self._is_consumption else None,
-            "energy_from": "measured" if measured is not None else self._modelled_as,
+            "energy_from": known.twin.energy_from if known is not None and measured is None else "measured",
             "run_power_w": taken / so_far.seconds,
             "peak_power_w": so_far.peak_power,
             "measured_energy_j": measured,
         }
-
-    @cached_property
-    def _drawn_at_rest(self) -> frozenset[str]:
-        assert self.known is not None
-        return frozenset(effect.id for effect in self.known.twin.stack.effects if effect.drawn_at_rest)
-
-    @cached_property
-    def _modelled_as(self) -> str:
-        assert self.known is not None
-        electrical = any(effect.electrical_loss for effect in self.known.twin.stack.effects)
-        return "modelled" if electrical else "mechanical"
 
     def _gap_states(self) -> Iterator[Values]:
         for place, now in self.watch.places.items():
@@ -168,18 +155,15 @@ class LiveEnergy:
 
     def _excursions(self) -> Iterator[Values]:
         for place, now in self.watch.places.items():
-            yield from self._of_place(place, now)
-
-    def _of_place(self, place: str, now: PlaceState) -> Iterator[Values]:
-        for number, one in enumerate(now.excursions, start=1):
-            yield self._place(place) | {
-                "number": number,
-                "began": _moment(one.began),
-                "ended": None if one.ended is None else _moment(one.ended),
-                "lasted_s": one.until - one.began,
-                "peak_residual": one.peak_residual,
-                "peak_ratio": one.peak_ratio,
-            }
+            for number, one in enumerate(now.excursions, start=1):
+                yield self._place(place) | {
+                    "number": number,
+                    "began": _moment(one.began),
+                    "ended": None if one.ended is None else _moment(one.ended),
+                    "lasted_s": one.until - one.began,
+                    "peak_residual": one.peak_residual,
+                    "peak_ratio": one.peak_ratio,
+                }
 
     def _place(self, place: str) -> Values:
         assert self.known is not None

@@ -78,9 +78,8 @@ def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry])
     slopes = _slopes(twin, motion, ledger)
     covariance = np.asarray(slopes @ twin.covariance @ slopes.T)
     if twin.remainder:  # what lasts of it looks like what is drawn at rest
-        at_rest = {effect.id for effect in twin.stack.effects if effect.drawn_at_rest}
         lasting = twin.remainder.energy(float(motion.time[-1] - motion.time[0]))
-        covariance += np.diag([lasting**2 if entry.effect in at_rest else 0.0 for entry in ledger])
+        covariance += np.diag([lasting**2 if entry.effect in twin.at_rest else 0.0 for entry in ledger])
     return covariance
 
 

@@ -100,6 +100,16 @@ class Twin:
         """The effects' regressors."""
         return Stack(self.robot, self.effects)
 
+    @cached_property
+    def at_rest(self) -> frozenset[str]:
+        """The ids of the effects whose power is drawn at rest, too."""
+        return frozenset(effect.id for effect in self.stack.effects if effect.drawn_at_rest)
+
+    @property
+    def energy_from(self) -> str:
+        """Of what its energy is told: "modelled", or "mechanical" where no effect is an electrical loss."""
+        return "modelled" if any(effect.electrical_loss for effect in self.stack.effects) else "mechanical"
+
     @property
     def standing(self) -> tuple[Effect, ...]:
         """The effects that act in whatever run, in their shapes."""
