@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from pyoxigraph import BlankNode, Literal, NamedNode
+from pyoxigraph import Literal, NamedNode
 
 from irtwin.knowledge.mapping.identifiers import Identifier
+from irtwin.knowledge.store.by_subject import Node
 
 RR = "http://www.w3.org/ns/r2rml#"
 
-Node = NamedNode | BlankNode | Literal
 Template = tuple[str | Identifier, ...]  # fixed text and columns
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
-from pyoxigraph import BlankNode, Literal, NamedNode, RdfFormat, parse
+from pyoxigraph import BlankNode, Literal, NamedNode, RdfFormat, Triple, parse
 
 from irtwin.errors import InputError
 from irtwin.knowledge.mapping.document import (
@@ -18,13 +18,13 @@ from irtwin.knowledge.mapping.document import (
     Join,
     LogicalTable,
     MappingDocument,
-    Node,
     PredicateObjectMap,
     TermMap,
     TermType,
     TriplesMap,
 )
 from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
+from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.store.rdf_input import read_rdf, refuse
 
 _RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
@@ -44,39 +44,24 @@ def read_document(path: Path) -> MappingDocument:
     content = read_rdf(path, RdfFormat.TURTLE)
     try:
         parser = parse(content, RdfFormat.TURTLE, base_iri=file_iri)
-        graph = _Graph((quad.subject, quad.predicate, quad.object) for quad in parser)
+        graph = _Graph(quad.triple for quad in parser)
     except (SyntaxError, MemoryError) as error:
         refuse(path, error)
     declared = None if parser.base_iri == file_iri else parser.base_iri
     return MappingDocument(declared, _Reader(path, graph).triples_maps())
 
 
-class _Graph:
-    """The triples of a document, by subject and property.
+class _Graph(BySubject):
+    """A document, where a shortcut such as rr:object stands beside the rr:objectMap that it is short for."""
 
-    A shortcut such as rr:object stands beside the rr:objectMap with the rr:constant that it is short for.
-    """
-
-    def __init__(self, triples: Iterable[tuple[Node, NamedNode, Node]]) -> None:
-        self.properties: dict[Node, dict[str, list[Node]]] = {}
-        for subject, predicate, value in triples:
-            values = self.properties.setdefault(subject, {}).setdefault(predicate.value, [])
-            if value not in values:
-                values.append(value)
-        for properties in list(self.properties.values()):
+    def __init__(self, triples: Iterable[Triple]) -> None:
+        super().__init__(triples, RR)
+        for properties in list(self._objects.values()):
             for name in _SHORTCUTS & properties.keys():
                 maps: list[Node] = [BlankNode() for _ in properties[name]]
                 for node, value in zip(maps, properties[name], strict=True):
-                    self.properties[node] = {f"{RR}constant": [value]}
+                    self._objects[node] = {f"{RR}constant": [value]}
                 properties[f"{name}Map"] = maps + properties.get(f"{name}Map", [])
-
-    def objects(self, node: Node, name: str) -> list[Node]:
-        """Return the values of a node's property rr:NAME, as they come in the document."""
-        return self.properties.get(node, {}).get(RR + name, [])
-
-    def names(self, node: Node) -> list[str]:
-        """Return the IRIs of a node's properties."""
-        return sorted(self.properties.get(node, {}))
 
 
 class _Reader:
@@ -88,11 +73,11 @@ class _Reader:
 
     def triples_maps(self) -> dict[Node, TriplesMap]:
         nodes: dict[Node, None] = {}  # in the document's order, so that each reading gives the same statements
-        for node, properties in self.graph.properties.items():
-            typed = NamedNode(f"{RR}TriplesMap") in properties.get(_RDF_TYPE, [])
-            if typed or any(RR + name in properties for name in ("logicalTable", "subjectMap")):
+        for node in self.graph.all():
+            typed = NamedNode(f"{RR}TriplesMap") in self.graph.values(node, _RDF_TYPE)
+            if typed or self.graph.values(node, "logicalTable") or self.graph.values(node, "subjectMap"):
                 nodes[node] = None
-            nodes |= dict.fromkeys(self.graph.objects(node, "parentTriplesMap"))
+            nodes |= dict.fromkeys(self.graph.values(node, "parentTriplesMap"))
         if not nodes:
             raise InputError(f"{self.path}: has no rr:TriplesMap; name an R2RML document")
         return {node: self.triples_map(node) for node in nodes}
@@ -108,7 +93,7 @@ class _Reader:
             classes=self.classes(subject_node, where),
             graphs=self.graphs(subject_node, where),
             properties=tuple(
-                self.predicate_object_map(item, where) for item in self.graph.objects(node, "predicateObjectMap")
+                self.predicate_object_map(item, where) for item in self.graph.values(node, "predicateObjectMap")
             ),
         )
 
@@ -116,8 +101,8 @@ class _Reader:
         table = self.one(node, "logicalTable", where)
         where = f"{where}, logical table"
         self.only(table, where, "tableName sqlQuery sqlVersion")
-        for version in self.graph.objects(table, "sqlVersion"):
-            if version.value.removeprefix(RR) not in _SQL_VERSIONS:
+        for version in self.graph.values(table, "sqlVersion"):
+            if getattr(version, "value", "").removeprefix(RR) not in _SQL_VERSIONS:
                 self.fault(where, f"{_label(version)} is no SQL version identifier; take rr:SQL2008 or leave it out")
         name, query = self.text(table, "tableName", where), self.text(table, "sqlQuery", where)
         if (name is None) is (query is None):
@@ -128,14 +113,14 @@ class _Reader:
 
     def subject(self, node: Node, where: str) -> tuple[Node, TermMap]:
         """Return the subject map's node and the map."""
-        maps = self.graph.objects(node, "subjectMap")
+        maps = self.graph.values(node, "subjectMap")
         if len(maps) != 1:
             self.fault(where, f"has {len(maps)} subject maps; give one rr:subjectMap or rr:subject")
         allowed = (TermType.IRI, TermType.BLANK_NODE)
         return maps[0], self.term_map(maps[0], f"{where}, subject map", allowed, extra="class graph graphMap")
 
     def classes(self, node: Node, where: str) -> tuple[NamedNode, ...]:
-        return tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.objects(node, "class"))
+        return tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.values(node, "class"))
 
     def graphs(self, node: Node, where: str) -> tuple[TermMap, ...]:
         return self.iri_maps(node, "graph", f"{where}, graph map")
@@ -143,9 +128,9 @@ class _Reader:
     def predicate_object_map(self, node: Node, where: str) -> PredicateObjectMap:
         allowed = "predicate predicateMap object objectMap graph graphMap"
         self.only(node, f"{where}, predicate-object map", allowed)
-        objects = self.graph.objects(node, "objectMap")
-        name = next(map(_label, self.graph.objects(node, "predicate")), _label(node))
-        if not self.graph.objects(node, "predicateMap") or not objects:
+        objects = self.graph.values(node, "objectMap")
+        name = next(map(_label, self.graph.values(node, "predicate")), _label(node))
+        if not self.graph.values(node, "predicateMap") or not objects:
             self.fault(where, f"predicate-object map {name} needs a predicate and an object")
         return PredicateObjectMap(
             predicates=self.iri_maps(node, "predicate", f"{where}, predicate map of {name}"),
@@ -154,17 +139,17 @@ class _Reader:
         )
 
     def object_map(self, node: Node, where: str) -> TermMap | Join:
-        if self.graph.objects(node, "parentTriplesMap"):
+        if self.graph.values(node, "parentTriplesMap"):
             return self.join(node, where)
         return self.term_map(node, where, tuple(TermType), extra="datatype language")
 
     def iri_maps(self, node: Node, name: str, where: str) -> tuple[TermMap, ...]:
-        return tuple(self.term_map(item, where, (TermType.IRI,)) for item in self.graph.objects(node, f"{name}Map"))
+        return tuple(self.term_map(item, where, (TermType.IRI,)) for item in self.graph.values(node, f"{name}Map"))
 
     def join(self, node: Node, where: str) -> Join:
         self.only(node, where, "parentTriplesMap joinCondition")
         conditions = []
-        for item in self.graph.objects(node, "joinCondition"):
+        for item in self.graph.values(node, "joinCondition"):
             self.only(item, where, "child parent")
             sides = [self.text(item, side, where) for side in ("child", "parent")]
             if sides[0] is None or sides[1] is None:
@@ -176,7 +161,7 @@ class _Reader:
 
     def term_map(self, node: Node, where: str, allowed: tuple[TermType, ...], extra: str = "") -> TermMap:
         self.only(node, where, f"constant column template termType inverseExpression {extra}")
-        constants = self.graph.objects(node, "constant")
+        constants = self.graph.values(node, "constant")
         column, template = self.text(node, "column", where), self.text(node, "template", where)
         if len(constants) + (column is not None) + (template is not None) != 1:
             self.fault(where, "give just one of rr:constant, rr:column and rr:template")
@@ -226,7 +211,7 @@ class _Reader:
 
     def only(self, node: Node, where: str, allowed: str) -> None:
         """Refuse R2RML properties that do not belong here: misspelt ones would be silently ignored."""
-        for predicate in self.graph.names(node):
+        for predicate in sorted(name for name, _ in self.graph.said_of(node)):
             if predicate.startswith(RR) and predicate.removeprefix(RR) not in allowed.split():
                 name = _label(NamedNode(predicate))
                 self.fault(where, f"{name} does not belong here; allowed are {', '.join(allowed.split())}")
@@ -238,7 +223,7 @@ class _Reader:
         return value
 
     def optional(self, node: Node, name: str, where: str) -> Node | None:
-        values = self.graph.objects(node, name)
+        values = self.graph.values(node, name)
         if len(values) > 1:
             self.fault(where, f"{len(values)} values of rr:{name}; give one")
         return values[0] if values else None
@@ -266,7 +251,7 @@ class _Reader:
 
 
 def _label(node: Node) -> str:
-    if isinstance(node, BlankNode):
+    if isinstance(node, BlankNode | Triple):
         return "[...]"
     if isinstance(node, Literal):
         return repr(node.value)

@@ -49,12 +49,13 @@ def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
     if term_map.constant is not None:
         constant = term_map.constant
         return lambda row: constant
-    text = _text(term_map, columns, base_iri)
-    if term_map.term_type is TermType.LITERAL:
-        return _literal_maker(term_map, text)
-    if term_map.term_type is TermType.BLANK_NODE:
-        return _blank_node_maker(text)
-    return _iri_maker(term_map, text, base_iri)
+    text, term = _text(term_map, columns, base_iri), _of_text(term_map, base_iri)
+
+    def make(row: Row) -> Term | None:
+        lexical = text(row)
+        return None if lexical is None else term(*lexical)
+
+    return make
 
 
 def _text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
@@ -101,17 +102,29 @@ def _percent_encoded(match: re.Match[str]) -> str:
     return quote(match[0], safe="")
 
 
-def _iri_maker(term_map: TermMap, text: _Text, base_iri: str) -> TermMaker:
-    def make(row: Row) -> NamedNode | None:
-        lexical = text(row)
-        if lexical is None:
-            return None
-        try:
-            return NamedNode(lexical[0])
-        except ValueError:  # not absolute: below the base, or no IRI at all
-            return _below(base_iri, lexical[0], term_map)
+def _of_text(term_map: TermMap, base_iri: str) -> Callable[[str, NamedNode], Term]:
+    """Return the function that makes the map's term of a text and its natural datatype."""
+    language, datatype = term_map.language, term_map.datatype
 
-    return make
+    def iri(text: str, _: NamedNode) -> NamedNode:
+        try:
+            return NamedNode(text)
+        except ValueError:  # not absolute: below the base, or no IRI at all
+            return _below(base_iri, text, term_map)
+
+    def typed(text: str, natural: NamedNode) -> Literal:
+        assert datatype is not None
+        if natural != datatype and not is_lexical(text, datatype):
+            raise InputError(f"{term_map.where}: the value {text!r} is no {datatype.value}")
+        return Literal(text, datatype=datatype)
+
+    if term_map.term_type is TermType.IRI:
+        return iri
+    if term_map.term_type is TermType.BLANK_NODE:
+        return lambda text, _: BlankNode(f"b{text.encode().hex()}")
+    if language:
+        return lambda text, _: Literal(text, language=language)
+    return typed if datatype else lambda text, natural: Literal(text, datatype=natural)
 
 
 def _below(base_iri: str, value: str, term_map: TermMap) -> NamedNode:
@@ -121,34 +134,3 @@ def _below(base_iri: str, value: str, term_map: TermMap) -> NamedNode:
         raise InputError(
             f"{term_map.where}: the value {value!r} makes no valid IRI; use a template, which encodes it"
         ) from None
-
-
-def _blank_node_maker(text: _Text) -> TermMaker:
-    def make(row: Row) -> BlankNode | None:
-        lexical = text(row)
-        return None if lexical is None else BlankNode(f"b{lexical[0].encode().hex()}")
-
-    return make
-
-
-def _literal_maker(term_map: TermMap, text: _Text) -> TermMaker:
-    language, datatype = term_map.language, term_map.datatype
-
-    def natural(row: Row) -> Literal | None:
-        lexical = text(row)
-        return None if lexical is None else Literal(lexical[0], datatype=lexical[1])
-
-    def tagged(row: Row) -> Literal | None:
-        lexical = text(row)
-        return None if lexical is None else Literal(lexical[0], language=language)
-
-    def typed(row: Row) -> Literal | None:
-        lexical = text(row)
-        if lexical is None:
-            return None
-        assert datatype is not None
-        if lexical[1] != datatype and not is_lexical(lexical[0], datatype):
-            raise InputError(f"{term_map.where}: the value {lexical[0]!r} is no {datatype.value}")
-        return Literal(lexical[0], datatype=datatype)
-
-    return tagged if language else typed if datatype else natural

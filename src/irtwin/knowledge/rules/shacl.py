@@ -7,7 +7,8 @@ from decimal import Decimal, InvalidOperation
 from pyoxigraph import BlankNode, Literal, NamedNode
 
 from irtwin.knowledge.rules.rule import SHACL, Rule, start_of_body
-from irtwin.knowledge.shacl.shapes import Node, Shapes
+from irtwin.knowledge.shacl.shapes import Shapes
+from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import RDFS, SH, shorten
 
 _TARGETS = {

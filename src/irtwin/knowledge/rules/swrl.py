@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from typing import Any
 
-from pyoxigraph import Literal, NamedNode, Triple
+from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.rules.rule import SWRL, Rule
+from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, XSD, shorten
 
 NAMESPACE = "http://www.w3.org/2003/11/swrl#"
@@ -25,35 +26,30 @@ _COMPARED = {
 _RECKONED = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}  # the first argument is the result
 _SAME = {"SameIndividualAtom": "=", "DifferentIndividualsAtom": "!="}
 
-_Node = dict[str, Any]
-
 
 def rules_of(triples: Iterable[Triple], source: str) -> Iterator[Rule]:
     """Yield the SWRL rules among triples; `source` names them in messages. InputError for one that is not understood.
 
     Class atoms name a class, or a restriction to values; built-ins compare, add, subtract, multiply or divide.
     """
-    nodes: dict[Any, _Node] = {}
-    for triple in triples:
-        nodes.setdefault(triple.subject, {})[triple.predicate.value] = triple.object
-    for node, of in nodes.items():
-        if of.get(RDF + "type") == NamedNode(NAMESPACE + "Imp"):
-            label, comment = (getattr(of.get(RDFS + name), "value", "") for name in ("label", "comment"))
-            if not label:
-                raise InputError(f"{source}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
-            construct = _Imp(nodes, f"{source}: the rule {label!r}").construct(of)
-            name = node.value if isinstance(node, NamedNode) else label
-            yield Rule(name, label, comment, (Decimal(0), Decimal(0)), construct, SWRL)
+    said = BySubject(triples, NAMESPACE)
+    for node in said.having(RDF + "type", NAMESPACE + "Imp"):
+        label, comment = said.text(node, RDFS + "label"), said.text(node, RDFS + "comment")
+        if not label:
+            raise InputError(f"{source}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
+        construct = _Imp(said, f"{source}: the rule {label!r}").construct(node)
+        name = node.value if isinstance(node, NamedNode) else label
+        yield Rule(name, label, comment, (Decimal(0), Decimal(0)), construct, SWRL)
 
 
 class _Imp:
     """One rule in the making: the triples of its file, and what its variables are called."""
 
-    def __init__(self, said: dict[Any, _Node], where: str):
+    def __init__(self, said: BySubject, where: str):
         self._said, self._where = said, where
         self._names: dict[str, str] = {}
 
-    def construct(self, rule: _Node) -> str:
+    def construct(self, rule: Node) -> str:
         body, head = (self._atoms(rule, part) for part in ("body", "head"))
         self._name_focus(body)
         where = [line for atom in body for line in self._lines(atom)]
@@ -62,49 +58,40 @@ class _Imp:
             raise self._fault("concludes more than classes and properties; do that in its swrl:body")
         return f"CONSTRUCT {{ {' '.join(made)} }} WHERE {{ {' '.join(sorted(where, key=_turn))} }}"
 
-    def _atoms(self, rule: _Node, part: str) -> list[_Node]:
-        found = [self._said.get(atom) for atom in self._items(rule.get(NAMESPACE + part))]
-        atoms = [atom for atom in found if atom is not None]
-        if not atoms or len(atoms) < len(found):
+    def _atoms(self, rule: Node, part: str) -> list[Node]:
+        atoms = self._said.items(self._said.value(rule, part))
+        if not atoms or not all(map(self._said.said_of, atoms)):
             raise self._fault(f"has no list of atoms for its swrl:{part}")
         return atoms
 
-    def _items(self, cell: Any) -> list[Any]:
-        items, seen = [], set[Any]()
-        while cell in self._said and cell not in seen:
-            seen.add(cell)
-            items.append(self._said[cell].get(RDF + "first"))
-            cell = self._said[cell].get(RDF + "rest")
-        return items if cell == NamedNode(RDF + "nil") else []
-
-    def _name_focus(self, body: list[_Node]) -> None:
+    def _name_focus(self, body: list[Node]) -> None:
         """Call the individual that the rule begins with `$this`, as SHACL does."""
-        firsts = (atom.get(NAMESPACE + "argument1") for atom in body)
+        firsts = (self._said.value(atom, "argument1") for atom in body)
         focus = next((it for it in firsts if self._is_variable(it)), None)
-        if focus is not None:
+        if isinstance(focus, NamedNode | BlankNode):
             self._names[focus.value] = "this"
 
-    def _lines(self, atom: _Node) -> list[str]:
-        kind = getattr(atom.get(RDF + "type"), "value", "").removeprefix(NAMESPACE)
-        first, second = (atom.get(NAMESPACE + name) for name in ("argument1", "argument2"))
+    def _lines(self, atom: Node) -> list[str]:
+        kind = getattr(self._said.value(atom, RDF + "type"), "value", "").removeprefix(NAMESPACE)
+        first, second = (self._said.value(atom, name) for name in ("argument1", "argument2"))
         if kind == "BuiltinAtom":
             return [self._built_in(atom)]
         if kind == "ClassAtom" and first is not None:
-            return self._class(self._term(first), atom.get(NAMESPACE + "classPredicate"))
+            return self._class(self._term(first), self._said.value(atom, "classPredicate"))
         if kind == "DataRangeAtom" and first is not None:
-            return self._range(self._term(first), atom.get(NAMESPACE + "dataRange"))
+            return self._range(self._term(first), self._said.value(atom, "dataRange"))
         if first is None or second is None:
             raise self._fault(f"has a swrl:{kind or 'Atom'} that lacks an argument, or is none of SWRL's")
         if kind in _SAME:
             return [f"FILTER({self._term(first)} {_SAME[kind]} {self._term(second)})"]
-        return [f"{self._term(first)} {atom.get(NAMESPACE + 'propertyPredicate')} {self._term(second)} ."]
+        return [f"{self._term(first)} {self._said.value(atom, 'propertyPredicate')} {self._term(second)} ."]
 
     def _class(self, subject: str, kind: Any) -> list[str]:
         """Return an atom of a class, or of a restriction to some value."""
         if isinstance(kind, NamedNode):
             return [f"{subject} <{RDF}type> {kind} ."]
-        of = self._said.get(kind, {})
-        of_property, value, some = (of.get(OWL + name) for name in ("onProperty", "hasValue", "someValuesFrom"))
+        names = ("onProperty", "hasValue", "someValuesFrom")
+        of_property, value, some = (self._said.value(kind, OWL + name) for name in names)
         if isinstance(of_property, NamedNode) and value is not None:
             return [f"{subject} {of_property} {self._term(value)} ."]
         if isinstance(of_property, NamedNode) and some is not None:
@@ -119,18 +106,17 @@ class _Imp:
             return [f"FILTER(DATATYPE({value}) = {kind})"]
         facets = [
             (name.removeprefix(XSD), limit)
-            for facet in self._items(self._said.get(kind, {}).get(OWL + "withRestrictions"))
-            for name, limit in self._said.get(facet, {}).items()
+            for facet in self._said.items(self._said.value(kind, OWL + "withRestrictions"))
+            for name, (limit, *_) in self._said.said_of(facet)
         ]
         if not facets or any(name not in FACETS for name, _ in facets):
             raise self._fault(f"has a data range that is none of {', '.join(FACETS)}; write it as a built-in")
         return [f"FILTER({value} {FACETS[name]} {self._term(limit)})" for name, limit in facets]
 
-    def _built_in(self, atom: _Node) -> str:
-        built_in = atom.get(NAMESPACE + "builtin")
-        iri = getattr(built_in, "value", "")
+    def _built_in(self, atom: Node) -> str:
+        iri = getattr(self._said.value(atom, "builtin"), "value", "")
         name = iri.removeprefix(BUILT_INS)
-        arguments = [self._term(each) for each in self._items(atom.get(NAMESPACE + "arguments"))]
+        arguments = [self._term(each) for each in self._said.items(self._said.value(atom, "arguments"))]
         if name in _COMPARED and len(arguments) == 2:
             return f"FILTER({arguments[0]} {_COMPARED[name]} {arguments[1]})"
         if name in _RECKONED and len(arguments) > 2:
@@ -152,7 +138,7 @@ class _Imp:
     def _is_variable(self, term: Any) -> bool:
         if isinstance(term, Literal) or term is None:
             return False
-        return bool(self._said.get(term, {}).get(RDF + "type") == NamedNode(NAMESPACE + "Variable"))
+        return self._said.value(term, RDF + "type") == NamedNode(NAMESPACE + "Variable")
 
     def _fault(self, what: str) -> InputError:
         return InputError(f"{self._where} {what}")

@@ -15,6 +15,7 @@ from typing import TypeGuard
 from pyoxigraph import Literal, NamedNode, RdfFormat, Triple, parse
 
 from irtwin.knowledge.shacl.shapes import Shapes
+from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
 
 _OWN = "https://w3id.org/irtwin/shapes/"
@@ -86,7 +87,7 @@ class _Ontology:
     def _properties(self, end: str) -> list[str]:
         return sorted(one.value for one in self._said.having(RDFS + end) if self._is_own(one))
 
-    def _is_own(self, term: object) -> TypeGuard[NamedNode]:
+    def _is_own(self, term: Node) -> TypeGuard[NamedNode]:
         """Whether a term has a name, and is not of a vocabulary that the ontology has no module of."""
         home = self._said.value(term, RDFS + "isDefinedBy")
         named = isinstance(term, NamedNode)
@@ -112,9 +113,9 @@ class _Ontology:
         subjects = self._classes_of(name, "domain")
         return bool(subjects) and all(asked & self._above(NamedNode(one)) for one in subjects)
 
-    def _above(self, one: object) -> set[object]:
+    def _above(self, one: Node) -> set[Node]:
         """Return a class with those that it is below of."""
-        above, todo = set[object](), [one]
+        above, todo = set[Node](), [one]
         while todo:
             each = todo.pop()
             if each not in above:

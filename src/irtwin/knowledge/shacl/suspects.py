@@ -12,7 +12,8 @@ from typing import cast
 
 from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 
-from irtwin.knowledge.shacl.shapes import Node, Shapes
+from irtwin.knowledge.shacl.shapes import Shapes
+from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import PREFIXES, RDF, RDFS, SH, XSD
 
 _KIND = "?_kind"
@@ -107,7 +108,7 @@ class _Writer:
             return " && ".join(self._conditions(value, node)) or "true"
         if name == "or":
             either = [" && ".join(self._conditions(one, node)) or "true" for one in self._shapes.items(value)]
-            return f"({' || '.join(f'COALESCE({one}, false)' for one in either)})"
+            return f"({' || '.join(f'COALESCE({one}, false)' for one in either) or 'false'})"
         if name == "class":
             kind = self._name()
             return f"EXISTS {{ {node} a {kind} {self._of_kind(kind, value)} }}"
