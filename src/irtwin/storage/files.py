@@ -50,15 +50,20 @@ def temporary_beside(folder: Path) -> Iterator[Path]:
 @contextmanager
 def working_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """Give a new folder, gone at the end; those of the same prefix that killed processes left go too."""
-    for left in parent.glob(f"{prefix}*"):
-        with suppress(OSError), _locked(left):  # else it is in use
-            shutil.rmtree(left)
+    remove_left_behind(parent, prefix)
     with (
         told_when_full(parent),
-        tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as name,
+        tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name,
         _locked(Path(name)),
     ):
         yield Path(name)
+
+
+def remove_left_behind(parent: Path, prefix: str) -> None:
+    """Remove the working folders of a prefix that killed processes left."""
+    for left in parent.glob(f"{prefix}*"):
+        with suppress(OSError), _locked(left):  # else it is in use
+            shutil.rmtree(left)
 
 
 @contextmanager

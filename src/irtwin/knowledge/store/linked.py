@@ -5,10 +5,11 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+
+from irtwin.storage import files
 
 _PREFIX = ".view-"
 _PUBLISHED = f"{_PREFIX}of-all-"
@@ -18,24 +19,19 @@ _PUBLISHED = f"{_PREFIX}of-all-"
 def linked(folder: Path, ignored: tuple[str, ...], copied: tuple[str, ...] = ()) -> Iterator[Path]:
     """Give a folder beside another, with links to its files but those whose names start with one of `ignored`.
 
-    Files whose names match one of the patterns `copied` are copied, as they will be written on. The folder is locked,
-    so that nobody takes it for left behind. FileNotFoundError where a file goes meanwhile, OSError where links cannot
-    be made there.
+    Files whose names match one of the patterns `copied` are copied, as they will be written on. Those that killed
+    processes left go. FileNotFoundError where a file goes meanwhile, OSError or WorkspaceFault where links cannot be
+    made there.
     """
-    with tempfile.TemporaryDirectory(prefix=_PREFIX, dir=folder.parent, ignore_cleanup_errors=True) as name:
-        lock = os.open(name, os.O_RDONLY)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            for file in folder.iterdir():
-                if file.name.startswith(ignored):
-                    continue
-                if any(map(file.match, copied)):
-                    shutil.copyfile(file, Path(name) / file.name)
-                else:
-                    os.link(file, Path(name) / file.name)
-            yield Path(name)
-        finally:
-            os.close(lock)
+    with files.working_folder(folder.parent, _PREFIX) as view:
+        for file in folder.iterdir():
+            if file.name.startswith(ignored):
+                continue
+            if any(map(file.match, copied)):
+                shutil.copyfile(file, view / file.name)
+            else:
+                os.link(file, view / file.name)
+        yield view
 
 
 @contextmanager
@@ -70,11 +66,4 @@ def _is_locked(view: Path) -> bool:
 
 def remove_left_behind(folder: Path) -> None:
     """Remove the links that killed processes left beside a folder."""
-    for left in folder.parent.glob(f"{_PREFIX}*"):
-        with suppress(OSError):  # it is in use, or another process removes it just now
-            lock = os.open(left, os.O_RDONLY)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(left)
-            finally:
-                os.close(lock)
+    files.remove_left_behind(folder.parent, _PREFIX)

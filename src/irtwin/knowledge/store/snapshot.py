@@ -17,10 +17,10 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Self, TypeVar
 
-from irtwin.errors import InputError
+from irtwin.errors import InputError, WorkspaceFault
 from irtwin.knowledge.store.damage import check_files, damaged
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.linked import found, linked, published, remove_left_behind
+from irtwin.knowledge.store.linked import found, linked, published
 
 OLDEST = 0.5  # s; a view is not older than this when it answers
 _PATIENCE = 5.0  # s after which files that nobody changed, and that cannot be read, are damaged
@@ -59,7 +59,6 @@ class Snapshot:
     def __init__(self, folder: Path):
         self._folder = folder
         self._view = ExitStack()
-        remove_left_behind(folder)
         check_files(folder)
         self._open()
 
@@ -103,7 +102,7 @@ def _links(source: Path, held: ExitStack, copied: tuple[str, ...] = ()) -> Path 
         return held.enter_context(linked(source, _NO_DATA, copied))
     except FileNotFoundError:
         raise
-    except OSError:  # read-only, full, another user's, or without links
+    except (OSError, WorkspaceFault):  # read-only, full, another user's, or without links
         return None
 
 
