@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 from urllib.parse import unquote
 
@@ -80,16 +81,17 @@ def read(
     now = datetime.now(UTC)
     for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
         gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
-        about = _robot(graph, session, subject)
+        said = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
+        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **said)
         cell = _cell(graph, subject, predicate)
         if cell is not None:
-            _fill(assertion, graph, session, cell, (subject, predicate), new, (about, author, now))
+            _fill(assertion, graph, session, cell, (subject, predicate), new, fact)
             continue
         for quad in gone:
             _withdraw(assertion, graph, session, quad)
         for quad in new:
             _check_free(graph, quad)
-            assertion.facts.append(_free(quad, about, author, now))
+            assertion.facts.append(fact(fact_id=secrets.token_hex(12), **_free(quad)))
             assertion.added.add(quad)
     return assertion
 
@@ -162,23 +164,18 @@ def _fill(
     cell: _Cell,
     about: tuple[NamedNode, NamedNode],
     new: set[Quad],
-    by: tuple[str | None, str, datetime],
+    said: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
     what = " ".join(show(term, graph.base) for term in about)
     if len({quad.object for quad in new}) > 1:
         raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
     value = next(iter(new)).object if new else None
-    fact = AssertedFact(
+    fact = said(
         fact_id=secrets.token_hex(12),
-        about_robot=by[0],
-        subject=about[0].value,
-        predicate=about[1].value,
         value=_text(cell.column, value, what),
         kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
         graph=cell.graph.value,
-        author=by[1],
-        time=by[2],
         place=f"{cell.column.table.name}.{cell.column.name}",
         row_key=key_text(cell.key),
     )
@@ -245,24 +242,11 @@ def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
         )
 
 
-def _free(quad: Quad, about: str | None, author: str, now: datetime) -> AssertedFact:
+def _free(quad: Quad) -> dict[str, str]:
+    """Return the columns of a fact that no row follows."""
     term = quad.object
-    assert isinstance(quad.subject, NamedNode) and isinstance(term, NamedNode | Literal)
-    literal = term if isinstance(term, Literal) else None
-    return AssertedFact(
-        fact_id=secrets.token_hex(12),
-        about_robot=about,
-        subject=quad.subject.value,
-        predicate=quad.predicate.value,
-        value=term.value,
-        kind="IRI" if literal is None else f"@{literal.language}" if literal.language else literal.datatype.value,
-        graph=quad.graph_name.value,  # type: ignore[union-attr]
-        author=author,
-        time=now,
-        replaced=None,
-        place=None,
-        row_key=None,
-    )
+    of_literal = isinstance(term, Literal) and (f"@{term.language}" if term.language else term.datatype.value)
+    return {"value": term.value, "kind": of_literal or "IRI", "graph": quad.graph_name.value}  # type: ignore[union-attr]
 
 
 def _show(quad: Quad, graph: KnowledgeGraph) -> str:
