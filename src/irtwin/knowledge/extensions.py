@@ -11,8 +11,6 @@ import rdflib
 from pyoxigraph import NamedNode, QuerySolutions, Store
 from pyshacl.entrypoints import meta_validate
 from rdflib.namespace import SH
-from rdflib.plugins.sparql.algebra import translateQuery
-from rdflib.plugins.sparql.parser import parseQuery
 from sqlalchemy import Engine
 
 from irtwin.errors import InputError
@@ -22,6 +20,7 @@ from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.questions.queries import read_question
 from irtwin.knowledge.rules import swrl
+from irtwin.knowledge.rules.conjunction import algebra
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.rule import SHACL, Rule
 from irtwin.knowledge.store.keywords import refuse_service
@@ -115,7 +114,7 @@ def _check_rule(file: Resource, rule: Rule) -> None:
         raise InputError(
             f"{file.path}, line {line}: the rule {rule.label!r} is no SPARQL: {fault[1].partition(': ')[2]}"
         )
-    query = translateQuery(parseQuery(rule.construct), initNs=PREFIXES).algebra
+    query = algebra(rule.construct)
     made = {term for pattern in query.template for term in pattern}
     if any(isinstance(term, rdflib.BNode) for term in made):
         raise InputError(

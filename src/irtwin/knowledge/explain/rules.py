@@ -8,14 +8,12 @@ from typing import Any, cast
 
 import rdflib
 from pyoxigraph import BlankNode, Literal, NamedNode, QuerySolutions, Triple
-from rdflib.plugins.sparql.algebra import translateQuery
-from rdflib.plugins.sparql.parser import parseQuery
 from rdflib.plugins.sparql.parserutils import CompValue
 
 from irtwin.knowledge.rdflib_terms import from_rdflib
+from irtwin.knowledge.rules.conjunction import algebra
 from irtwin.knowledge.rules.rule import Rule, group_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import PREFIXES
 
 _Term = NamedNode | BlankNode | Literal | Triple
 _Bound = dict[str, _Term]
@@ -26,7 +24,7 @@ def premises(graph: KnowledgeGraph, rule: Rule, conclusion: Triple) -> tuple[Tri
 
     What must be absent for the rule to hold is not among them, nor what lies between the ends of a property path.
     """
-    query = translateQuery(parseQuery(rule.construct), initNs=PREFIXES).algebra
+    query = algebra(rule.construct)
     for pattern in query.template:
         bound = _unified(pattern, conclusion)
         if bound is not None:

@@ -41,13 +41,14 @@ class Conjunction:
 
 def conjunction(construct: str) -> Conjunction:
     """Read a CONSTRUCT; NoConjunction where it is more."""
-    query = _algebra(construct)
+    query = algebra(construct)
     patterns, comparisons = _conjuncts(query.p)
     return Conjunction(patterns, comparisons, list(query.template))
 
 
 @lru_cache(maxsize=256)  # rdflib takes a tenth of a second a rule, and the rules are those of the last time
-def _algebra(construct: str) -> Any:
+def algebra(construct: str) -> Any:
+    """Return the algebra of a rule's CONSTRUCT, as rdflib reads it."""
     return translateQuery(parseQuery(construct), initNs=PREFIXES).algebra
 
 
