@@ -17,10 +17,9 @@ from sqlalchemy.orm import Session
 
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, IRT, XSD
 from irtwin.storage import gap_schema as gap
-from irtwin.storage import live_schema as live
 from irtwin.storage import schema
 from irtwin.storage import structure_schema as structure
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Base
 
@@ -385,7 +384,7 @@ def _live_runs() -> Iterator[Base]:
             stale_since=stale_since and _moment(stale_since), stale_reason=why, activity_id=made,
         )  # fmt: skip
     for channel, joint, number, began, ended, seconds, residual, unit, ratio in EXCURSIONS:
-        yield live.GapExcursion(
+        yield schema.GapExcursion(
             run_id="Arm_B.live_1", place=joint or "robot", number=number, twin_id="Arm_B.t1", robot_id="Arm_B",
             channel=channel, joint=joint, unit=unit, began=_moment(began), ended=ended and _moment(ended),
             lasted_s=seconds, peak_residual=residual, peak_ratio=ratio, activity_id="live.Arm_B.live_1",

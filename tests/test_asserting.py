@@ -21,7 +21,7 @@ from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY
 from irtwin.rewriting import conclude, fill, map_rows, rewriting
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
 from tests import small_fleet

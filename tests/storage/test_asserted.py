@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from tests import rows
 
-from irtwin.storage.asserted import follow
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact, follow
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Run
 

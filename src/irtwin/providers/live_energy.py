@@ -23,7 +23,7 @@ from irtwin.providers.names import run_iri, twin_iri
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
-from irtwin.storage import live_schema, schema
+from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.twin.gap_watch import ROBOT, GapWatch, Windows, band
 from irtwin.twin.so_far import EnergySoFar, WatchedStretch
@@ -35,8 +35,8 @@ _KINDS: Mapping[str, type[schema.Base]] = {
     "run_energy": schema.RunEnergy,
     "energy_share": schema.EnergyShare,
     "joint_energy": schema.JointEnergy,
-    "gap_state": live_schema.GapState,
-    "gap_excursion": live_schema.GapExcursion,
+    "gap_state": schema.GapState,
+    "gap_excursion": schema.GapExcursion,
 }
 _AT_ONCE = 4096  # samples of a stored run
 _MOST_RUNS = 40  # that a twin knows tell its band

@@ -28,8 +28,7 @@ from irtwin.signals import log
 from irtwin.signals.channels import columns_of, from_columns
 from irtwin.signals.conditioning import condition
 from irtwin.storage import schema
-from irtwin.storage.asserted import follow
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact, follow
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
 from irtwin.storage.schema import (

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 from irtwin.knowledge.vocabulary import IRT
 from irtwin.providers.names import run_iri
 from irtwin.providers.provider import Made
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import Activity, Run, RunEnergy, SavingVerification, in_utc
 

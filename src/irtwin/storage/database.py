@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Literal, Self
 
@@ -16,8 +16,7 @@ from irtwin.location import Location
 from irtwin.resources import Resources, resources_of
 from irtwin.storage import asserted, base_iri, engine, files, tariff
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
-from irtwin.storage import live_schema as _live_schema  # noqa: F401  likewise
-from irtwin.storage.asserted_schema import AssertedFact
+from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import VERSION_TABLE, migrate, stamp
 from irtwin.storage.package_tables import package_tables
@@ -170,11 +169,9 @@ class Workspace:
         """Where the report of a robot's last diagnosis lies."""
         return self.file(f"reports/{robot_id}.gap.html")
 
-    @contextmanager
-    def reading(self) -> Iterator[Session]:
-        """Give a session to read with; nothing done in it is kept."""
-        with Session(self.engine) as session:
-            yield session
+    def reading(self) -> Session:
+        """Give a session to read with, which its block closes; nothing done in it is kept."""
+        return Session(self.engine)
 
     def ingest(
         self,
@@ -321,10 +318,8 @@ class Workspace:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @contextmanager
-    def _writing(self) -> Iterator[Session]:
-        with engine.writing(self.engine) as session:
-            yield session
+    def _writing(self) -> AbstractContextManager[Session]:
+        return engine.writing(self.engine)
 
     def _files(self, name: str) -> list[Path]:
         folder = self.folder / name

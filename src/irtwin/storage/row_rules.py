@@ -15,7 +15,7 @@ from typing import Any
 from sqlalchemy import Column, Connection, Table, select
 
 from irtwin.errors import InputError
-from irtwin.storage.asserted_schema import FILLED
+from irtwin.storage.asserted import FILLED
 from irtwin.storage.base_iri import checked as checked_base
 from irtwin.storage.rows import FILES, filled
 from irtwin.storage.schema import MEASURED, MEASURED_RUN, MODELLED, PLANNED, PLANNED_RUN, WATCHED_RUNS, Moment

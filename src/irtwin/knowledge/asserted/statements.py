@@ -33,8 +33,7 @@ from irtwin.knowledge.vocabulary import (
     RDF,
     XSD,
 )
-from irtwin.storage.asserted import key_text, row_of, value_of, written
-from irtwin.storage.asserted_schema import FILLED, AssertedFact
+from irtwin.storage.asserted import FILLED, AssertedFact, key_text, row_of, value_of, written
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Base, Robot
