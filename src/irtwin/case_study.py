@@ -75,7 +75,7 @@ def _carried_out(location: Location, task: Task, base: str | None, announce: Ann
     announce("4. The page: read back from the graph")
     with Workspace.existing(location) as place, KnowledgeGraph.of_workspace(place) as graph:
         robot = graph.iri(robot_iri(identifier(ROBOT)))
-        described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.read_document)
+        described, meshes = robot_of_graph(graph, robot), meshes_of_graph(graph, robot, place.folder)
         out = place.file("reports/case_study.html")
         render(graph, robot, place.read_file, out, partial(draw_scene, described, meshes))
     return out

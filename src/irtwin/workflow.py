@@ -107,7 +107,7 @@ def keep_diagnosis(location: Location, data_set: DataSet, diagnosis: Diagnosis |
                 place.read_document,
                 out,
                 place.resources,
-                lambda: (data_set.robot, meshes_of_graph(graph, robot, place.read_document)),
+                lambda: (data_set.robot, meshes_of_graph(graph, robot, place.folder)),
             )
 
 
@@ -214,7 +214,7 @@ def write_report(place: Workspace, robot_id: str) -> Path:
         robot = graph.iri(robot_iri(robot_id))
         scene = None
         if is_described(place, robot_id):
-            meshes = meshes_of_graph(graph, robot, place.read_document)
+            meshes = meshes_of_graph(graph, robot, place.folder)
             scene = partial(draw_scene, robot_of_graph(graph, robot), meshes)
         render(graph, robot, place.read_file, out, scene, Explainer(graph).of_iris, place.resources)
     return out

@@ -28,7 +28,7 @@ def meshes_in(workspace: Workspace) -> dict[str, Mesh]:
     graph.replace(
         map_database(workspace.engine, sorted(folder("mappings").glob("*.r2rml.ttl"))), GRAPH_SOURCE, GRAPH_ACTIVITY
     )
-    return dict(meshes_of_graph(graph, robot_iri("Meshed"), workspace.read_document))
+    return dict(meshes_of_graph(graph, robot_iri("Meshed"), workspace.folder))
 
 
 def stored(workspace: Workspace) -> list[Path]:

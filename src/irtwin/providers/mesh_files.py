@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from irtwin.robot.meshes import Mesh, find_mesh, read_mesh, read_mesh_file
 from irtwin.robot.structure import structure_of
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import MESHES
+from irtwin.storage.files import read_document
 
 _MESHES = """SELECT DISTINCT ?mesh ?file ?checksum {
   ?shape irt:shape_of / irt:link_of ?arm ; irt:Mesh ?mesh ; irt:File ?file ; irt:Checksum ?checksum .
@@ -46,22 +47,14 @@ def mesh_copies(data_set: DataSet) -> tuple[dict[str, MeshCopy], list[str]]:
     return copies, undrawn
 
 
-def meshes_of_graph(
-    graph: KnowledgeGraph, robot_iri: str, read_document: Callable[[str, str], bytes]
-) -> Mapping[str, Mesh]:
-    """Return a robot's meshes by the names that its description gives them, from the files that the graph names.
-
-    `read_document` returns a file of the workspace by path and checksum.
-    """
-    copies = mesh_copies_of_graph(graph, robot_iri, read_document)
+def meshes_of_graph(graph: KnowledgeGraph, robot_iri: str, workspace: Path) -> Mapping[str, Mesh]:
+    """Return a robot's meshes by the names that its description gives them, from the files that the graph names."""
+    copies = mesh_copies_of_graph(graph, robot_iri, workspace)
     return {name: read_mesh(copy.content, Path(copy.path).suffix, copy.path) for name, copy in copies.items()}
 
 
-def mesh_copies_of_graph(
-    graph: KnowledgeGraph, robot_iri: str, read_document: Callable[[str, str], bytes]
-) -> Mapping[str, MeshCopy]:
+def mesh_copies_of_graph(graph: KnowledgeGraph, robot_iri: str, workspace: Path) -> Mapping[str, MeshCopy]:
     """Return the files that a graph names of a robot's meshes, by the names that its description gives them."""
-    return {
-        row["mesh"]: MeshCopy(row["file"], row["checksum"], read_document(row["file"], row["checksum"]))
-        for row in graph.query(_MESHES, {"arm": robot_iri}).rows
-    }
+    rows = graph.query(_MESHES, {"arm": robot_iri}).rows
+    named = [(row["mesh"], row["file"], row["checksum"]) for row in rows]
+    return {mesh: MeshCopy(path, sha256, read_document(workspace, path, sha256)) for mesh, path, sha256 in named}

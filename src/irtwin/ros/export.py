@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 
 from sqlalchemy import select
@@ -22,7 +21,6 @@ from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.files import read_document
 from irtwin.twin.described import described
 
 _NO_START = datetime(1970, 1, 1, tzinfo=UTC)  # of a plan: its bag begins at 0 s
@@ -38,7 +36,7 @@ def export_package(out: Path, location: Location, robot: str | None) -> list[str
     with open_graph(location) as graph:
         iri = robot_named(graph, robot)
         described = robot_of_graph(graph, iri)
-        copies = mesh_copies_of_graph(graph, iri, partial(read_document, location.folder))
+        copies = mesh_copies_of_graph(graph, iri, location.folder)
     described = _as_identified(described, location)
     return write_package(described, out, {name: copy.content for name, copy in copies.items()})
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from irtwin.serve.samples import Page, Samples
 from irtwin.serve.shares import client
 from irtwin.serve.source import reading
 from irtwin.serve.worker import SERVER_FAILS
-from irtwin.storage.files import read_document
 from irtwin.virtual.robot_data import robot_data
 
 _MOST_ROBOTS = 64  # that are remembered as drawn
@@ -99,7 +97,7 @@ def _drawn(location: Location, robot_id: str) -> bytes:
         if any(sign in iri for sign in '<>"{}|\\^` '):
             raise InputError(f"no robot {robot_id!r} here")
         robot = robot_of_graph(graph, iri)
-        meshes = meshes_of_graph(graph, iri, partial(read_document, location.folder))
+        meshes = meshes_of_graph(graph, iri, location.folder)
         poses = _poses(graph, iri, robot.joint_names)
     return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
 
