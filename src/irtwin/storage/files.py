@@ -51,27 +51,34 @@ def temporary_beside(folder: Path) -> Iterator[Path]:
 def working_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """Give a new folder, gone at the end; those of the same prefix that killed processes left go too."""
     remove_left_behind(parent, prefix)
+    with folder_in_use(parent, prefix) as folder:
+        yield folder
+
+
+@contextmanager
+def folder_in_use(parent: Path, prefix: str) -> Iterator[Path]:
+    """Give a new folder, gone at the end, and locked until then: so nobody takes it for left behind."""
     with (
         told_when_full(parent),
         tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name,
-        _locked(Path(name)),
+        _locked(Path(name), fcntl.LOCK_EX),
     ):
         yield Path(name)
 
 
 def remove_left_behind(parent: Path, prefix: str) -> None:
-    """Remove the working folders of a prefix that killed processes left."""
+    """Remove the folders of a prefix that killed processes left."""
     for left in parent.glob(f"{prefix}*"):
-        with suppress(OSError), _locked(left):  # else it is in use
+        with suppress(OSError), _locked(left, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else it is in use
             shutil.rmtree(left)
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a folder's lock. OSError where another process does."""
+def _locked(folder: Path, how: int) -> Iterator[None]:
+    """Hold a folder's lock. OSError where another process does, if that is not to be waited for."""
     handle = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(handle, how)
         yield
     finally:
         os.close(handle)

@@ -19,11 +19,10 @@ _PUBLISHED = f"{_PREFIX}of-all-"
 def linked(folder: Path, ignored: tuple[str, ...], copied: tuple[str, ...] = ()) -> Iterator[Path]:
     """Give a folder beside another, with links to its files but those whose names start with one of `ignored`.
 
-    Files whose names match one of the patterns `copied` are copied, as they will be written on. Those that killed
-    processes left go. FileNotFoundError where a file goes meanwhile, OSError or WorkspaceFault where links cannot be
-    made there.
+    Files whose names match one of the patterns `copied` are copied, as they will be written on. FileNotFoundError where
+    a file goes meanwhile, OSError or WorkspaceFault where links cannot be made there.
     """
-    with files.working_folder(folder.parent, _PREFIX) as view:
+    with files.folder_in_use(folder.parent, _PREFIX) as view:
         for file in folder.iterdir():
             if file.name.startswith(ignored):
                 continue

@@ -20,7 +20,7 @@ from typing import Self, TypeVar
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.knowledge.store.damage import check_files, damaged
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.linked import found, linked, published
+from irtwin.knowledge.store.linked import found, linked, published, remove_left_behind
 
 OLDEST = 0.5  # s; a view is not older than this when it answers
 _PATIENCE = 5.0  # s after which files that nobody changed, and that cannot be read, are damaged
@@ -59,6 +59,7 @@ class Snapshot:
     def __init__(self, folder: Path):
         self._folder = folder
         self._view = ExitStack()
+        remove_left_behind(folder)
         check_files(folder)
         self._open()
 
