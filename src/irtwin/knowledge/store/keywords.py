@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from string import ascii_lowercase
 
 from pyoxigraph import Store
@@ -29,24 +30,23 @@ def refuse_service(text: str, base: str | None, code_points_first: bool = False)
     `code_points_first` is for servers, which may take `\\u0053` for a letter anywhere. Oxigraph does so in strings and
     IRIs alone.
     """
-    for form in _forms(text, code_points_first):
-        fault = fault_without(form, ("service",), parse_query, base)
-        if fault is not None:
-            raise InputError(
-                "SERVICE asks another server, which is not allowed here: ask this graph alone"
-                f" (where SERVICE is no clause, the rest is no SPARQL: {fault})"
-            )
+    why = "SERVICE asks another server, which is not allowed here: ask this graph alone (where SERVICE is no clause"
+    _refuse(text, ("service",), parse_query, base, code_points_first, why)
 
 
 def refuse_service_and_load(text: str, base: str | None, code_points_first: bool = False) -> None:
     """Raise InputError where an update reads from elsewhere, or may; otherwise as `refuse_service`."""
-    for form in _forms(text, code_points_first):
-        fault = fault_without(form, ("service", "load"), parse_update, base)
+    why = "LOAD and SERVICE read from elsewhere, which is not allowed here: use INSERT DATA (where they are no clauses"
+    _refuse(text, ("service", "load"), parse_update, base, code_points_first, why)
+
+
+def _refuse(
+    text: str, words: tuple[str, ...], parse: Parse, base: str | None, code_points_first: bool, why: str
+) -> None:
+    for form in [text, _CODE_POINT.sub(_character, text)] if code_points_first else [text]:
+        fault = fault_without(form, words, parse, base)
         if fault is not None:
-            raise InputError(
-                "LOAD and SERVICE read from elsewhere, which is not allowed here: use INSERT DATA"
-                f" (where they are no clauses, the rest is no SPARQL: {fault})"
-            )
+            raise InputError(f"{why}, the rest is no SPARQL: {fault})")
 
 
 def fault_without(text: str, words: tuple[str, ...], parse: Parse, base: str | None) -> str | None:
@@ -71,19 +71,15 @@ def fault_without(text: str, words: tuple[str, ...], parse: Parse, base: str | N
 
 def parse_query(text: str, base: str | None) -> None:
     """Raise SyntaxError where a text is no query. An ASK is answered on an empty store, nothing else is."""
-    try:
+    with suppress(RuntimeError):  # it is one, with a function that Oxigraph has not
         Store().query(text, base_iri=base, prefixes=PREFIXES)
-    except RuntimeError:
-        return  # it is one, with a function that Oxigraph has not
 
 
 def parse_update(text: str, base: str | None) -> None:
     """Raise SyntaxError where a text is no update. Nothing of it is done."""
     start = after_prologue(text)
-    try:
+    with suppress(RuntimeError):
         Store().update(f"{text[:start]}{_ABSENT}{text[start:]}", base_iri=base, prefixes=PREFIXES)
-    except RuntimeError:
-        return
 
 
 def is_update(text: str, base: str | None) -> bool:
@@ -109,10 +105,6 @@ def _misspelt(text: str, word: str) -> str | None:
         return None
     written = f"({start}){word[len(start)]}({end})"
     return re.sub(written, rf"\g<1>{letter}\g<2>", text, flags=re.IGNORECASE | re.ASCII)
-
-
-def _forms(text: str, code_points_first: bool) -> list[str]:
-    return [text, _CODE_POINT.sub(_character, text)] if code_points_first else [text]
 
 
 def _character(escape: re.Match[str]) -> str:

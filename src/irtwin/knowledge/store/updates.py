@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
 
@@ -149,11 +150,10 @@ def _templates(prologue: str, rest: str, base: str | None) -> tuple[dict[str, st
 def _in_place(text: str, base: str | None) -> SyntaxError | None:
     """Return what the parser says of a text as it was written, which is known to be no update."""
     try:
-        Store().update(text, base_iri=base, prefixes=PREFIXES)
+        with suppress(RuntimeError):
+            Store().update(text, base_iri=base, prefixes=PREFIXES)
     except SyntaxError as error:
         return error
-    except RuntimeError:
-        return None
     return None
 
 
