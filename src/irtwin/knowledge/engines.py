@@ -35,8 +35,8 @@ def inferred(engine: str, triples: Collection[Triple]) -> set[Triple]:
         from irtwin.knowledge.owl_rl import by_owlrl
 
         return by_owlrl.inferred(triples)
-    found = _by_hermit(triples) if engine == HERMIT else set()
-    return (found | set(Closure({*triples, *found}).inferred())).difference(triples)
+    found, closure = _closed(engine, triples)
+    return found.union(closure.inferred()).difference(triples)
 
 
 def worth_keeping(engine: str, triples: Collection[Triple]) -> set[Triple]:
@@ -45,13 +45,15 @@ def worth_keeping(engine: str, triples: Collection[Triple]) -> set[Triple]:
         from irtwin.knowledge.owl_rl import by_owlrl
 
         return by_owlrl.worth_keeping(triples)
-    found = _by_hermit(triples) if engine == HERMIT else set()
-    closed = Closure({*triples, *found}).worth_keeping()
-    return (set(filter(says_something, found)) | closed).difference(triples)
+    found, closure = _closed(engine, triples)
+    return closure.worth_keeping().union(filter(says_something, found)).difference(triples)
 
 
-def _by_hermit(triples: Collection[Triple]) -> set[Triple]:
-    """Return what HermiT finds. It leaves out what lies above its results: OWL 2 RL is to add that."""
-    from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
+def _closed(engine: str, triples: Collection[Triple]) -> tuple[set[Triple], Closure]:
+    """Return what HermiT finds, if it is asked, and the closure, which adds what lies above its results."""
+    found = set[Triple]()
+    if engine == HERMIT:
+        from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
 
-    return owl_dl.classify(triples)
+        found = owl_dl.classify(triples)
+    return found, Closure({*triples, *found})
