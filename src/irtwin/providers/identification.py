@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -17,7 +17,6 @@ from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, load_run, stored_data_set
 from irtwin.signals.log import DataSet, Run
-from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
 from irtwin.twin.files import to_json
@@ -167,7 +166,7 @@ def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]
 def _torque_fits(
     twin_id: str, robot_id: str, keys: dict[str, str], twin: Twin, parts: Split
 ) -> Iterator[schema.TorqueFit]:
-    for part, motions in _parts(parts):
+    for part, motions in ((FIT, parts.fit), (HELD_OUT, parts.held_out)):
         for fit in validate(twin, motions):
             if fit.torque_rmse is None or fit.r_squared is None:
                 continue
@@ -181,7 +180,3 @@ def _torque_fits(
                     rmse_nm=float(error),
                     r_squared=float(explained) if math.isfinite(explained) else None,
                 )
-
-
-def _parts(parts: Split) -> Iterable[tuple[str, Sequence[Motion]]]:
-    return (FIT, parts.fit), (HELD_OUT, parts.held_out)

@@ -14,7 +14,7 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.export import exported
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.rdf_input import parsing, read_rdf
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
 
 _TYPE = NamedNode(f"{RDF}type")
@@ -53,10 +53,8 @@ def _parsed(path: Path) -> Iterator[Triple]:
     form = _FORMATS.get(path.suffix.lower())
     if form is None:
         raise InputError(f"{path}: its name must end in {', '.join(_FORMATS)}; save it as RDF/XML or Turtle")
-    try:
+    with parsing(path):
         yield from (quad.triple for quad in parse(read_rdf(path, form), format=form))
-    except (SyntaxError, MemoryError) as error:
-        refuse(path, error)
 
 
 def _named(triples: Iterable[Triple]) -> set[Triple]:

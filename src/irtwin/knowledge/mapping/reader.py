@@ -25,7 +25,7 @@ from irtwin.knowledge.mapping.document import (
 )
 from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
 from irtwin.knowledge.store.by_subject import BySubject, Node
-from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.rdf_input import parsing, read_rdf
 
 _RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
 # BCP 47, as far as it is in use: no language of five letters or more is registered.
@@ -42,11 +42,9 @@ def read_document(path: Path) -> MappingDocument:
     """Read and check a mapping document in Turtle."""
     file_iri = path.resolve().as_uri()
     content = read_rdf(path, RdfFormat.TURTLE)
-    try:
+    with parsing(path):
         parser = parse(content, RdfFormat.TURTLE, base_iri=file_iri)
         graph = _Graph(quad.triple for quad in parser)
-    except (SyntaxError, MemoryError) as error:
-        refuse(path, error)
     declared = None if parser.base_iri == file_iri else parser.base_iri
     return MappingDocument(declared, _Reader(path, graph).triples_maps())
 

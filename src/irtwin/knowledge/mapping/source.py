@@ -36,7 +36,6 @@ class TableSource:
     folded: whether the columns are a table's, so that a regular identifier means a folded name.
     """
 
-    where: str
     sql: str
     columns: dict[str, Natural]
     cast: frozenset[str]
@@ -108,7 +107,7 @@ def describe(connection: Connection, table: LogicalTable) -> TableSource:
     cast: frozenset[str] = frozenset()
     if connection.dialect.name == "postgresql":
         cast = frozenset(column[0] for column in description if column[1] not in _NATURAL_IN_POSTGRESQL)
-    return TableSource(table.where, sql, columns, cast, folded=table.query is None)
+    return TableSource(sql, columns, cast, folded=table.query is None)
 
 
 def read(connection: Connection, sql: str, where: str) -> Iterator[Sequence[Sequence[Any]]]:

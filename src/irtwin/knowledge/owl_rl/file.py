@@ -10,7 +10,7 @@ from pyoxigraph import RdfFormat, Triple, parse, serialize
 from irtwin.errors import InputError
 from irtwin.knowledge import engines
 from irtwin.knowledge.engines import NATIVE
-from irtwin.knowledge.store.rdf_input import read_rdf, refuse
+from irtwin.knowledge.store.rdf_input import parsing, read_rdf
 from irtwin.knowledge.vocabulary import PREFIXES
 from irtwin.storage.files import check_place, write
 
@@ -37,10 +37,8 @@ def close_file(source: Path, out: Path, engine: str = NATIVE) -> int:
 def _read(source: Path) -> list[Triple]:
     form = _format(source)
     content = read_rdf(source, form)
-    try:
+    with parsing(source):
         return [quad.triple for quad in parse(content, format=form, base_iri=source.absolute().as_uri())]
-    except (SyntaxError, MemoryError) as error:
-        refuse(source, error)
 
 
 def _format(path: Path) -> RdfFormat:

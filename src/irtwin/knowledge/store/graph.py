@@ -97,12 +97,12 @@ class KnowledgeGraph:
         return cls(place.location.graph_url or place.graph_folder, place.folder, place.resources, place.base)
 
     @classmethod
-    def as_it_stands(cls, path: Path, workspace: Path | None = None, resources: Resources | None = None) -> Self:
+    def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
         """Open what is on disk now, to read; takes no lock. Where another process may write meanwhile: see `snapshot`.
 
         Raises OSError or RuntimeError where that process changed the files just now.
         """
-        return cls(path, workspace, resources, read_only=True)
+        return cls(path, workspace, read_only=True)
 
     def __enter__(self) -> Self:
         """Return the graph; leaving the block closes it."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 from xml.parsers.expat import ErrorString, ExpatError, ParserCreate
 
 from pyoxigraph import RdfFormat, Triple, parse
@@ -37,18 +37,20 @@ def read_rdf(path: Path, form: RdfFormat) -> bytes:
 def read_turtle(file: Path) -> Iterator[Triple]:
     """Read a Turtle file; InputError names the file and the line where it is broken."""
     content = read_rdf(file, RdfFormat.TURTLE)
-    try:
+    with parsing(file):
         yield from named_by_content((quad.triple for quad in parse(content, format=RdfFormat.TURTLE)), content)
-    except (SyntaxError, MemoryError) as error:
-        refuse(file, error)
 
 
-def refuse(path: Path, error: SyntaxError | MemoryError) -> NoReturn:
+@contextmanager
+def parsing(path: Path) -> Iterator[None]:
     """Turn what a parser says of a file into an InputError."""
-    if isinstance(error, MemoryError):
+    try:
+        yield
+    except MemoryError:
         raise InputError(f"{path}: has a term of more than 16 MB; keep such content in a separate file") from None
-    line = f", line {error.lineno}" if error.lineno else ""
-    raise InputError(f"{path}{line}: {error.msg}") from error
+    except SyntaxError as error:
+        line = f", line {error.lineno}" if error.lineno else ""
+        raise InputError(f"{path}{line}: {error.msg}") from error
 
 
 def _check_triples(path: Path, content: bytes) -> None:
