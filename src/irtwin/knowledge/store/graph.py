@@ -35,7 +35,7 @@ from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 from irtwin.knowledge.store.update_dataset import using
-from irtwin.knowledge.store.updates import as_change, by_asking, by_doing, check
+from irtwin.knowledge.store.updates import by_asking, by_doing, check
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
 from irtwin.resources import Resources, resources_of
 
@@ -411,8 +411,7 @@ class KnowledgeGraph:
             return set(cast(QueryTriples, self._store.query(asked, base_iri=base, prefixes=self.prefixes)))
 
         try:
-            change = as_change(text, self._holding, base, self.prefixes)
-            change = change or by_asking(text, self._holding, construct, base)
+            change = by_asking(text, self._holding, construct, base, self.prefixes)
             removed, added = change or by_doing(text, self.quads(), base, self.prefixes)
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error

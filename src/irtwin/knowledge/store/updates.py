@@ -23,6 +23,8 @@ from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, PREFIXES
 _NO_GRAPH = re.compile(r"The graph <([^>]*)> does not exist")
 _DATA = re.compile(rf"(INSERT|DELETE){SPACE}DATA", re.IGNORECASE | re.ASCII)
 _DELETE_WHERE = re.compile(rf"DELETE{SPACE}(?=WHERE)", re.IGNORECASE | re.ASCII)
+_WORDS = ("delete", "insert")
+_END = " \t\r\n;"  # of an update, after which nothing is done
 _TEMPLATE = re.compile(rf"{SPACE}(INSERT|DELETE){SPACE}\{{", re.IGNORECASE | re.ASCII)
 
 
@@ -35,66 +37,43 @@ def check(text: str, base: str | None, on_server: bool = False) -> None:
         raise InputError(f"not a SPARQL update: {in_words(_in_place(text, base) or error, text)}") from error
 
 
-def as_change(
-    text: str,
-    holding: Callable[[Iterable[Triple]], Iterable[Quad]],
-    base: str | None = None,
-    prefixes: dict[str, str] = PREFIXES,
-) -> tuple[set[Quad], set[Quad]] | None:
-    """Return the quads of named graphs that an update takes out and puts in, where its text alone tells: or None.
-
-    It does where it is one INSERT DATA or DELETE DATA without blank nodes. `holding` finds the quads of named graphs
-    that say one of some triples. The text has passed `check`.
-    """
-    start = after_prologue(text)
-    head = _DATA.match(text, start)
-    if head is None:
-        return None
-    prologue, data = text[:start], text[head.end() :].rstrip(" \t\r\n;")
-    # A group is one INSERT's template as well: what follows it would not be let through here.
-    if not is_update(f"{prologue}INSERT {data}\nWHERE {{ }}", base):
-        return None
-    named, union = _inserted(f"{prologue}INSERT DATA {data}", base, prefixes)
-    if has_blank_node(named) or has_blank_node(union):
-        return None
-    if head[1].lower() == "delete":
-        return named | set(holding(union)), set()
-    new = union - {quad.triple for quad in (*named, *holding(union))}
-    return set(), named | set(_in_graph(new))
-
-
 def by_asking(
     text: str,
     holding: Callable[[Iterable[Triple]], Iterable[Quad]],
     construct: Callable[[str], set[Triple]],
     base: str | None = None,
+    prefixes: dict[str, str] = PREFIXES,
 ) -> tuple[set[Quad], set[Quad]] | None:
-    """Return the same as `as_change` of an update that is one DELETE or INSERT with WHERE, by asking: or None.
+    """Return the quads of named graphs that an update takes out and puts in, where its data, or a query, tell: or None.
 
-    `construct` answers a CONSTRUCT over the union of all named graphs. The text has passed `check`.
+    They do where it is one INSERT DATA or DELETE DATA, or one DELETE and INSERT with WHERE of triples alone, without
+    blank nodes. `holding` finds the quads of named graphs that say one of some triples; `construct` answers a CONSTRUCT
+    over the union of all named graphs. The text has passed `check`.
     """
     start = after_prologue(text)
-    prologue, rest = text[:start], text[start:]
-    if short := _DELETE_WHERE.match(rest):
-        forms, rest = {"delete": ""}, rest[short.end() :]
-    else:
-        forms, rest = _templates(prologue, rest, base)
-    pattern = rest.rstrip(" \t\r\n;")
+    prologue = text[:start]
+    forms, pattern = _operation(prologue, text[start:], base)
+
+    def made(form: str) -> tuple[set[Quad], set[Triple]]:
+        """Return the quads of named graphs and the triples of the union that a form makes."""
+        if pattern is None:
+            return _inserted(f"{prologue}INSERT DATA {form}", base, prefixes)
+        return set(), construct(f"{prologue}CONSTRUCT {form}\n{pattern}")
+
     try:  # a template of named graphs, USING, or another operation after this one is no CONSTRUCT
-        made = {word: construct(f"{prologue}CONSTRUCT {form}\n{pattern}") for word, form in forms.items()}
+        gone, come = ((set(), set()) if (form := forms.get(word)) is None else made(form) for word in _WORDS)
     except SyntaxError:
         return None
-    gone, come = made.get("delete", set()), made.get("insert", set())
-    if not forms or has_blank_node(gone | come):
+    if not forms or any(has_blank_node(some) for some in (*gone, *come)):
         return None
-    new = come - {quad.triple for quad in holding(come)}
-    return set(holding(gone - come)), set(_in_graph(new))
+    new = come[1] - {quad.triple for quad in (*come[0], *holding(come[1]))}
+    return gone[0] | set(holding(gone[1] - come[1])), come[0] | set(_in_graph(new))
 
 
 def by_doing(
     text: str, quads: Iterable[Quad], base: str | None = None, prefixes: dict[str, str] = PREFIXES
 ) -> tuple[set[Quad], set[Quad]]:
-    """Return the same as `as_change`, of any update, by doing it on a copy of all quads in memory.
+    """Return the same as `by_asking`, of any update, by doing it on a copy of all quads in memory.
 
     Raises SyntaxError or RuntimeError where it fails.
     """
@@ -134,17 +113,27 @@ def _in_graph(triples: Iterable[Triple]) -> Iterator[Quad]:
     return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
 
 
-def _templates(prologue: str, rest: str, base: str | None) -> tuple[dict[str, str], str]:
-    """Return the groups of triples after DELETE and INSERT, and what follows these; a group ends where it is whole."""
+def _operation(prologue: str, rest: str, base: str | None) -> tuple[dict[str, str], str | None]:
+    """Return the groups after DELETE and INSERT of one operation, and what follows these: None of one of data.
+
+    No groups where it is none of these.
+    """
+    if data := _DATA.match(rest):
+        group = rest[data.end() :].rstrip(_END)
+        # A group is one INSERT's template as well: what follows it would not be let through here.
+        is_alone = is_update(f"{prologue}INSERT {group}\nWHERE {{ }}", base)
+        return ({data[1].lower(): group} if is_alone else {}), None
+    if short := _DELETE_WHERE.match(rest):
+        return {"delete": ""}, rest[short.end() :].rstrip(_END)
     forms: dict[str, str] = {}
-    while head := _TEMPLATE.match(rest):
+    while head := _TEMPLATE.match(rest):  # a group ends where it is whole
         ends = (brace.end() for brace in re.finditer("}", rest))
         end = next((end for end in ends if is_update(f"{prologue}{rest[:end]}\nWHERE {{ }}", base)), None)
         if end is None or head[1].lower() in forms:
             return {}, rest
         forms[head[1].lower()] = rest[head.end() - 1 : end]
         rest = rest[end:]
-    return forms, rest
+    return forms, rest.rstrip(_END)
 
 
 def _in_place(text: str, base: str | None) -> SyntaxError | None:
