@@ -21,9 +21,9 @@ from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
+from irtwin.knowledge.store.ontology import ELECTRICITY
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.table import Row
-from irtwin.knowledge.tariff import ELECTRICITY
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_INFERRED,

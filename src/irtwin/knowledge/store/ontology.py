@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
@@ -12,9 +12,11 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.knowledge.tariff import tariff_of
-from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, ONTOLOGY, OWL
+from irtwin.knowledge.vocabulary import DCTERMS, GRAPH_ONTOLOGY, ONTOLOGY, OWL, TARIFF, term
 from irtwin.resources import Resources
+from irtwin.storage.tariff import FILE, Tariff, read_tariff
+
+ELECTRICITY = NamedNode(f"{TARIFF}electricity")
 
 
 def quads(resources: Resources, workspace: Path | None) -> Iterator[Quad]:
@@ -36,8 +38,20 @@ def _modules(resources: Resources) -> tuple[tuple[Path, ...], bytes]:
     return paths, b"".join(path.read_bytes() for path in paths)
 
 
-def _tariff(workspace: Path | None) -> Iterable[Triple]:
-    return () if workspace is None else tariff_of(workspace)
+def _tariff(workspace: Path | None) -> Iterator[Triple]:
+    """Yield what `plant.toml` says of the tariff, which holds for all robots. InputError where it is at fault."""
+    tariff = Tariff() if workspace is None else read_tariff(workspace)
+    values: dict[str, float | str | None] = {
+        term("Energy_Price"): tariff.price,
+        term("Currency"): tariff.currency or None,
+        term("Emission_Factor"): tariff.co2,
+        term("Operating_Hours"): tariff.hours,
+    }
+    known = {name: value for name, value in values.items() if value is not None}
+    for name, value in known.items():
+        yield Triple(ELECTRICITY, NamedNode(name), Literal(value))
+    if known:
+        yield Triple(ELECTRICITY, NamedNode(f"{DCTERMS}source"), Literal(FILE))
 
 
 @lru_cache(maxsize=1)  # a run puts them into two graphs
