@@ -38,35 +38,35 @@ AFTER = [run("2026-03-20", joules) for joules in (89.0, 90.0, 91.0, 90.0)]
 
 def test_a_saving_is_the_adjusted_baseline_less_what_was_measured() -> None:
     found = verification([*BEFORE, *AFTER], DAY)
-    assert (found.words, found.unit, found.before, found.after) == ("verified", "hour", 3, 4)
-    assert (found.adjusted_j, found.saved_j) == pytest.approx((400.0, 40.0))
+    assert (found.result, found.compared_for, found.runs_before, found.runs_after) == ("verified", "hour", 3, 4)
+    assert (found.adjusted_baseline_j, found.saving_j) == pytest.approx((400.0, 40.0))
     # variances of the means: 4/3 and (2/3)/4, times 4²; Welch's degrees of freedom 2.51
-    assert found.half_width_j == pytest.approx(3.5682 * 4 * (4 / 3 + 1 / 6) ** 0.5, rel=1e-3)
-    assert (found.lower_j + found.upper_j) / 2 == pytest.approx(40.0)
+    assert found.saving_upper_j - found.saving_j == pytest.approx(3.5682 * 4 * (4 / 3 + 1 / 6) ** 0.5, rel=1e-3)
+    assert (found.saving_lower_j + found.saving_upper_j) / 2 == pytest.approx(40.0)
 
 
 def test_it_is_adjusted_to_what_was_made() -> None:
     twice = [run("2026-03-20", 2 * one.energy_j, time_s=7200.0) for one in AFTER]
-    assert verification([*BEFORE, *twice], DAY).saved_j == pytest.approx(80.0)
+    assert verification([*BEFORE, *twice], DAY).saving_j == pytest.approx(80.0)
     pieces = [replace(one, pieces=10) for one in BEFORE] + [replace(one, pieces=5) for one in AFTER]
     fewer = verification(pieces, DAY)
-    assert (fewer.unit, fewer.words) == ("piece", "not verified")
-    assert fewer.saved_j == pytest.approx(20 * 10.0 - 360.0)
-    assert verification([*pieces, run("2026-03-02", 100.0)], DAY).unit == "hour"  # one that counts none
+    assert (fewer.compared_for, fewer.result) == ("piece", "not verified")
+    assert fewer.saving_j == pytest.approx(20 * 10.0 - 360.0)
+    assert verification([*pieces, run("2026-03-02", 100.0)], DAY).compared_for == "hour"  # one that counts none
 
 
 def test_another_product_is_no_saving() -> None:
     heavy, light = ([replace(one, product=name) for one in AFTER] for name in ("heavy", "light"))
     early = [replace(one, product="heavy") for one in BEFORE]
-    assert verification([*early, *light], DAY).words == "too few runs"
+    assert verification([*early, *light], DAY).result == "too few runs"
     mixed = verification([*early, *heavy, *light], DAY)
-    assert (mixed.before, mixed.after, mixed.saved_j) == (3, 4, pytest.approx(40.0))
-    assert verification([*BEFORE, *[replace(one, payload_kg=5.0) for one in AFTER]], DAY).words == "too few runs"
+    assert (mixed.runs_before, mixed.runs_after, mixed.saving_j) == (3, 4, pytest.approx(40.0))
+    assert verification([*BEFORE, *[replace(one, payload_kg=5.0) for one in AFTER]], DAY).result == "too few runs"
 
 
 def test_runs_of_the_day_and_beyond_the_next_change_count_on_neither_side() -> None:
     others = [run(DAY, 1e9), run("2026-02-01", 1e9), run("2026-04-01", 1e9)]
-    assert verification([*BEFORE, *AFTER, *others], DAY, after="2026-02-10", until="2026-03-25").saved_j == (
+    assert verification([*BEFORE, *AFTER, *others], DAY, after="2026-02-10", until="2026-03-25").saving_j == (
         pytest.approx(40.0)
     )
 
@@ -74,12 +74,17 @@ def test_runs_of_the_day_and_beyond_the_next_change_count_on_neither_side() -> N
 @pytest.mark.parametrize(("runs", "counts"), [([], (0, 0)), (BEFORE, (3, 0)), ([*BEFORE, *AFTER[:2]], (3, 2))])
 def test_too_few_runs_are_told(runs: list[TakenEnergy], counts: tuple[int, int]) -> None:
     found = verification(runs, DAY)
-    assert (found.words, found.adjusted_j, (found.before, found.after)) == ("too few runs", None, counts)
+    assert (found.result, found.adjusted_baseline_j, (found.runs_before, found.runs_after)) == (
+        "too few runs",
+        None,
+        counts,
+    )
 
 
 def test_runs_without_any_scatter_have_no_interval() -> None:
     same = [*[run("2026-03-01", 10.0)] * 3, *[run("2026-03-20", 9.0)] * 3]
-    assert (verification(same, DAY).half_width_j, verification(same, DAY).words) == (0.0, "verified")
+    found = verification(same, DAY)
+    assert (found.saving_lower_j, found.saving_upper_j, found.result) == (found.saving_j, found.saving_j, "verified")
 
 
 @pytest.mark.parametrize(("saved", "counts"), [(0.0, (5, 5)), (0.1, (8, 4))])
@@ -94,8 +99,8 @@ def test_nineteen_of_twenty_intervals_hold_what_was_saved(saved: float, counts: 
             for made in side
         ]
         found = verification(runs, DAY)
-        held += found.lower_j <= 100.0 * saved * pieces[1].sum() <= found.upper_j
-        verified += found.words == "verified"
+        held += found.saving_lower_j <= 100.0 * saved * pieces[1].sum() <= found.saving_upper_j
+        verified += found.result == "verified"
     assert 0.92 < held / tries < 0.99
     assert verified / tries < 0.05 if saved == 0.0 else verified / tries > 0.8
 

@@ -43,39 +43,6 @@ class TakenEnergy:
     payload_kg: float | None = None
 
 
-@dataclass(frozen=True)
-class Verification:
-    """What was saved, J, with its 95 % interval: `adjusted_j` is what the runs after would have taken as before.
-
-    unit: what energies were compared for; before, after: how many runs were. Without enough of these nothing else is
-    said.
-    """
-
-    before: int
-    after: int
-    unit: str = ""
-    adjusted_j: float | None = None
-    saved_j: float = 0.0
-    half_width_j: float = 0.0
-
-    @property
-    def lower_j(self) -> float:
-        """Lower end of the interval, J."""
-        return self.saved_j - self.half_width_j
-
-    @property
-    def upper_j(self) -> float:
-        """Upper end of the interval, J."""
-        return self.saved_j + self.half_width_j
-
-    @property
-    def words(self) -> str:
-        """What is to be said of it."""
-        if self.adjusted_j is None:
-            return "too few runs"
-        return "verified" if self.lower_j > 0.0 else "not verified"
-
-
 def provide(workspace: Workspace, action: str) -> Made:
     """Make what an action saved, by its IRI below the base; nothing where what was done is taken back.
 
@@ -97,7 +64,9 @@ def provide(workspace: Workspace, action: str) -> Made:
     before = max((day for day in days.values() if day < days[iri]), default="")
     until = min((day for day in days.values() if day > days[iri]), default="~")
     counted = [run for run in runs.values() if run is not None]
-    return Made(robot_id, used, [_row(iri, robot_id, verification(counted, days[iri], before, until))])
+    row = verification(counted, days[iri], before, until)
+    row.action, row.robot_id = iri, robot_id
+    return Made(robot_id, used, [row])
 
 
 def _earlier(session: Session, action: str) -> str:
@@ -122,21 +91,12 @@ def _taken(run: Run, energy: RunEnergy) -> TakenEnergy | None:
     return TakenEnergy(day, energy.energy_consumption_j, run.run_time_s, *made)
 
 
-def _row(action: str, robot_id: str, found: Verification) -> SavingVerification:
-    row = SavingVerification(
-        action=action, robot_id=robot_id, result=found.words, runs_before=found.before, runs_after=found.after
-    )
-    if found.adjusted_j is not None:
-        row.compared_for, row.adjusted_baseline_j, row.saving_j = found.unit, found.adjusted_j, found.saved_j
-        row.saving_lower_j, row.saving_upper_j = found.lower_j, found.upper_j
-    return row
-
-
-def verification(runs: Iterable[TakenEnergy], day: str, after: str = "", until: str = "~") -> Verification:
+def verification(runs: Iterable[TakenEnergy], day: str, after: str = "", until: str = "~") -> SavingVerification:
     """Hold the runs before a day against those after it; of the day itself neither, for nobody knows its hour.
 
-    Only runs after the day `after` and before `until` count, between which nothing else was changed. Products and
-    payloads that either side has fewer than FEWEST runs of are left out.
+    The row says what was saved, J, with its 95 % interval; its action and robot are for who asks to say. Only runs
+    after the day `after` and before `until` count, between which nothing else was changed. Products and payloads that
+    either side has fewer than FEWEST runs of are left out.
     """
     counted = [run for run in runs if after < run.day < until and run.day != day]
     alike: dict[object, tuple[list[TakenEnergy], list[TakenEnergy]]] = defaultdict(lambda: ([], []))
@@ -145,7 +105,7 @@ def verification(runs: Iterable[TakenEnergy], day: str, after: str = "", until: 
     pairs = [sides for sides in alike.values() if min(map(len, sides)) >= FEWEST]
     if not pairs:
         late = sum(run.day > day for run in counted)
-        return Verification(len(counted) - late, late)
+        return SavingVerification(result="too few runs", runs_before=len(counted) - late, runs_after=late)
     unit, amount = _basis([run for sides in pairs for side in sides for run in side])
     return _compared(pairs, unit, amount)
 
@@ -158,7 +118,7 @@ def _basis(runs: Sequence[TakenEnergy]) -> tuple[str, Callable[[TakenEnergy], fl
 
 def _compared(
     pairs: Sequence[tuple[list[TakenEnergy], list[TakenEnergy]]], unit: str, amount: Callable[[TakenEnergy], float]
-) -> Verification:
+) -> SavingVerification:
     """Add up what each product and payload saved; the interval is Student's, with Welch's degrees of freedom."""
     adjusted = saved = variance = spread = 0.0
     for before, after in pairs:
@@ -172,7 +132,16 @@ def _compared(
             spread += part**2 / of
     half = float(scipy.special.stdtrit(variance**2 / spread, _SURE)) * math.sqrt(variance) if spread else 0.0
     early, late = (sum(len(sides[side]) for sides in pairs) for side in (0, 1))
-    return Verification(early, late, unit, adjusted, saved, half)
+    return SavingVerification(
+        result="verified" if saved - half > 0.0 else "not verified",
+        runs_before=early,
+        runs_after=late,
+        compared_for=unit,
+        adjusted_baseline_j=adjusted,
+        saving_j=saved,
+        saving_lower_j=saved - half,
+        saving_upper_j=saved + half,
+    )
 
 
 def _rate(runs: Sequence[TakenEnergy], amount: Callable[[TakenEnergy], float]) -> tuple[float, float, int]:
