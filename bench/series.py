@@ -39,7 +39,7 @@ def main(samples: int) -> None:
     end = moment[-1]
     with tempfile.TemporaryDirectory() as folder, KnowledgeGraph(workspace=Path(folder)) as graph:
         began = time.perf_counter()
-        path = write_series(Path(folder), table).path
+        path, _ = write_series(Path(folder), table)
         print(f"{samples} samples of 7 channels written in {time.perf_counter() - began:.1f} s")
         graph.update(FACTS.format(path=path))
         for call in ("integral", "mean", "max"):

@@ -34,13 +34,13 @@ def series(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     table = pa.table({"time": TIME, "power": power, 'odd "name': np.arange(1000)})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("irtwin.storage.series.ROW_GROUP", 100)
-        return SeriesWindows(folder / write_series(folder, table).path), power
+        return SeriesWindows(folder / write_series(folder, table)[0]), power
 
 
 def test_a_curve_is_all_samples_or_the_extremes_of_them(tmp_path: Path) -> None:
     time, spike = np.arange(50_000) / 100, np.zeros(50_000)
     spike[31_415] = 1 / 3
-    file = SeriesWindows(tmp_path / write_series(tmp_path, pa.table({"time": time, "x": spike, "on": spike > 0})).path)
+    file = SeriesWindows(tmp_path / write_series(tmp_path, pa.table({"time": time, "x": spike, "on": spike > 0}))[0])
     curve = file.curve("x", 0, 1e9)
     assert len(curve) <= windows.MOST_DRAWN and (314.15, 0.3333333) in curve and curve == sorted(curve)
     assert file.curve("on", 314.13, 314.15) == [(314.13, 0.0), (314.14, 0.0), (314.15, 1.0)]

@@ -24,11 +24,10 @@ _MOST_NAMED = 3  # statements, in words
 
 @dataclass(frozen=True)
 class Aside:
-    """What nothing is concluded from: asserted statements, and why; and conclusions of rules that clash with others."""
+    """The asserted statements that nothing is concluded from, and why."""
 
     statements: frozenset[Triple]
     why: str
-    conclusions: frozenset[Triple]
 
     def notes(self, nodes: Iterable[object] = ()) -> set[Triple]:
         """Return what is to be said of whom the statements are about, and of other nodes that stand for these."""
@@ -58,7 +57,7 @@ def contain(
             aside |= clashing
         else:
             statements = frozenset(aside & premises)
-            return Aside(statements, _in_words(reason, statements), frozenset(aside - statements)), inferred
+            return Aside(statements, _in_words(reason, statements)), inferred
     raise clash
 
 

@@ -328,15 +328,15 @@ class Workspace:
     def _store(self, series: Mapping[str, pa.Table], kind: str, activity_id: str | None) -> list[Series]:
         rows = []
         for run_id, table in series.items():
-            stored = write_series(self.folder, table)
+            path, series_id = write_series(self.folder, table)
             rows.append(
                 Series(
-                    series_id=stored.series_id,
+                    series_id=series_id,
                     run_id=run_id,
                     kind=kind,
-                    path=stored.path,
-                    row_count=stored.row_count,
-                    columns=",".join(stored.columns),
+                    path=path,
+                    row_count=table.num_rows,
+                    columns=",".join(table.column_names),
                     activity_id=activity_id,
                 )
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,25 +17,15 @@ FOLDER = "series"
 ROW_GROUP = 122_880  # rows; those are read that a window needs
 
 
-@dataclass(frozen=True)
-class SeriesFile:
-    """A stored Parquet file; `path` is relative to the workspace, `series_id` the file's sha256."""
-
-    series_id: str
-    path: str
-    row_count: int
-    columns: tuple[str, ...]
-
-
-def write_series(workspace: Path, table: pa.Table) -> SeriesFile:
-    """Store a table, once: the same content has the same name."""
+def write_series(workspace: Path, table: pa.Table) -> tuple[str, str]:
+    """Store a table, once: the same content has the same name. Return its path in the workspace, and its SHA-256."""
     with files.temporary_beside(workspace / FOLDER) as temporary:
         pq.write_table(table, temporary, compression="zstd", row_group_size=ROW_GROUP)
         series_id = checksum(temporary)
         path = f"{FOLDER}/{series_id}.parquet"
         if not (file := inside(workspace, path)).exists():
             files.put_in_place(temporary, file)
-    return SeriesFile(series_id, path, table.num_rows, tuple(table.column_names))
+    return path, series_id
 
 
 def read_series(workspace: Path, path: str, series_id: str, columns: Sequence[str] | None = None) -> pa.Table:
