@@ -26,7 +26,7 @@ from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import DataSet, Run, read_data_set
 from irtwin.twin.identify import identify
 
-SIZE, SMOOTHED, SEED = 1.5, 0.12, 700  # -, s, -
+SIZE, SMOOTHED, SEED = 3.0, 0.12, 700  # -, s, -
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # positions, speeds, accelerations, torque, (N, n)

@@ -203,6 +203,15 @@ def test_what_explains_most_does_not_hide_what_is_likely():
     assert _Search.likely(search, posterior, [], None) is None
 
 
+def test_what_is_likelier_in_the_end_takes_the_place_of_what_came_first():
+    system, (true, mixture) = system_of([[1.0, 0.0], [0.9, 0.3]], [1.0, 0.0])
+    search = _Search(system, [true, mixture], HypothesisPrior.of([true, mixture]), DEFAULT.criterion, None)
+    first = [(mixture, mixture.variants[0])]
+    ((named, _),), noise = search.likeliest(first, search.left(first, np.ones(1)))
+    assert named is true
+    assert noise == pytest.approx(1.0, rel=0.05)
+
+
 def test_what_is_expected_in_each_joint_shows_in_all_together():
     """None of six joints shows it by itself; where some size is expected and not there, that speaks against it."""
     size = 0.1
