@@ -8,6 +8,7 @@ from functools import cache
 import owlrl
 import rdflib
 from pyoxigraph import Triple
+from rdflib import OWL, RDF
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl.closure import Contradiction, says_something
@@ -50,7 +51,12 @@ def _closed(triples: Iterable[Triple]) -> set[Triple]:
     graph = rdflib.Graph()
     for subject, predicate, object in triples:
         graph.add((to_rdflib(subject), to_rdflib(predicate), to_rdflib(object)))
+    ends = _repeat_last_keys(graph)
     owlrl.DeductiveClosure(owlrl.OWLRL_Semantics).expand(graph)
+    for end, repeated in ends.items():
+        graph.remove((repeated, None, None))
+        graph.remove((None, None, repeated))
+        graph.add((end, RDF.rest, RDF.nil))
     for error in graph.objects(None, _ERRORS.error):
         if not str(error).startswith(_ILL_TYPED):
             raise Contradiction(f"statements contradict each other, owlrl finds: {error}")
@@ -60,3 +66,16 @@ def _closed(triples: Iterable[Triple]) -> set[Triple]:
         for statement in said
         if isinstance(statement[1], rdflib.URIRef) and not isinstance(statement[0], rdflib.Literal)
     }
+
+
+def _repeat_last_keys(graph: rdflib.Graph) -> dict[rdflib.term.Node, rdflib.BNode]:
+    """Say the last property of each key twice, as owlrl 7.6 never compares the last; return what follows which cell."""
+    ends: dict[rdflib.term.Node, rdflib.BNode] = {}
+    for end, key in list(graph.subject_objects(RDF.first)):
+        is_last = (end, RDF.rest, RDF.nil) in graph
+        if is_last and any((None, OWL.hasKey, cell) in graph for cell in graph.transitive_subjects(RDF.rest, end)):
+            repeated = ends[end] = rdflib.BNode()
+            graph.set((end, RDF.rest, repeated))
+            graph.add((repeated, RDF.first, key))
+            graph.add((repeated, RDF.rest, RDF.nil))
+    return ends
