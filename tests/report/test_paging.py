@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from irtwin.report.plant.paging import PAGE, on_page, page_number, pages
+from irtwin.report.plant.page import PAGE, on_page, page_number, pages
 
 
 def test_each_line_is_on_one_page() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from irtwin.input_file import read_text
+from irtwin.report.wording import local_name
 from irtwin.resources import MOST_BYTES, Resources
 
 Row = Mapping[str, Any]  # a variable's Python value, None where it is unbound
@@ -68,6 +69,14 @@ def read_questions(files: Iterable[Path]) -> dict[str, PageQuestion]:
 def ask(graph: Graph, questions: Mapping[str, PageQuestion], bindings: Mapping[str, str]) -> dict[str, Answer]:
     """Ask every question; one whose variables are not all in `bindings` has no rows."""
     return {name: Answer(question, _rows(graph, question, bindings)) for name, question in questions.items()}
+
+
+def limits(answers: Answers) -> dict[str, float]:
+    """Return the limits of the graph, which the question `limits` finds, by the ends of their IRIs.
+
+    Each is in the unit that the ontology gives it; no page has a limit of its own.
+    """
+    return {local_name(row["limit"]): float(row["value"]) for row in answers["limits"].rows}
 
 
 def _parse(file: Path) -> PageQuestion:

@@ -14,7 +14,7 @@ from starlette.routing import Route
 
 from irtwin.errors import InputError
 from irtwin.report.plant import actions, choice, comparison, curves, links, overview, page, robot, sheet
-from irtwin.report.plant.paging import page_number
+from irtwin.report.plant.page import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion
 from irtwin.serve.asking import Asking, Bindings
@@ -43,7 +43,6 @@ class PlantPages:
     def __init__(self, workspace: Path, asking: Asking, reports: ReportFiles, updates: Updates, limits: Limits) -> None:
         self._workspace, self._asking, self._reports = workspace, asking, reports
         self._updates, self._limits = updates, limits
-        self._links = links.links(asking.base)
 
     def routes(self) -> list[Route]:
         """Return where they are."""
@@ -79,7 +78,7 @@ class PlantPages:
     async def _robot(self, request: Request) -> Response:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
-        values = self._beside(request) | self._reports.of_robot(self._links.tail(iri))
+        values = self._beside(request) | self._reports.of_robot(links.tail(iri, self._asking.base))
         values["number"] = page_number(request.query_params.get("page"))
         shown = {**robot.of_robot(answers, values["zone"]), **values}
         return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
@@ -88,7 +87,7 @@ class PlantPages:
         iri = self._individual("run", request.path_params["name"])
         answers = await self._known(request, page.questions("run"), {"run": iri}, "run")
         (run,) = answers["run"].rows
-        values = self._beside(request) | self._reports.of_robot(self._links.tail(run["robot"]))
+        values = self._beside(request) | self._reports.of_robot(links.tail(run["robot"], self._asking.base))
         values["curves"] = curves.of_run(answers)
         return await html(
             lambda: page.render("run/page.html.jinja", answers, {"run": iri}, **robot.of_run(answers), **values),

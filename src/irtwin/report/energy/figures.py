@@ -8,8 +8,7 @@ from typing import Any
 
 from irtwin.report import wording
 from irtwin.report.colours import MEASURED, MODELLED, PALETTE, effect_colour
-from irtwin.report.limits import limits
-from irtwin.report.questions import Answer, Answers, Row
+from irtwin.report.questions import Answer, Answers, Row, limits
 from irtwin.report.traces import Figure, axis, bars, beside, level, plain
 
 ROBOT_WIDE = "whole robot"

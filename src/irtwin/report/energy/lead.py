@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from irtwin.report import wording
 from irtwin.report.energy import verdict
-from irtwin.report.limits import limits
-from irtwin.report.questions import Answers, Row
+from irtwin.report.questions import Answers, Row, limits
 
 _HOUR = 3600.0  # s
 

@@ -17,8 +17,7 @@ from irtwin.report import colours
 from irtwin.report.energy import lead, tables, verdict
 from irtwin.report.energy.figures import figures
 from irtwin.report.explorer import Columns, ReadSeries, explorer
-from irtwin.report.limits import limits
-from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
+from irtwin.report.questions import Answers, Graph, added_to, ask, limits, questions_of
 from irtwin.report.templates import style, written
 from irtwin.report.traces import Figure
 from irtwin.resources import Resources, folder, shipped

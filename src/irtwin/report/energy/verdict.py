@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from irtwin.report import wording
-from irtwin.report.limits import limits
-from irtwin.report.questions import Answers, Row
+from irtwin.report.questions import Answers, Row, limits
 
 # A twin is judged on data that it never saw; failing that, on what there is, and the page says so.
 _TORQUE_PARTS = (("held_out", "on data it never saw"), ("fit", "on the data it was fitted to"))

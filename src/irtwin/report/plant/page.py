@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
+from typing import Any, TypeVar
 
 import jinja2
 
 from irtwin import resources
 from irtwin.knowledge.vocabulary import ID
 from irtwin.providers.verification import FEWEST
-from irtwin.report.plant import choice, links, paging
+from irtwin.report.plant import choice, links
 from irtwin.report.plant.energies import kwh
 from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
 FOLDER = resources.folder("reports") / "plant"
+PAGE = 50  # lines of a table on a page; tables as files stay whole
+T = TypeVar("T")
 
 
 @cache
@@ -67,14 +69,29 @@ def compile_templates(base: str) -> None:
 
 @cache
 def _templates(base: str) -> jinja2.Environment:
-    of = links.links(base)
     templates = environment(resources.shipped())
     templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates.filters |= {
-        "page_of": of.page_of, "individual": of.individual, "tail": of.tail, "kwh": kwh, "spaced": _spaced,
-         "pages": paging.pages, "on_page": paging.on_page,
-    }  # fmt: skip
+        function.__name__: partial(function, base=base) for function in (links.page_of, links.individual, links.tail)
+    }
+    templates.filters |= {"kwh": kwh, "spaced": _spaced, "pages": pages, "on_page": on_page}
     return templates
+
+
+def pages(lines: Sequence[object]) -> int:
+    """Return how many pages so many lines take, one at least."""
+    return max(1, -(-len(lines) // PAGE))
+
+
+def on_page(lines: Sequence[T], number: int) -> Sequence[T]:
+    """Return the lines of a page, the first of which is 1; beyond the last, those of the last."""
+    start = (min(number, pages(lines)) - 1) * PAGE
+    return lines[start : start + PAGE]
+
+
+def page_number(text: str | None) -> int:
+    """Return the page that an address asks for; the first where it says none, or nonsense."""
+    return max(1, int(text)) if text and text.isascii() and text.isdigit() and len(text) < 10 else 1
 
 
 def _spaced(text: str | None) -> str:
