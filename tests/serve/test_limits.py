@@ -17,13 +17,12 @@ import pytest
 
 from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import Operation, Refusal
 
 pytestmark = pytest.mark.slow
 
 PRODUCT = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 ALL_PAIRS = "SELECT DISTINCT * { ?a ?b ?c . ?d ?e ?f }"
-REQUEST = {"default_graphs": (), "named_graphs": (), "base": "http://e/sparql", "accept": "text/csv", "at_once": False}
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +148,7 @@ async def pool(graph: Path, limits: Limits, size: int = 1) -> AsyncIterator[Pool
 
 async def read(workers: Pool, query: str) -> bytes:
     async with workers.worker("here") as worker:
-        await worker.ask({**REQUEST, "text": query})
+        await worker.ask(Operation("query", query), "http://e/sparql", "text/csv", False)
         return b"".join([piece async for piece in worker.pieces()])
 
 

@@ -94,10 +94,9 @@ def test_one_that_is_gone_is_told_without_its_address(tmp_path: Path, capfd: pyt
         worker = await Worker.start(place, Limits())
         keeper.stop()
         told = []
-        asked = {"text": "ASK {}", "default_graphs": [], "named_graphs": [], "base": "http://e/", "accept": ""}
         clear = Operation("update", "CLEAR ALL")
         update = Updates(place, TOKEN, Limits()).do(clear, "http://e/", f"Bearer {TOKEN}", "me")
-        for asking in (worker.ask({**asked, "at_once": False}), update):
+        for asking in (worker.ask(Operation("query", "ASK {}"), "http://e/", "", False), update):
             with pytest.raises(Refusal) as refusal:
                 await asking
             told.append(refusal.value)

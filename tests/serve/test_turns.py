@@ -11,7 +11,7 @@ import pytest
 
 from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.shares import Displaced
 from irtwin.serve.turns import Turns
 
@@ -107,14 +107,12 @@ def test_no_client_holds_more_than_its_share() -> None:
 
 @pytest.mark.slow
 def test_a_small_query_does_not_wait_for_all_of_another_client(new_graph: Callable[[], Path]) -> None:
-    request = {"default_graphs": (), "named_graphs": (), "base": "http://e/", "accept": "text/csv", "at_once": False}
-
     async def run() -> None:
         pool, done = Pool(Location(new_graph().parent), 1, Limits()), Served()
 
         async def ask(client: str, number: int) -> None:
             async with pool.worker(client) as worker:
-                await worker.ask({**request, "text": "ASK {}"})
+                await worker.ask(Operation("query", "ASK {}"), "http://e/", "text/csv", False)
                 assert [piece async for piece in worker.pieces()] == [b"true"]
             done.append(f"{client} {number}")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 
 from pyoxigraph import Literal, QueryBoolean, QueryResultsFormat, parse_query_results
 from starlette.requests import Request
@@ -13,8 +12,8 @@ from starlette.requests import Request
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.table import to_python
 from irtwin.report.questions import Answer, Answers, PageQuestion, Row
-from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.pool import AnswerHead, Limits, Pool, Worker, begun
+from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
@@ -23,7 +22,6 @@ Bindings = Mapping[str, str | Literal]
 
 _JSON = "application/sparql-results+json"
 _MOST = 32 << 20  # bytes of one answer: a page of more is of no use to anybody
-_TRIES = 3  # workers that may be lost before they begin
 
 
 class Asking:
@@ -70,10 +68,7 @@ class Asking:
         return answers
 
     async def _all(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
-        for _ in range(_TRIES):
-            with suppress(NotBegun):
-                return await self._of_one_worker(client, asked)
-        raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
+        return await begun(lambda: self._of_one_worker(client, asked))
 
     async def _of_one_worker(self, client: str, asked: list[tuple[str, str]]) -> list[tuple[AnswerHead, bytes]]:
         async with self._pool.worker(client) as worker:
@@ -88,8 +83,7 @@ class Asking:
                 ) from None
 
     async def _body(self, worker: Worker, text: str, accept: str) -> tuple[AnswerHead, bytes]:
-        about = {"text": text, "default_graphs": (), "named_graphs": (), "base": self.base, "accept": accept}
-        head = await worker.ask({**about, "at_once": self._updates.just_now})
+        head = await worker.ask(Operation("query", text), self.base, accept, self._updates.just_now)
         body = bytearray()
         async for piece in worker.pieces():
             body += piece

@@ -2,57 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from pyoxigraph import BlankNode, NamedNode, RdfFormat, Triple, serialize
+from pyoxigraph import NamedNode, RdfFormat, parse, serialize
 from starlette.responses import Response
 
-from irtwin.knowledge.vocabulary import RDF
 from irtwin.serve import negotiation
-from irtwin.serve.protocol import Refusal
 
-SD = "http://www.w3.org/ns/sparql-service-description#"
-_FORMATS = "http://www.w3.org/ns/formats/"
 NAMED_GRAPHS = "SELECT ?graph WHERE { GRAPH ?graph { } } ORDER BY ?graph"
-_RESULT_FORMATS = (
-    "SPARQL_Results_JSON", "SPARQL_Results_XML", "SPARQL_Results_CSV", "SPARQL_Results_TSV",
-    "Turtle", "N-Triples", "RDF_XML", "JSON-LD",
-)  # fmt: skip
-_RDF = {form.name: form for form in (RdfFormat.TURTLE, RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
+_PREFIXES = {"sd": "http://www.w3.org/ns/sparql-service-description#", "formats": "http://www.w3.org/ns/formats/"}
+_SERVICE = """
+[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature sd:UnionDefaultGraph ;
+  sd:resultFormat formats:SPARQL_Results_JSON, formats:SPARQL_Results_XML, formats:SPARQL_Results_CSV,
+    formats:SPARQL_Results_TSV, formats:Turtle, formats:N-Triples, formats:RDF_XML, formats:JSON-LD ;
+  sd:defaultDataset [ a sd:Dataset ; sd:defaultGraph [ a sd:Graph ] %s ] .
+"""
 
 
 def response(accept: str, address: str, graphs: Sequence[str], updates: bool) -> Response:
     """Describe the service at `address` with its named graphs, in the form that the client prefers."""
-    media_type = negotiation.best(accept, negotiation.TRIPLES)
-    if media_type is None:
-        raise Refusal(406, f"the description comes as {', '.join(negotiation.TRIPLES)}; none of them is in Accept")
-    body = serialize(
-        _triples(address, graphs, updates), format=_RDF[negotiation.TRIPLES[media_type]], prefixes={"sd": SD}
-    )
+    media_type = negotiation.chosen(accept, negotiation.TRIPLES, "the description")
+    languages = "sd:SPARQL11Query, sd:SPARQL11Update" if updates else "sd:SPARQL11Query"
+    named = "".join(f"; sd:namedGraph [ a sd:NamedGraph ; sd:name {NamedNode(graph)} ]" for graph in graphs)
+    prefixes = "".join(f"@prefix {name}: <{iri}> . " for name, iri in _PREFIXES.items())
+    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, named), RdfFormat.TURTLE)
+    form = RdfFormat.from_media_type(media_type)
+    body = serialize((quad.triple for quad in quads), format=form, prefixes=_PREFIXES)
     return Response(body, media_type=media_type, headers={"Vary": "Accept"})
-
-
-def _triples(address: str, graphs: Sequence[str], updates: bool) -> Iterator[Triple]:
-    service, dataset, default = BlankNode("service"), BlankNode("dataset"), BlankNode("default")
-    kind = NamedNode(f"{RDF}type")
-    yield Triple(service, kind, _sd("Service"))
-    yield Triple(service, _sd("endpoint"), NamedNode(address))
-    yield Triple(service, _sd("supportedLanguage"), _sd("SPARQL11Query"))
-    if updates:
-        yield Triple(service, _sd("supportedLanguage"), _sd("SPARQL11Update"))
-    yield Triple(service, _sd("feature"), _sd("UnionDefaultGraph"))
-    for name in _RESULT_FORMATS:
-        yield Triple(service, _sd("resultFormat"), NamedNode(_FORMATS + name))
-    yield Triple(service, _sd("defaultDataset"), dataset)
-    yield Triple(dataset, kind, _sd("Dataset"))
-    yield Triple(dataset, _sd("defaultGraph"), default)
-    yield Triple(default, kind, _sd("Graph"))
-    for number, graph in enumerate(graphs):
-        named = BlankNode(f"graph{number}")
-        yield Triple(dataset, _sd("namedGraph"), named)
-        yield Triple(named, kind, _sd("NamedGraph"))
-        yield Triple(named, _sd("name"), NamedNode(graph))
-
-
-def _sd(name: str) -> NamedNode:
-    return NamedNode(SD + name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
@@ -15,7 +15,7 @@ from irtwin.serve import description, graph_store, negotiation, page
 from irtwin.serve.answer import Replies, Reply
 from irtwin.serve.asking import Asking
 from irtwin.serve.body import read_body
-from irtwin.serve.pool import AnswerHead, Limits, NotBegun, Pool, Worker
+from irtwin.serve.pool import AnswerHead, Limits, Pool, Worker, begun
 from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
 from irtwin.serve.standing import note
@@ -24,7 +24,6 @@ from irtwin.serve.updates import Updates
 _METHODS = "GET, HEAD, POST, OPTIONS"
 _METHODS_OF_GRAPH = "GET, HEAD, PUT, POST, DELETE, OPTIONS"
 _ROOM = 4  # largest answers that may wait for their clients
-_TRIES = 3  # workers that may be lost before a query begins
 _log = logging.getLogger(__name__)
 
 
@@ -92,7 +91,7 @@ class Endpoint:
     async def _respond(self, operation: Operation | None, request: Request, send: Send) -> None:
         try:
             if operation is not None and operation.kind == "query":
-                return await self._query(operation, request, send)
+                return await begun(lambda: self._stream(operation, request, send))
             response = await self._describe(request) if operation is None else await self._update(operation, request)
         except Refusal as refusal:
             response = refused(refusal)
@@ -111,19 +110,12 @@ class Endpoint:
         await self._updates.do(operation, _address(request), headers.get("authorization", ""), headers.get("from", ""))
         return Response(status_code=204)
 
-    async def _query(self, operation: Operation, request: Request, send: Send) -> None:
-        for _ in range(_TRIES):
-            with suppress(NotBegun):
-                return await self._stream(operation, request, send)
-        raise Refusal(503, "the graph cannot be read just now: try again later", {"Retry-After": "2"})
-
     async def _stream(self, operation: Operation, request: Request, send: Send) -> None:
         """Take the answer off the worker as fast as it makes it; the client may take its time."""
         with self._answers.new() as answer, ExitStack() as held:
             async with self._pool.worker(client(request)) as worker:
                 deadline = time.monotonic() + self._limits.seconds  # what it waited for a worker is not its own time
-                accept = request.headers.get("accept", "")
-                head = await self._ask(worker, operation, request, accept, deadline)
+                head = await self._ask(worker, operation, request, deadline)
                 sending = asyncio.create_task(_send(answer, head, request, send))
                 held.callback(sending.cancel)
                 try:
@@ -140,21 +132,12 @@ class Endpoint:
                     answer.break_off()
             await sending
 
-    async def _ask(
-        self, worker: Worker, operation: Operation, request: Request, accept: str, deadline: float
-    ) -> AnswerHead:
+    async def _ask(self, worker: Worker, operation: Operation, request: Request, deadline: float) -> AnswerHead:
         """Ask a worker; return what is known of the answer."""
-        asked = {
-            "text": operation.text,
-            "default_graphs": operation.default_graphs,
-            "named_graphs": operation.named_graphs,
-            "base": _address(request),
-            "accept": accept,
-            "at_once": self._updates.just_now,
-        }
+        accept = request.headers.get("accept", "")
         try:
             async with asyncio.timeout_at(deadline):
-                head = await worker.ask(asked)
+                head = await worker.ask(operation, _address(request), accept, self._updates.just_now)
         except TimeoutError:
             seconds = self._limits.seconds
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None

@@ -1,4 +1,4 @@
-"""What every response says to browsers, and which names the server answers to."""
+"""What every response says in its headers, and which names the server answers to."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from starlette.datastructures import MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from irtwin.serve.standing import HEADER, noted
 
 _LOCAL = {"localhost", "127.0.0.1", "[::1]"}
 _HEADERS = {
@@ -18,10 +20,10 @@ _HEADERS = {
 
 
 class Guard:
-    """Adds security headers, and refuses what pages of other sites ask, of which they could not read the answer.
+    """Adds security headers, and how the graph stands; refuses what pages of other sites ask.
 
-    Those of `origins` may ask the endpoint, and read its answers. With `local`, it answers only to this machine's own
-    names.
+    Those could not read the answer; pages of `origins` may ask the endpoint, and read its answers. With `local`, it
+    answers only to this machine's own names.
 
     A page from elsewhere can have its own name resolve to 127.0.0.1 and then read what is served there as if it were
     its own (DNS rebinding): such a request carries that name in Host.
@@ -46,6 +48,8 @@ class Guard:
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
+                if (standing := noted(request)) is not None:
+                    headers[HEADER] = standing
                 if is_welcome:
                     headers["Access-Control-Allow-Origin"] = origin
                     headers["Access-Control-Allow-Headers"] = "Accept, Content-Type"  # no token: pages only ask

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-SOLUTIONS = {
-    "application/sparql-results+json": "JSON",
-    "application/sparql-results+xml": "XML",
-    "text/csv": "CSV",
-    "text/tab-separated-values": "TSV",
-    "application/json": "JSON",
-    "application/xml": "XML",
-}
-TRIPLES = {
-    "text/turtle": "Turtle",
-    "application/n-triples": "N-Triples",
-    "application/rdf+xml": "RDF/XML",
-    "application/ld+json": "JSON-LD",
-    "application/xml": "RDF/XML",
-    "application/json": "JSON-LD",
-}
+from irtwin.serve.protocol import Refusal
+
+SOLUTIONS = (
+    "application/sparql-results+json", "application/sparql-results+xml", "text/csv", "text/tab-separated-values",
+    "application/json", "application/xml",
+)  # fmt: skip
+TRIPLES = (
+    "text/turtle", "application/n-triples", "application/rdf+xml", "application/ld+json", "application/xml",
+    "application/json",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,7 +33,7 @@ class _Range:
         return 1 if (self.kind, self.subtype) == ("*", "*") else 0
 
 
-def best(accept: str, offered: Sequence[str] | Mapping[str, str]) -> str | None:
+def best(accept: str, offered: Sequence[str]) -> str | None:
     """Return the media type on offer that an Accept header prefers, the first of equals; None where none will do.
 
     An empty header takes anything. The quality of a type is that of the range that names it most closely.
@@ -49,6 +43,14 @@ def best(accept: str, offered: Sequence[str] | Mapping[str, str]) -> str | None:
         return next(iter(offered))
     choice = max(offered, key=lambda media_type: _quality(media_type, ranges), default=None)
     return choice if choice is not None and _quality(choice, ranges) > 0 else None
+
+
+def chosen(accept: str, offered: Sequence[str], what: str) -> str:
+    """Return the media type that an Accept header prefers of what is `offered`. Raises Refusal where none will do."""
+    media_type = best(accept, offered)
+    if media_type is None:
+        raise Refusal(406, f"{what} comes as {', '.join(offered)}; none of them is in Accept")
+    return media_type
 
 
 def wants_page(accept: str) -> bool:

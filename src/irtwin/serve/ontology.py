@@ -14,11 +14,9 @@ from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
 from irtwin.resources import Resources, folder
 from irtwin.serve import negotiation
-from irtwin.serve.protocol import Refusal
 
 # The page carries its style and script, and a policy of its own for them.
 _PAGE_HEADERS = {"Vary": "Accept", "Content-Security-Policy": "frame-ancestors 'none'"}
-_FORMATS = {form.name: form for form in (RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
 
 
 def paths() -> list[str]:
@@ -35,10 +33,8 @@ def module(request: Request, known: Resources) -> Response:
     accept = request.headers.get("accept", "")
     if negotiation.wants_page(accept):
         return Response(_documentation(known), media_type="text/html", headers=_PAGE_HEADERS)
-    media_type = negotiation.best(accept, negotiation.TRIPLES)
-    if media_type is None:
-        raise Refusal(406, f"the ontology comes as {', '.join(negotiation.TRIPLES)}; none of them is in Accept")
-    return Response(_written(file, negotiation.TRIPLES[media_type]), media_type=media_type, headers={"Vary": "Accept"})
+    media_type = negotiation.chosen(accept, negotiation.TRIPLES, "the ontology")
+    return Response(_written(file, media_type), media_type=media_type, headers={"Vary": "Accept"})
 
 
 def questions(known: Resources, request: Request) -> Response:
@@ -80,11 +76,12 @@ def _path(triple: Triple) -> str | None:
 
 
 @cache
-def _written(file: Path, name: str) -> bytes:
+def _written(file: Path, media_type: str) -> bytes:
     """Return a module as it is written, comments and all, or in another form."""
-    if name == "Turtle":
+    form = RdfFormat.from_media_type(media_type)
+    if form == RdfFormat.TURTLE:
         return file.read_bytes()
     triples = (quad.triple for quad in parse(path=str(file), format=RdfFormat.TURTLE))
-    written = serialize(triples, format=_FORMATS[name], prefixes=PREFIXES)
+    written = serialize(triples, format=form, prefixes=PREFIXES)
     assert written is not None
     return written

@@ -8,21 +8,23 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import asdict, dataclass
+from typing import Any, TypeVar
 
 from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.knowledge.store.readable import NOT_READABLE
 from irtwin.location import Location
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.shares import Displaced
 from irtwin.serve.turns import Turns
 from irtwin.serve.worker import FRAME
 
 _log = logging.getLogger(__name__)
 _RETRY_AFTER = {"Retry-After": "2"}  # s
+_TRIES = 3  # workers that may be lost before they begin
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,14 @@ class AnswerHead:
 
 class NotBegun(Exception):
     """A worker that was lost before it began with a query: another one may take it."""
+
+
+async def begun(ask: Callable[[], Awaitable[T]]) -> T:
+    """Ask, and once more where a worker was lost before it began. Raises Refusal where that goes on."""
+    for _ in range(_TRIES):
+        with suppress(NotBegun):
+            return await ask()
+    raise Refusal(503, "the graph cannot be read just now: try again later", _RETRY_AFTER)
 
 
 class Worker:
@@ -87,10 +97,13 @@ class Worker:
         """Whether the process is there."""
         return self._process.returncode is None
 
-    async def ask(self, request: dict[str, Any]) -> AnswerHead:
-        """Send a query; return the head of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun."""
+    async def ask(self, query: Operation, base: str, accept: str, at_once: bool) -> AnswerHead:
+        """Send a query; return the head of the answer, whose bytes `pieces` gives. Raises Refusal, NotBegun.
+
+        Relative IRIs are below `base`; `at_once`: of the graph as it is now, not half a second ago.
+        """
         self.idle = False
-        self._write(request)
+        self._write({**asdict(query), "base": base, "accept": accept, "at_once": at_once})
         try:
             kind, data = await self._frame()
         except Refusal:

@@ -42,7 +42,6 @@ from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.source import reading
-from irtwin.serve.standing import Standing
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
 from irtwin.storage.tariff import read_tariff
@@ -218,7 +217,6 @@ def application(
         middleware=[
             Middleware(Guard, local=_is_loopback(host), origins=frozenset(origins)),
             Middleware(GZipMiddleware, minimum_size=_SMALL, compresslevel=5),
-            Middleware(Standing),
         ],
         exception_handlers={Refusal: _refused},
         lifespan=lifespan,

@@ -118,27 +118,14 @@ def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) ->
 
 def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
     answer = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
-    offered = negotiation.SOLUTIONS if isinstance(answer, QuerySolutions | QueryBoolean) else negotiation.TRIPLES
-    media_type = negotiation.best(request["accept"], offered)
-    if media_type is None:
-        raise Refusal(406, f"this answer comes as {', '.join(offered)}; none of them is in Accept")
-    sink.media_type = media_type
-    name = offered[media_type]
-    file = cast(IO[bytes], sink)
+    file, accept = cast(IO[bytes], sink), request["accept"]
     if isinstance(answer, QuerySolutions | QueryBoolean):
-        answer.serialize(file, format=_RESULTS[name])
+        sink.media_type = negotiation.chosen(accept, negotiation.SOLUTIONS, "this answer")
+        answer.serialize(file, format=QueryResultsFormat.from_media_type(sink.media_type))
     else:
-        serialize(answer, file, format=_RDF[name], prefixes=graph.prefixes)
+        sink.media_type = negotiation.chosen(accept, negotiation.TRIPLES, "this answer")
+        serialize(answer, file, format=RdfFormat.from_media_type(sink.media_type), prefixes=graph.prefixes)
     sink.end()
-
-
-_RDF = {form.name: form for form in (RdfFormat.TURTLE, RdfFormat.N_TRIPLES, RdfFormat.RDF_XML, RdfFormat.JSON_LD)}
-_RESULTS = {
-    "JSON": QueryResultsFormat.JSON,
-    "XML": QueryResultsFormat.XML,
-    "CSV": QueryResultsFormat.CSV,
-    "TSV": QueryResultsFormat.TSV,
-}
 
 
 def _refuse(out: IO[bytes], error: Exception) -> None:
