@@ -113,8 +113,6 @@ def live(
     Example: irtwin live --opcua opc.tcp://192.168.0.30:4840 --robot KR6
     """
     from irtwin.live.watch import watch
-    from irtwin.report.extensions import check
-    from irtwin.resources import resources_of
     from irtwin.workflow import catch_up
 
     of_one = {"replay": replay, "rtde": rtde, "opcua": opcua}
@@ -129,8 +127,7 @@ def live(
         raise click.UsageError("--nodes is for --opcua.")
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --robot; lines of a stream say it by themselves.")
-    check(resources_of(location.folder))
-    catch_up(location, say)  # while it watches, nobody else can
+    catch_up(location, say)  # while it watches, nobody else can; a fault in what extends the workspace is said here
     watch(
         location,
         port=port,

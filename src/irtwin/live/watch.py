@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Protocol
 
 from irtwin.errors import InputError
-from irtwin.knowledge.extensions import check, check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
@@ -71,8 +70,6 @@ def watch(
     With `rtde`: what the controller there says of the robot of this name, until a signal comes; with `opcua`, what the
     OPC UA server there says, by a file of `nodes` where one is given.
     With `performs`: the first run of that robot carries out the plan of this name.
-
-    Raises InputError for a fault in what extends the workspace, before a sample is read.
     """
     sys.setswitchinterval(SWITCH)
     refusals = RefusedLines(announce)
@@ -84,7 +81,7 @@ def watch(
         told_when_full(location.folder),
         Workspace.existing(location) as place,
         _alone(place),
-        KnowledgeGraph.of_workspace(_checked(place)) as graph,
+        KnowledgeGraph.of_workspace(place) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
         LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replayed is None else REPLAYED_RUN) as twin,
     ):
@@ -114,13 +111,6 @@ def watch(
 def _alone(place: Workspace) -> AbstractContextManager[None]:
     """Keep others from a server's graph, as the lock of a folder's store does by itself."""
     return nullcontext() if place.location.graph_url is None else rewriting_alone(place.engine, place.folder)
-
-
-def _checked(place: Workspace) -> Workspace:
-    """Look through what extends the workspace: a fault is said now, not when a run ends."""
-    check(place.resources)
-    check_mappings(place.resources, place.engine)
-    return place
 
 
 def _read(
