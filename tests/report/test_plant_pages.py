@@ -48,7 +48,7 @@ def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> No
     assert found.electrical_j == 5900.0
     assert found.cost == pytest.approx(5900 / 3.6e6 * 0.2)
     assert found.co2_kg == pytest.approx(5900 / 3.6e6 * 0.4)
-    assert [(of.name, [bar.energy_j for bar in trend.bars]) for of, trend in found.trends] == [
+    assert [(of.name, [bar.energy_j for bar in trend]) for of, trend in found.trends] == [
         ("measured", [3500.0, 1600.0, 800.0]), ("mechanical", [400.0, 440.0])
     ]  # fmt: skip
 
@@ -228,9 +228,9 @@ def test_one_day_is_no_trend_and_negative_energy_no_bar() -> None:
     assert days({"2026-03-02": 5.0}, 30) is None
     trend = days({"2026-03-02": -5.0, "2026-03-03": 10.0, "2026-03-01": 5.0}, 2)
     assert trend is not None
-    assert [(bar.day, bar.height) for bar in trend.bars] == [("2026-03-02", 0.0), ("2026-03-03", 1.0)]
+    assert [(bar.day, bar.height) for bar in trend] == [("2026-03-02", 0.0), ("2026-03-03", 1.0)]
     nothing = days({"2026-03-02": 0.0, "2026-03-03": 0.0}, 2)
-    assert nothing is not None and {bar.height for bar in nothing.bars} == {0.0}
+    assert nothing is not None and {bar.height for bar in nothing} == {0.0}
 
 
 def test_what_data_do_not_part_is_one_entry_with_a_range_of_each_part(graph: KnowledgeGraph) -> None:

@@ -47,16 +47,8 @@ class Bar:
     height: float
 
 
-@dataclass(frozen=True)
-class Days:
-    """Energy by day, oldest first, drawn as bars."""
-
-    bars: tuple[Bar, ...]
-
-    @property
-    def greatest(self) -> Bar:
-        """The day with the most energy."""
-        return max(self.bars, key=lambda bar: bar.energy_j)
+Days = tuple[Bar, ...]
+"""Energy by day, oldest first, drawn as bars."""
 
 
 def kind(name: str | None) -> EnergyKind:
@@ -75,7 +67,7 @@ def days(energies: Mapping[str, float], most: int) -> Days | None:
     if len(newest) < 2:
         return None
     greatest = max(energy for _, energy in newest)
-    return Days(tuple(Bar(day, energy, max(energy, 0.0) / greatest if greatest > 0 else 0.0) for day, energy in newest))
+    return tuple(Bar(day, energy, max(energy, 0.0) / greatest if greatest > 0 else 0.0) for day, energy in newest)
 
 
 def by_day(rows: Iterable[Row]) -> dict[tuple[str, str], dict[str, float]]:
