@@ -167,7 +167,7 @@ def test_a_full_disk_ends_what_follows_an_arm_and_is_no_lost_connection() -> Non
             raise OSError(errno.ENOSPC, "No space left on device")
 
         with pytest.raises(OSError, match="No space left"):
-            watch._follow(followed, full, lambda: None, print, threading.Event(), said.append)
+            watch._receive(followed.states(threading.Event(), said.append), full, print, lambda: None)
     assert not any("lost" in line for line in said)
 
 

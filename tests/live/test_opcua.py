@@ -48,7 +48,11 @@ class Followed:
         self._thread.start()
 
     def _follow(self) -> None:
-        self.client.follow(self.states.append, lambda it: self.refused.append(str(it)), self._done, self.said.append)
+        for it in self.client.states(self._done, self.said.append):
+            if isinstance(it, InputError):
+                self.refused.append(str(it))
+            else:
+                self.states.append(it)
 
     def until(self, enough: Any) -> None:
         ends = time.monotonic() + 20.0

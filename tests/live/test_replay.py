@@ -25,9 +25,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def played(replay: Replay, after: float = 0.0, ahead: float = 3600.0) -> list[State]:
-    states: list[State] = []
-    replay.play(states.append, threading.Event(), replay.start(after=after, ahead=ahead))
-    return states
+    return list(replay.play(threading.Event(), replay.start(after=after, ahead=ahead)))
 
 
 def test_all_states_come_in_order_with_the_logs_own_pauses(log: Path) -> None:
@@ -54,13 +52,10 @@ def test_a_speed_that_runs_too_far_ahead_of_the_clock_is_refused(log: Path) -> N
 
 def test_it_stops_when_told(log: Path) -> None:
     done = threading.Event()
-    states: list[State] = []
-
-    def take(state: State) -> None:
+    states = []
+    for state in Replay(log, ROBOT, "arm", speed=0.01).play(done, time.time()):
         states.append(state)
         done.set()
-
-    Replay(log, ROBOT, "arm", speed=0.01).play(take, done, time.time())
     assert len(states) == 1
 
 

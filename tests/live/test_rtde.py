@@ -42,14 +42,15 @@ class Follower:
     def follow(self, client: Rtde) -> None:
         ends = threading.Timer(20.0, self.done.set)
         ends.start()
-        client.follow(self._take, lambda error: self.refused.append(str(error)), self.done, self.said.append)
+        for state in client.states(self.done, self.said.append):
+            if isinstance(state, InputError):
+                self.refused.append(str(state))
+            else:
+                self.states.append(state)
+            if len(self.states) >= self._count:
+                self.done.set()
         ends.cancel()
         assert len(self.states) >= self._count, self.said
-
-    def _take(self, state: State) -> None:
-        self.states.append(state)
-        if len(self.states) >= self._count:
-            self.done.set()
 
 
 def followed(controller: Controller, count: int, *, constants: bool = True) -> tuple[Follower, Rtde]:
@@ -206,7 +207,7 @@ def test_who_follows_a_silent_controller_can_stop(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(rtde, "_PATIENCE", 60.0)
     with serving(Controller(quiet=5)) as port:
         client, done = Rtde(f"127.0.0.1:{port}", robot(), "arm"), threading.Event()
-        following = threading.Thread(target=client.follow, args=(lambda state: None, lambda reason: None, done))
+        following = threading.Thread(target=lambda: list(client.states(done, print)))
         following.start()
         done.set()
         following.join(10)

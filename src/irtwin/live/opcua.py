@@ -9,7 +9,7 @@ certificate = "irtwin.der"              # ours, and its key: signed and encrypte
 key = "irtwin.pem"
 server_certificate = "robot.der"        # what the server has to show; without it, whatever it shows
 
-All keys are optional. Values are read, all at once, so often as `rate` says: subscriptions leave a robot that stands
+All keys are optional. Values are read all at once: subscriptions leave a robot that stands
 without a sample, and many servers sample them slower than they are read.
 """
 
@@ -22,7 +22,7 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
+from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import STREAMED, State, state_of
 from irtwin.robot.description import Robot
 from irtwin.signals.toml_file import TomlTable, shown
@@ -50,7 +51,7 @@ _UNECE |= {"MTS": "m/s", "C16": "mm/s", "WTT": "W", "KWT": "kW", "CEL": "degC"}
 _FIELDS = {str(channel.streamed): field for field, channel in STREAMED.items()}
 _TEXTS = ("device", "user", "certificate", "key", "server_certificate")
 _PATIENCE = 5.0  # s for an answer
-_AGAIN = 1.0  # s until the next try to connect
+_RATE = 100.0  # samples a second that are read
 _STANDS = 0.5  # s after which a state comes though no position has a new time: the robot stands
 _HUNG = 2.0  # s, or five times its usual pause, after which a node that says a new time at rest, too, hangs
 _AT_REST = 20  # values that came again with a new time: the server says when it looked, not when they changed
@@ -97,61 +98,46 @@ class _NodeTimes:
         return self._at_rest[node] >= _AT_REST and now - at > max(_HUNG, 5.0 * usual)
 
 
-class OpcUa:
+class OpcUa(Controller):
     """A server of a robot; `what` says which values come."""
 
-    def __init__(
-        self, address: str, robot: Robot, robot_id: str, file: Path | None = None, rate: float = 100.0
-    ) -> None:
-        """Connect to opc.tcp://HOST:PORT, and find what is to be read, `rate` times a second.
+    lost = (*_LOST, InputError)
+
+    def __init__(self, address: str, robot: Robot, robot_id: str, file: Path | None = None) -> None:
+        """Connect to opc.tcp://HOST:PORT, and find what is to be read.
 
         Raises InputError where no such server answers, or a node is not there, or the file says what is none.
         """
         if not address.startswith("opc.tcp://"):
             raise InputError(f'--opcua "{address[:100]}": give opc.tcp://HOST:PORT')
-        self.address, self._robot, self.robot_id, self._rate = address, robot, robot_id, rate
+        self.address, self._robot, self.robot_id = address, robot, robot_id
         self._said = _read_file(file, len(robot.joints))
         self._stamp = self._newest = self._told = -math.inf
         self._times = _NodeTimes()
         try:
-            self.what = asyncio.run(self._described())
+            self.connect()
         except (*_LOST, ValueError) as error:
             raise InputError(
-                f"{address}: cannot be read by OPC UA ({_reason(error)}); check address, user and certificates"
+                f"{address}: cannot be read by OPC UA ({self.reason(error)}); check address, user and certificates"
             ) from error
 
-    def follow(
-        self,
-        take: Callable[[State], None],
-        refuse: Callable[[InputError], None],
-        done: threading.Event,
-        announce: Callable[[str], None] = lambda line: None,
-    ) -> None:
-        """Give each state on until `done`; one that says none, or is not taken, is refused by its error.
+    def connect(self) -> None:
+        """Connect for a moment."""
+        self.what = asyncio.run(self._described())
 
-        A connection that is lost is made again, and announced.
-        """
-        while not done.is_set():
-            try:
-                asyncio.run(self._read(take, refuse, done))
-            except (*_LOST, InputError) as error:
-                announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
-            while not done.wait(_AGAIN):
-                try:
-                    asyncio.run(self._described())
-                except (*_LOST, InputError):
-                    continue
-                announce(f"{self.address}: connected again")
-                break
+    def read(self, done: threading.Event) -> Iterator[State | InputError]:
+        """Yield what the nodes say, `rate` times a second."""
+        with asyncio.Runner() as runner:
+            readings = self._readings(done)
+            while (reading := runner.run(_next(readings))) is not None:
+                yield reading
 
     async def _described(self) -> str:
         async with self._places() as (_, places):
             units = {place.key: place.unit.name for place in places}
             return ", ".join(f"{STREAMED[_FIELDS[key]].label} ({unit})" for key, unit in units.items())
 
-    async def _read(
-        self, take: Callable[[State], None], refuse: Callable[[InputError], None], done: threading.Event
-    ) -> None:
+    async def _readings(self, done: threading.Event) -> AsyncIterator[State | InputError]:
         async with self._places() as (client, places):
             clock = await client.get_node(ua.ObjectIds.Server_ServerStatus_CurrentTime).read_value()
             due = time.monotonic()
@@ -161,10 +147,10 @@ class OpcUa:
                     self._times.hear(str(place.node), value, time.monotonic())
                 try:
                     if (stamp := self._moment(places, values, clock)) is not None:
-                        take(self._state(places, values, stamp))
+                        yield self._state(places, values, stamp)
                 except InputError as error:
-                    refuse(error)
-                due = max(due + 1.0 / self._rate, time.monotonic())
+                    yield error
+                due = max(due + 1.0 / _RATE, time.monotonic())
                 await asyncio.sleep(due - time.monotonic())
 
     def _moment(self, places: list[_Place], values: list[ua.DataValue], clock: datetime) -> float | None:
@@ -258,12 +244,16 @@ class OpcUa:
             (await node.read_data_value()).StatusCode.check()
             text = self._said.get("units", {}).get(key) or await _unit_text(node)
         except ua.UaStatusCodeError as error:
-            raise InputError(f"{self.address}: {key} {node}: {_reason(error)}") from None
+            raise InputError(f"{self.address}: {key} {node}: {self.reason(error)}") from None
         unit = unit_of(text, (channel.unit_of(kind),))
         if unit is None:
             why = f'"{text}" is no unit of it' if text else "the server says no unit"
             raise InputError(f"{self.address}: {key} {node}: {why}; write units.{key} in --nodes FILE")
         return _Place(key, node, unit)
+
+
+async def _next(readings: AsyncIterator[State | InputError]) -> State | InputError | None:
+    return await anext(readings, None)
 
 
 async def _child(node: Node, *path: str) -> Node | None:
@@ -313,7 +303,3 @@ def _node_ids(file: Path, key: str, said: Any, joints: int | None) -> list[ua.No
 
 def _seconds(at: datetime) -> float:
     return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
-
-
-def _reason(error: BaseException) -> str:
-    return str(error) or type(error).__name__

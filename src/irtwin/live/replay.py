@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -50,14 +50,14 @@ class Replay:
             )
         return start
 
-    def play(self, take: Callable[[State], None], done: threading.Event, start: float) -> None:
-        """Give each state on at its time, the first at `start`, until the last, or `done`."""
+    def play(self, done: threading.Event, start: float) -> Iterator[State]:
+        """Yield each state at its time, the first at `start`, until the last, or `done`."""
         began = time.monotonic()
         for state in self.states(start):
             pause = (state.time - start) / self.speed - (time.monotonic() - began)
-            if pause > 0 and done.wait(pause):
+            if done.is_set() or (pause > 0 and done.wait(pause)):
                 return
-            take(state)
+            yield state
 
     def states(self, start: float) -> Iterator[State]:
         """Yield the states, the first at `start`, s since 1970."""

@@ -11,10 +11,11 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 
 from irtwin.errors import InputError
+from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import State, state_of
 from irtwin.robot.description import Robot
 
@@ -34,7 +35,6 @@ _IF_THERE = (
 )
 _PATIENCE = 5.0  # s for a whole package, however it comes: the controller sends some hundred a second
 _LOOK_UP = 0.5  # s of a wait until it is seen that nobody follows any more
-_AGAIN = 1.0  # s until the next try to connect
 _HEAVIEST = 1e6  # kg
 _LONGEST_UP = 1e9  # s since a controller started
 _SKIPPED = 100  # packages of other kinds before an answer
@@ -44,8 +44,10 @@ class LostError(Exception):
     """The connection broke, or what came is no RTDE."""
 
 
-class Rtde:
+class Rtde(Controller):
     """An arm's controller; `what` says which values come, and what is missing for others."""
+
+    lost = (OSError, LostError)
 
     def __init__(self, address: str, robot: Robot, robot_id: str, rate: float = 125.0) -> None:
         """Connect to HOST or HOST:PORT. Raises InputError where no controller of such an arm answers.
@@ -64,14 +66,13 @@ class Rtde:
         self._fields: dict[str, str] = {}
         self._recipe = 0
         try:
-            self._socket = self._connect()
-        except (OSError, LostError) as error:
+            self.connect()
+        except self.lost as error:
             raise InputError(
                 f"{self.address}: no controller answers by RTDE ({_reason(error)}); check address and port"
             ) from error
 
-    @property
-    def what(self) -> str:
+    def _described(self) -> str:
         """Which values come, and what is missing for others."""
         torque = "actual_current" in self._fields
         parts = ["positions", *(["speeds"] if "actual_qd" in self._fields else [])]
@@ -82,46 +83,29 @@ class Rtde:
         lacking += [] if self._has_power else ["no power: the controller does not offer it"]
         return "; ".join([", ".join(parts), *lacking])
 
-    def follow(
-        self,
-        take: Callable[[State], None],
-        refuse: Callable[[InputError], None],
-        done: threading.Event,
-        announce: Callable[[str], None] = lambda line: None,
-    ) -> None:
-        """Give each state on until `done`; one that says none, or is not taken, is refused by its error.
+    def read(self, done: threading.Event) -> Iterator[State | InputError]:
+        """Yield what comes by the connection."""
+        with closing(self._socket):
+            for values, offset in self._packages(done):
+                try:
+                    yield self._state(values, offset)
+                except InputError as error:
+                    yield error
 
-        A connection that is lost is made again, and announced.
-        """
-        while not done.is_set():
-            try:
-                with closing(self._socket):
-                    for values, offset in self._packages(done):
-                        try:
-                            take(self._state(values, offset))
-                        except InputError as error:
-                            refuse(error)
-            except (OSError, LostError) as error:
-                if done.is_set():
-                    return
-                announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
-                self._connect_again(done)
-                if not done.is_set():
-                    announce(f"{self.address}: connected again")
+    def reason(self, error: BaseException) -> str:
+        """Say in words why a connection broke."""
+        return _reason(error)
 
-    def _connect_again(self, done: threading.Event) -> None:
-        while not done.wait(_AGAIN):
-            try:
-                self._socket = self._connect()
-                return
-            except (OSError, LostError):
-                continue
+    def connect(self) -> None:
+        """Connect, agree on variables, and start the data."""
+        self._socket = self._connected()
+        self.what = self._described()
 
     @property
     def _has_power(self) -> bool:
         return {"actual_robot_voltage", "actual_robot_current"} <= self._fields.keys()
 
-    def _connect(self) -> socket.socket:
+    def _connected(self) -> socket.socket:
         """Connect, agree on version and variables, and start the data."""
         give_up = time.monotonic() + _PATIENCE  # for all of it
         connection = socket.create_connection(self._where, timeout=_PATIENCE)
@@ -236,7 +220,7 @@ def _exactly(connection: socket.socket, count: int, give_up: float, done: thread
     return bytes(parts)
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: BaseException) -> str:
     return f"no whole package within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
 
 

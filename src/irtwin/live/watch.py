@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
+from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.refusals import RefusedLines
@@ -29,25 +29,6 @@ from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 Announce = Callable[[str], None]
-
-
-class Controller(Protocol):
-    """A source that is connected to, of one robot; `what` says which values come."""
-
-    address: str
-
-    @property
-    def what(self) -> str:
-        """Which values come."""
-
-    def follow(
-        self,
-        take: Callable[[State], None],
-        refuse: Callable[[InputError], None],
-        done: threading.Event,
-        announce: Announce,
-    ) -> None:
-        """Give each state on until `done`."""
 
 
 def watch(
@@ -98,10 +79,11 @@ def watch(
         if replay is not None:
             start = replay.start(after=twin.robots.times.end(replay.robot_id), ahead=AHEAD)
             announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            replay.play(_refusing(receive, refusals.refuse), done, start)
+            _receive(replay.play(done, start), receive, refusals.refuse, twin.check)
         elif robot is not None:
             source = _controller(place, robot, rtde=rtde, opcua=opcua, nodes=nodes)
-            _follow(source, receive, twin.check, refusals.refuse, done, announce)
+            announce(f"Following {source.address}: {source.what}")
+            _receive(source.states(done, announce), receive, refusals.refuse, twin.check)
         else:
             _read(take, port, twin, done, announce)
     announce(f"{twin.stored} samples stored, {refusals.count} lines refused")
@@ -130,56 +112,26 @@ def _read(
             twin.check()
 
 
-def _follow(
-    source: Controller,
-    receive: Callable[[State], None],
-    check: Callable[[], None],
+def _receive(
+    states: Iterable[State | InputError],
+    take: Callable[[State], None],
     refuse: Callable[[InputError], None],
-    done: threading.Event,
-    announce: Announce,
+    check: Callable[[], None],
 ) -> None:
-    failures: list[BaseException] = []
-
-    def receive_or_end(state: State) -> None:
+    """Give each state on; what is none, or is not taken, is refused by its error."""
+    for state in states:
         try:
-            receive(state)
-        except InputError:
-            raise
-        except BaseException as error:  # a full disk, which the source would take for a connection that is lost
-            end(error)
-
-    def refuse_or_end(error: InputError) -> None:
-        refuse(error)
-        try:
+            if isinstance(state, InputError):
+                raise state
+            take(state)
+        except InputError as error:
+            refuse(error)
             check()  # whether it was refused as nothing can be stored any more
-        except BaseException as failure:
-            end(failure)
-
-    def end(failure: BaseException) -> None:
-        failures.append(failure)
-        done.set()
-
-    announce(f"Following {source.address}: {source.what}")
-    source.follow(receive_or_end, refuse_or_end, done, announce)
-    if failures:
-        raise failures[0]
 
 
 def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
     robot_id = find_robot(place, robot)
     return Replay(log, load_robot(place, robot_id), robot_id, speed)
-
-
-def _refusing(take: Callable[[State], None], refuse: Callable[[InputError], None]) -> Callable[[State], None]:
-    """Return what takes a state, and refuses one that cannot be taken, by its error."""
-
-    def take_or_refuse(state: State) -> None:
-        try:
-            take(state)
-        except InputError as error:
-            refuse(error)
-
-    return take_or_refuse
 
 
 def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:
