@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from irtwin.alarms.settings import asks, read_edge_nodes, read_receivers
+from irtwin.alarms.settings import asks, read_settings
 from irtwin.errors import InputError
 
 ENVIRONMENT = {
@@ -28,7 +28,7 @@ def test_webhooks_and_brokers_are_read_and_their_names_hold_no_secret(file: Path
         '[[webhook]]\nurl = "http://127.0.0.1:8000/robots"\n'
         '[[mqtt]]\nhost = "broker"\ntopic = "plant/alarms"\nuser = "me"\npassword_env = "IRTWIN_PASSWORD"\ntls = true\n'
     )
-    receivers = read_receivers(file, ENVIRONMENT)
+    receivers, _ = read_settings(file, ENVIRONMENT)
     names = ["webhook at example.com", "webhook at 127.0.0.1:8000", "MQTT broker at broker:8883"]
     assert [receiver.name for receiver in receivers] == names
     assert not any(secret in repr(receivers) for secret in ("pa55", "t0ken", "secret"))
@@ -73,8 +73,7 @@ def test_webhooks_and_brokers_are_read_and_their_names_hold_no_secret(file: Path
 def test_mistakes_are_named(file: Path, text: str, message: str) -> None:
     file.write_text(text)
     with pytest.raises(InputError, match=message) as refused:
-        read_receivers(file, ENVIRONMENT)
-        read_edge_nodes(file, ENVIRONMENT)
+        read_settings(file, ENVIRONMENT)
     assert str(refused.value).startswith(f"{file}: ")
     assert "me:pass" not in str(refused.value)
 
@@ -88,5 +87,5 @@ def test_only_receivers_that_the_user_trusts_are_told(file: Path) -> None:
     mine, theirs, broker = asks(file)
     assert mine == "alarms.toml: webhook at mine.example, with IRTWIN_HOOK_TOKEN"
     assert broker == "alarms.toml: mqtt at broker:1883, topic t"
-    assert [it.name for it in read_receivers(file, ENVIRONMENT, {mine})] == ["webhook at mine.example"]
-    assert read_receivers(file, {}, {theirs.replace("theirs", "other")}) == []  # nor is a variable looked up
+    assert [it.name for it in read_settings(file, ENVIRONMENT, {mine})[0]] == ["webhook at mine.example"]
+    assert read_settings(file, {}, {theirs.replace("theirs", "other")}) == ([], [])  # nor is a variable looked up

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -93,17 +91,12 @@ def follow(
 def told_in(workspace: Path) -> Iterator[ToldAlarms]:
     """Give what was told of a workspace's alarms. Raises InputError where another process tells them already."""
     folder = files.inside(workspace, _FOLDER)
-    with files.told_when_full(workspace):
+    with files.told_when_full(workspace), ExitStack() as held:
         folder.mkdir(exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held.enter_context(files.locked(folder))
         except BlockingIOError:
-            os.close(handle)
             raise InputError(
                 f"{workspace}: another `irtwin alarms --follow` tells its alarms; stop that first"
             ) from None
-        try:
-            yield ToldAlarms(folder / _TOLD)
-        finally:
-            os.close(handle)
+        yield ToldAlarms(folder / _TOLD)

@@ -26,9 +26,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Container, Mapping
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -53,54 +52,49 @@ _KEYS = {
 }
 
 
-def read_receivers(
+def read_settings(
     file: Path, environment: Mapping[str, str] = os.environ, may: Container[str] | None = None
-) -> list[Receiver]:
-    """Return who is to be told by a file: those that it `may` tell, by name, or all.
+) -> tuple[list[Receiver], list[Broker]]:
+    """Return who is told of alarms by a file, and the brokers that are told of robots by Sparkplug B.
 
-    Raises InputError, naming file, table and key, on all that is wrong.
+    These have GROUP/NODE as their topic. `may`: whom the file may tell, by name; all if None. Raises InputError, naming
+    file, table and key, on all that is wrong.
     """
-    return [make(table, environment) for kind, make, table in _allowed(file, may) if kind != "sparkplug"]
-
-
-def read_edge_nodes(
-    file: Path, environment: Mapping[str, str] = os.environ, may: Container[str] | None = None
-) -> list[Broker]:
-    """Return the brokers that are told of robots by Sparkplug B, each with GROUP/NODE as its topic, likewise."""
-    return [_broker(kind, table, environment) for kind, _, table in _allowed(file, may) if kind == "sparkplug"]
+    receivers: list[Receiver] = []
+    edge_nodes: list[Broker] = []
+    try:
+        for kind, table in _tables(file):
+            if may is not None and _asked(kind, table) not in may:
+                continue
+            if kind == "webhook":
+                receivers.append(_webhook(table, environment))
+            else:
+                (edge_nodes if kind == "sparkplug" else receivers).append(_broker(kind, table, environment))
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"alarms cannot be sent without the package {error.name}; pip install 'irtwin[alarms]'"
+        ) from None
+    return receivers, edge_nodes
 
 
 def asks(file: Path) -> list[str]:
-    """Return what a file asks for, by name. Raises InputError as `read_receivers`."""
-    return [_asked(kind, table) for kind, _, table in _tables(file)]
+    """Return what a file asks for, by name. Raises InputError as `read_settings`."""
+    return [_asked(kind, table) for kind, table in _tables(file)]
 
 
-_Maker = Callable[[TomlTable, Mapping[str, str]], Receiver]
-
-
-def _asked(kind: str, table: TomlTable) -> str:
-    """Return the name by which a receiver is asked for."""
-    return f"{NAME}: {_where(kind, table)}"
-
-
-def _allowed(file: Path, may: Container[str] | None) -> list[tuple[str, _Maker, TomlTable]]:
-    return [it for it in _tables(file) if may is None or _asked(it[0], it[2]) in may]
-
-
-def _tables(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
-    """Return each receiver of a file: its kind, and what makes it of which table."""
+def _tables(file: Path) -> list[tuple[str, TomlTable]]:
+    """Return the table of each receiver of a file, with its kind."""
     document = read_toml(file)
     _check(file, "", document, tuple(_KEYS))
-    asked: list[tuple[str, _Maker, TomlTable]] = []
-    makers: Mapping[str, _Maker] = {"webhook": _webhook, **{kind: partial(_broker, kind) for kind in _PLACES}}
-    for kind, make in makers.items():
+    asked = []
+    for kind, keys in _KEYS.items():
         tables = document.get(kind, [])
         if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
             raise InputError(f"{file}: {kind} should be tables; write [[{kind}]] above its keys")
         for number, values in enumerate(tables, start=1):
             table = TomlTable(file, f"{kind} {number}:", values)
-            _check(file, table.name, values, _KEYS[kind])
-            asked.append((kind, make, table))
+            _check(file, table.name, values, keys)
+            asked.append((kind, table))
     if not asked:
         raise InputError(
             f"{file}: names nobody; write [[webhook]] with url, [[mqtt]] with host and topic, or "
@@ -109,12 +103,14 @@ def _tables(file: Path) -> list[tuple[str, _Maker, TomlTable]]:
     return asked
 
 
-def _where(kind: str, table: TomlTable) -> str:
-    """Say where the messages of a table go, and which variables with them; paths of webhooks are often secrets."""
-    url = table.text("url")
-    place = _host(table, url) if kind == "webhook" else _port(kind, table)
+def _asked(kind: str, table: TomlTable) -> str:
+    """Return the name by which a receiver is asked for: where its messages go, and which variables with them.
+
+    Of a webhook's URL it says the host alone: its path is often a secret.
+    """
+    place = _host(table, table.text("url")) if kind == "webhook" else _port(kind, table)
     variables = [name for key in ("url_env", "token_env", "password_env") if (name := table.text(key)) is not None]
-    return f"{kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
+    return f"{NAME}: {kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
 
 
 def _port(kind: str, table: TomlTable) -> str:
@@ -136,10 +132,8 @@ def _webhook(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
     url = given[0] or given[1] or ""
     _check_url(table, url)
     token, timeout = _secret(table, "token_env", environment), _timeout(table)
-    try:
-        from irtwin.alarms.webhook import Webhook
-    except ModuleNotFoundError as error:
-        raise _missing(error) from None
+    from irtwin.alarms.webhook import Webhook  # an extra
+
     return Webhook(url, token, timeout)
 
 
@@ -159,10 +153,8 @@ def _broker(kind: str, table: TomlTable, environment: Mapping[str, str]) -> Brok
     if password is not None and user is None:
         raise InputError(f"{table.file}: {table.name} password_env goes with user")
     timeout = _timeout(table)
-    try:
-        from irtwin.alarms.mqtt import Broker
-    except ModuleNotFoundError as error:
-        raise _missing(error) from None
+    from irtwin.alarms.mqtt import Broker  # an extra
+
     return Broker(host, port, topic, user, password, tls, timeout)
 
 
@@ -215,7 +207,3 @@ def _check(file: Path, name: str, values: Mapping[str, Any], known: tuple[str, .
             near = get_close_matches(key, known, 1)
             hint = f"did you mean {near[0]}?" if near else f"it may have {', '.join(known)}"
             raise InputError(f"{file}: {f'{name} {shown(key)[1:-1]}'.strip()} is not known; {hint}")
-
-
-def _missing(error: ModuleNotFoundError) -> InputError:
-    return InputError(f"alarms cannot be sent without the package {error.name}; pip install 'irtwin[alarms]'")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
 from irtwin.alarms.delivery import Delivery, Receiver
 from irtwin.alarms.follow import follow, told_in
-from irtwin.alarms.settings import NAME, asks, read_edge_nodes, read_receivers
+from irtwin.alarms.settings import NAME, asks, read_settings
 from irtwin.asking import checked, open_graph
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.table import AnswerTable
@@ -47,7 +47,7 @@ def tell(
     workspace, done = location.folder, threading.Event()
     alarms = _alarms(location, robot)  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
-    receivers, brokers = _named(config, None) if config is not None else _of_workspace(workspace, announce)
+    receivers, brokers = read_settings(config) if config is not None else _of_workspace(workspace, announce)
     with told_in(workspace) as told:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: done.set())
@@ -75,10 +75,6 @@ def _edge_nodes(brokers: Sequence[Broker], announce: Callable[[str], None]) -> l
     return [EdgeNode(broker, announce) for broker in brokers]
 
 
-def _named(file: Path, may: frozenset[str] | None) -> tuple[list[Receiver], list[Broker]]:
-    return read_receivers(file, may=may), read_edge_nodes(file, may=may)
-
-
 def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Receiver], list[Broker]]:
     """Return whom the workspace's own file may tell; say whom it would tell, too."""
     file = inside(workspace, NAME)
@@ -88,7 +84,7 @@ def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[lis
     for asked in asks(file):
         if asked not in may:
             announce(f"{workspace}: not told: {asked.removeprefix(f'{NAME}: ')}; {how(workspace)}")
-    return _named(file, may)
+    return read_settings(file, may=may)
 
 
 def _alarms(location: Location, robot: str | None, nodes: Sequence[EdgeNode] = ()) -> list[Alarm]:

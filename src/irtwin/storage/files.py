@@ -61,7 +61,7 @@ def folder_in_use(parent: Path, prefix: str) -> Iterator[Path]:
     with (
         told_when_full(parent),
         tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name,
-        _locked(Path(name), fcntl.LOCK_EX),
+        locked(Path(name), fcntl.LOCK_EX),
     ):
         yield Path(name)
 
@@ -69,13 +69,13 @@ def folder_in_use(parent: Path, prefix: str) -> Iterator[Path]:
 def remove_left_behind(parent: Path, prefix: str) -> None:
     """Remove the folders of a prefix that killed processes left."""
     for left in parent.glob(f"{prefix}*"):
-        with suppress(OSError), _locked(left, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else it is in use
+        with suppress(OSError), locked(left):  # else it is in use
             shutil.rmtree(left)
 
 
 @contextmanager
-def _locked(folder: Path, how: int) -> Iterator[None]:
-    """Hold a folder's lock. OSError where another process does, if that is not to be waited for."""
+def locked(folder: Path, how: int = fcntl.LOCK_EX | fcntl.LOCK_NB) -> Iterator[None]:
+    """Hold a folder's lock. BlockingIOError where another process does, if that is not to be waited for."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(handle, how)
