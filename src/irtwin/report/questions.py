@@ -79,6 +79,12 @@ def limits(answers: Answers) -> dict[str, float]:
     return {local_name(row["limit"]): float(row["value"]) for row in answers["limits"].rows}
 
 
+def effect_name(row: Row, variable: str = "effect") -> str:
+    """Return what the ontology calls a row's effect, `label`, or its id; of another variable, `variable_label`."""
+    label = row["label" if variable == "effect" else f"{variable}_label"]
+    return str(label or local_name(row[variable]).replace("_", " "))
+
+
 def _parse(file: Path) -> PageQuestion:
     text = read_text(file, MOST_BYTES)
     header = dict(_HEADER.findall(text))

@@ -11,7 +11,7 @@ from typing import Any
 
 from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.report import wording
-from irtwin.report.questions import Row
+from irtwin.report.questions import Row, effect_name
 
 Explain = Callable[[str, str, str], Explanation | None]  # subject, predicate and object, by their IRIs
 
@@ -75,7 +75,7 @@ def parameters(rows: Sequence[Row], joints: Sequence[Row]) -> Parameters:
             per_joint += [_line([row for row in of_effect if row["name"] == name]) for name in sorted(names)]
         else:
             in_order = sorted(of_effect, key=lambda row: _natural(row["name"]))
-            others.append((_label(of_effect[0]), tuple(_single(row) for row in in_order)))
+            others.append((effect_name(of_effect[0]), tuple(_single(row) for row in in_order)))
     return Parameters(tuple(row["joint"] for row in joints), tuple(per_joint), tuple(others))
 
 
@@ -129,18 +129,14 @@ def _natural(name: str) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
-def _label(row: Row) -> str:
-    return row["label"] or wording.local_name(row["effect"]).replace("_", " ")
-
-
 def _line(rows: Sequence[Row]) -> ParameterLine:
     first = rows[0]
-    return ParameterLine(_label(first), first["name"], first["unit"], {row["joint"]: _cell(row) for row in rows})
+    return ParameterLine(effect_name(first), first["name"], first["unit"], {row["joint"]: _cell(row) for row in rows})
 
 
 def _single(row: Row) -> ParameterLine:
     name = f"{row['name']} of {row['joint']}" if row["joint"] else row["name"]
-    return ParameterLine(_label(row), name, row["unit"], {}, _cell(row))
+    return ParameterLine(effect_name(row), name, row["unit"], {}, _cell(row))
 
 
 def _cell(row: Row) -> ParameterCell:

@@ -7,8 +7,7 @@ from typing import Any
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
-from irtwin.report.gap.verdict import effect_name
-from irtwin.report.questions import Answers, Row
+from irtwin.report.questions import Answers, Row, effect_name
 
 _MANY = 100.0  # standard deviations: more is said as "over 100"
 _KINDS = {

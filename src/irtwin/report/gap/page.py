@@ -27,8 +27,8 @@ from irtwin.report.gap import friction as gap_friction
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
-from irtwin.report.gap.verdict import effect_name, of_cause
-from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
+from irtwin.report.gap.verdict import of_cause
+from irtwin.report.questions import Answers, Graph, Row, added_to, ask, effect_name, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot

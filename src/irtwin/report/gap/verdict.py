@@ -10,7 +10,7 @@ from irtwin.document.odd_stretch import OddStretch
 from irtwin.report import wording
 from irtwin.report.gap import findings
 from irtwin.report.gap.findings import ToldFinding
-from irtwin.report.questions import Answers, Row
+from irtwin.report.questions import Answers, Row, effect_name
 
 _MOSTLY = 0.5  # share of a gap
 
@@ -117,12 +117,6 @@ def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
 def misses(error: float) -> str:
     """Say a tracking error, rad."""
     return f"{1e3 * error:.3g} mrad RMS"
-
-
-def effect_name(row: Row, variable: str = "effect") -> str:
-    """Return what the ontology calls a row's effect, `label`, or its id; of another variable, `variable_label`."""
-    label = row["label" if variable == "effect" else f"{variable}_label"]
-    return str(label or wording.local_name(row[variable]).replace("_", " "))
 
 
 def of_cause(cause: str, answers: Answers, question: str) -> list[Row]:
