@@ -12,6 +12,7 @@ from tests.storage.test_database import WORK, populate, state, workspace
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
+from irtwin.storage.rows import values
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, Activity
 from irtwin.storage.staging import staged
 
@@ -66,7 +67,7 @@ def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
         activity_id="live.1", robot_id=rows.ROBOT, provider=LIVE, subject="run", started=rows.NOON, ended=rows.NOON,
         software="irtwin",
     )  # fmt: skip
-    workspace.keep_run(live, rows.samples(8), [activity])
+    workspace.keep_run(live, rows.samples(8), {"activity": [values(activity)]})
     robot, joints, runs, series = rows.data_set()
     with staged(workspace, rows.ROBOT) as apart:
         assert apart.ingest(robot, joints[:1], runs, series) == "replaced"
@@ -78,7 +79,7 @@ def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
 def test_what_a_twin_says_of_a_live_run_goes_with_the_twin_alone(workspace: Workspace) -> None:
     populate(workspace)
     live = rows.run("live_1", kind=LIVE_RUN, role=None)
-    workspace.keep_run(live, rows.samples(8), [rows.activity("live.1", LIVE, "run")])
+    workspace.keep_run(live, rows.samples(8), {"activity": [values(rows.activity("live.1", LIVE, "run"))]})
     (energy,) = rows.run_energy(f"{rows.ROBOT}.t1")
     energy.run_id = live.run_id
     workspace.replace_activity(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from importlib.metadata import version
 from itertools import chain
 from typing import Any
@@ -19,14 +18,8 @@ from irtwin.providers.names import run_iri
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.signals.motion import STILL_SHARE, STILL_SPEED
 from irtwin.storage.journal import Header, Rows
-from irtwin.storage.schema import LIVE, Activity, Base, JointState, LiveState, Run, RunEnergy, RunState
+from irtwin.storage.schema import LIVE, moment_of
 
-_MADE: dict[str, type[Base]] = {
-    "run_state": RunState,
-    "joint_state": JointState,
-    "live_state": LiveState,
-    "run_energy": RunEnergy,
-}
 Values = dict[str, Any]
 Tables = dict[str, list[Values]]  # table -> rows, by column
 _COM = tuple(f"payload_com_{axis}_m" for axis in "xyz")
@@ -85,9 +78,9 @@ def rows(
         "kind": header.kind,
         "payload_kg": header.payload_kg,
         **dict(zip(_COM, header.payload_com, strict=True)),
-        "start_time": _moment(began),
+        "start_time": moment_of(began),
         "start_time_from": "log",
-        "started": _moment(began),
+        "started": moment_of(began),
         "run_time_s": at.time - began,
         "sample_count": count,
         **({} if header.performs is None else {"performs": header.performs}),
@@ -98,7 +91,7 @@ def rows(
         "activity": [activity(header, activity_id, LIVE, began)],
         "run_state": [{**made, "current_state": current_state}],
         "joint_state": [{**made, **joint} for joint in _joint_states(header.robot_id, joints, at)],
-        "live_state": [{**made, "state_time": _moment(at.time), **live}],
+        "live_state": [{**made, "state_time": moment_of(at.time), **live}],
     }
 
 
@@ -118,10 +111,10 @@ def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa
     tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
     length = at.time - began
     tables["run"][0] |= {
-        "ended": _moment(at.time),
+        "ended": moment_of(at.time),
         "sample_rate_hz": (len(time) - 1) / length if length else None,
     }
-    tables["activity"][0] |= {"ended": _moment(at.time)}
+    tables["activity"][0] |= {"ended": moment_of(at.time)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}
     return tables, pa.table({name: values for name, values in table.items() if not np.isnan(values).all()})
@@ -139,10 +132,10 @@ def activity(header: Header, activity_id: str, provider: str, began: float, ende
         "robot_id": header.robot_id,
         "provider": provider,
         "subject": run_iri(header.run_id),
-        "started": _moment(began),
+        "started": moment_of(began),
         "software": f"irtwin {version('irtwin')}",
     }
-    return row if ended is None else row | {"ended": _moment(ended)}
+    return row if ended is None else row | {"ended": moment_of(ended)}
 
 
 def together(*parts: Tables) -> Tables:
@@ -152,12 +145,6 @@ def together(*parts: Tables) -> Tables:
         for name, some in part.items():
             tables[name] = [*tables.get(name, ()), *some]
     return tables
-
-
-def records(tables: Tables) -> tuple[Run, Activity, list[Base]]:
-    """Return the rows as the database takes them: the run, the activity that watched it, and what that made."""
-    made = [kind(**values) for name, kind in _MADE.items() for values in tables.get(name, ())]
-    return Run(**tables["run"][0]), Activity(**tables["activity"][0]), made
 
 
 def _speeds(signals: Signals) -> Rows:
@@ -190,8 +177,3 @@ def _joint_states(robot_id: str, joints: Sequence[str], at: Newest) -> list[Valu
 
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else value
-
-
-def _moment(seconds: float) -> datetime:
-    """Return a time as the database keeps it: UTC without its zone."""
-    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)

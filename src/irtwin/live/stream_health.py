@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from irtwin.live.frozen_values import FROZEN
+from irtwin.storage.schema import moment_of
 
 STALE = 2.0  # s without a good state; of a slow source five times its usual pause
 _PAUSES = 5.0
@@ -53,7 +54,7 @@ class StreamHealth:
 
     def end(self, reason: str) -> None:
         """Note why the run ends before its time."""
-        self.stale_since, self.reason = self._last_good(time.monotonic() - self._heard), reason
+        self.stale_since, self.reason = moment_of(time.time() - time.monotonic() + self._heard), reason
         self._ended = True
 
     def look(self) -> bool:
@@ -63,7 +64,7 @@ class StreamHealth:
         quiet = bool(self.frozen) or silence >= max(STALE, _PAUSES * usual)
         if self.stale_since is not None or not self._count or not quiet:
             return False
-        self.stale_since = self._last_good(silence)
+        self.stale_since = moment_of(time.time() - silence)
         self.reason = self.frozen or self._late or f"no state came for {silence:.1f} s"
         return True
 
@@ -79,7 +80,3 @@ class StreamHealth:
 
     def _why(self) -> dict[str, Any]:
         return {"stale_since": self.stale_since, "stale_reason": self.reason}
-
-    @staticmethod
-    def _last_good(silence: float) -> datetime:
-        return datetime.fromtimestamp(time.time() - silence, UTC).replace(tzinfo=None)

@@ -19,7 +19,7 @@ from irtwin.live.shown import AlarmNews, ShownRuns
 from irtwin.live.stream_health import StreamHealth
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.journal import Header, Journal
-from irtwin.storage.schema import LIVE
+from irtwin.storage.schema import LIVE, moment_of
 from irtwin.twin.so_far import WatchedStretch
 
 LEAST = 0.2  # s of samples that are worked out at once
@@ -139,5 +139,5 @@ class WatchedRun:
         counts = {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
         if self.newest is None or self.standing_since is None:
             return counts
-        since = datetime.fromtimestamp(self.standing_since, UTC).replace(tzinfo=None)
-        return {**counts, "standing_since": since, "standing_s": float(int(self.newest.time - self.standing_since))}
+        stood = float(int(self.newest.time - self.standing_since))
+        return {**counts, "standing_since": moment_of(self.standing_since), "standing_s": stood}

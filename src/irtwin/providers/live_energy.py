@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -150,7 +149,7 @@ class LiveEnergy:
                 "band": now.band,
                 "ratio": now.ratio,
                 "state": now.state,
-                "since": _moment(now.since),
+                "since": schema.moment_of(now.since),
             }
 
     def _excursions(self) -> Iterator[Values]:
@@ -158,8 +157,8 @@ class LiveEnergy:
             for number, one in enumerate(now.excursions, start=1):
                 yield self._place(place) | {
                     "number": number,
-                    "began": _moment(one.began),
-                    "ended": None if one.ended is None else _moment(one.ended),
+                    "began": schema.moment_of(one.began),
+                    "ended": None if one.ended is None else schema.moment_of(one.ended),
                     "lasted_s": one.until - one.began,
                     "peak_residual": one.peak_residual,
                     "peak_ratio": one.peak_ratio,
@@ -266,8 +265,3 @@ def _windows(workspace: Workspace, run_id: str, joints: tuple[str, ...]) -> np.n
     columns = [np.array(table[name]) - np.array(table[f"{name}_model"]) if name in there else missing for name in names]
     windows = Windows().take(np.array(table["time"]), np.column_stack(columns), begins=True)
     return np.array([root for _, root in windows]).reshape(-1, len(names))
-
-
-def _moment(seconds: float) -> datetime:
-    """Return a time as the database keeps it: UTC without its zone."""
-    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)

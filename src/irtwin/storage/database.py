@@ -22,6 +22,7 @@ from irtwin.storage.migration import VERSION_TABLE, migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_rows
 from irtwin.storage.rows import (
+    Rows,
     base_of,
     drop_activities,
     drop_data_set,
@@ -29,6 +30,7 @@ from irtwin.storage.rows import (
     drop_run,
     facts,
     insert_rows,
+    insert_values,
     keep_base,
     named_files,
     part_tables,
@@ -252,13 +254,13 @@ class Workspace:
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
-    def keep_run(self, run: Run, series: pa.Table, rows: Sequence[Base] = ()) -> Series:
-        """Keep a run of no data set with its samples, and further rows about it; return where the samples lie."""
+    def keep_run(self, run: Run, series: pa.Table, rows: Rows | None = None) -> None:
+        """Keep a run of no data set with its samples, and further rows about it, by table."""
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)
             run.file, run.sha256 = stored.path, stored.series_id
-            insert_rows(session, [run, stored, *rows])
-        return stored
+            insert_rows(session, [run, stored])
+            insert_values(session, rows or {})
 
     def facts_about(self, robot_id: str) -> list[AssertedFact]:
         """Return the facts that rows of a robot follow, the earliest first."""

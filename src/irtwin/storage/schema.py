@@ -47,6 +47,11 @@ def in_utc(moment: datetime) -> datetime:
     return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
 
 
+def moment_of(seconds: float) -> datetime:
+    """Return a time, s since 1970, as a column keeps it: in UTC, without its zone."""
+    return datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)
+
+
 class Base(DeclarativeBase):
     """The registry of tables."""
 
