@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from markupsafe import Markup
 from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
 from irtwin.knowledge.store.table import to_python
-from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, RDF, RDFS, shorten
+from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, shorten
 from irtwin.report.energy.page import content_policy
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resource, Resources, folder, shipped
@@ -26,20 +26,6 @@ KINDS = {
     "AnnotationProperty": "Annotation properties",
     "NamedIndividual": "Individuals",
 }
-CHARACTERISTICS = {
-    f"{OWL}FunctionalProperty": "functional",
-    f"{OWL}InverseFunctionalProperty": "inverse functional",
-    f"{OWL}SymmetricProperty": "symmetric",
-    f"{OWL}TransitiveProperty": "transitive",
-}
-# A link that the page shows at the term that it leads to, too, and what it is called there.
-BACK = {
-    "subclass of": "subclasses",
-    "sub-property of": "sub-properties",
-    "domain": "in the domain of",
-    "range": "in the range of",
-}
-_BUILT_IN = (OWL, RDF, RDFS)
 _ALIGNED = {  # vocabularies that only the alignment speaks of
     "sosa": "http://www.w3.org/ns/sosa/",
     "ssn": "http://www.w3.org/ns/ssn/",
@@ -62,7 +48,6 @@ class DocumentedTerm:
     unit_symbol: str | None
     unit_given_by: str | None
     extends: str | None = None  # the module that it is of, where that does not ship
-    characteristics: list[str] = field(default_factory=list)
     links: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     values: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
 
@@ -170,29 +155,15 @@ def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[s
         )  # fmt: skip
         known[term.iri] = term
         terms.setdefault(row["module"], {}).setdefault(kind, []).append(term)
-    _add_links(known, _ask(store, "links"))
+    for row in _ask(store, "links"):
+        if row["term"] in known:
+            known[row["term"]].links[row["link"]].append(row["other"])
+            if row["back"] and row["other"] in known:
+                known[row["other"]].links[row["back"]].append(row["term"])
     for row in _ask(store, "values"):
         if row["term"] in known:
             known[row["term"]].values[row["property"]].append(row["value"])
     return terms
-
-
-def _add_links(known: Mapping[str, DocumentedTerm], rows: Iterable[Mapping[str, Any]]) -> None:
-    for row in rows:
-        term, link, other = known.get(row["term"]), row["link"], row["other"]
-        if term is None:
-            continue
-        if other in CHARACTERISTICS:
-            term.characteristics.append(CHARACTERISTICS[other])
-        elif link == "is":
-            if not other.startswith(_BUILT_IN):
-                term.links["is a"].append(other)
-                if other in known:
-                    known[other].links["individuals"].append(term.iri)
-        else:
-            term.links[link].append(other)
-            if link in BACK and other in known:
-                known[other].links[BACK[link]].append(term.iri)
 
 
 def _imported(store: Store) -> list[str]:
