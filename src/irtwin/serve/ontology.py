@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import cast
 from urllib.parse import urlsplit
 
-from pyoxigraph import NamedNode, RdfFormat, Triple, parse, serialize
+from pyoxigraph import QuerySolutions, RdfFormat, Store, parse, serialize
 from starlette.requests import Request
 from starlette.responses import Response
 
-from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.knowledge.vocabulary import OWL, PREFIXES, RDF
+from irtwin.knowledge.vocabulary import OWL, PREFIXES
 from irtwin.resources import Resources, folder
 from irtwin.serve import negotiation
 
+_IRIS = f"SELECT ?iri {{ {{ ?iri a <{OWL}Ontology> }} UNION {{ ?it <{OWL}versionIRI> ?iri }} }}"
 # The page carries its style and script, and a policy of its own for them.
 _PAGE_HEADERS = {"Vary": "Accept", "Content-Security-Policy": "frame-ancestors 'none'"}
 
@@ -60,19 +61,11 @@ def _documentation(known: Resources) -> str:
 def _modules() -> dict[str, Path]:
     modules = {}
     for file in sorted(folder("ontology").glob("*.ttl")):
-        for triple in read_turtle(file):
-            path = _path(triple)
-            if path is not None:
-                modules[path] = file
+        store = Store()
+        store.load(path=str(file), format=RdfFormat.TURTLE)
+        for row in cast(QuerySolutions, store.query(_IRIS)):
+            modules[urlsplit(row["iri"].value).path] = file
     return modules
-
-
-def _path(triple: Triple) -> str | None:
-    """Return the path of an ontology's IRI, or of its version IRI, where the triple says one."""
-    if triple.predicate.value == f"{OWL}versionIRI" and isinstance(triple.object, NamedNode):
-        return urlsplit(triple.object.value).path
-    is_ontology = triple.predicate.value == f"{RDF}type" and triple.object == NamedNode(f"{OWL}Ontology")
-    return urlsplit(triple.subject.value).path if is_ontology and isinstance(triple.subject, NamedNode) else None
 
 
 @cache
