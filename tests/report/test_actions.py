@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
+from pyoxigraph import QuerySolutions, RdfFormat, Store
 from tests import plants
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import ID, IRT
 from irtwin.report.plant import overview, page
 from irtwin.report.plant.actions import actions, actions_sheet
 from irtwin.report.plant.choice import Selection
@@ -19,14 +21,15 @@ def answered(rows: dict[str, list[dict[str, Any]]]) -> Answers:
 
 
 def action(robot: str, what: str, done_on: str | None = None, year_j: float | None = None) -> dict[str, Any]:
-    said = {"action": f"id:{robot}/{what}", "robot": robot, "name": robot, "what": what, "place": "", "advice": None}
+    said: dict[str, Any] = {"state": "", "others": None}
+    said |= {"action": f"id:{robot}/{what}", "robot": robot, "name": robot, "what": what, "place": "", "advice": None}
     found = dict.fromkeys(("result", "before", "after", "unit", "adjusted_j", "saved_j", "lower_j", "upper_j"))
     return {**said, **found, "year_j": year_j, "run_j": None, "done_on": done_on, "by": "anna" if done_on else None}
 
 
 VERIFIED = {
-    "result": "verified", "before": 3, "after": 3, "unit": "hour", "adjusted_j": 270.0, "saved_j": 90.0,
-    "lower_j": 80.0, "upper_j": 100.0,
+    "state": "done, verified", "result": "verified", "before": 3, "after": 3, "unit": "hour", "adjusted_j": 270.0,
+    "saved_j": 90.0, "lower_j": 80.0, "upper_j": 100.0,
 }  # fmt: skip
 
 
@@ -47,17 +50,29 @@ ANSWERS = answered(
 
 def test_proposals_come_first_and_the_greatest_of_them() -> None:
     found = actions(ANSWERS)
-    assert [one.row["what"] for one in found] == ["large", "small", "second", "done", "first"]
-    assert [one.state for one in found] == [
-        "proposed", "proposed", "done, verified", "done, not verified yet", "done, too few runs"
-    ]  # fmt: skip
-    assert [one.row["name"] for one in actions(ANSWERS, Selection(find="b"))] == ["B", "B"]
+    assert [one["what"] for one in found] == ["large", "small", "second", "done", "first"]
+    assert [one["name"] for one in actions(ANSWERS, Selection(find="b"))] == ["B", "B"]
 
 
 def test_two_changes_of_one_day_are_told_together() -> None:
-    rows = [*ANSWERS["actions"].rows, action("A", "also", "2026-03-01")]
-    found = actions({**ANSWERS, **answered({"actions": rows})})
-    assert {one.row["what"]: one.others for one in found if one.others} == {"second": 1, "also": 1}
+    store = Store()
+    done = {"A": ("one", "two"), "B": ("one",)}
+    told = "".join(
+        f'id:{robot}_{what} a irt:Saving_Action ; irt:saves_at id:{robot} ; irt:Done_On "2026-03-01" .'
+        for robot, some in done.items()
+        for what in some
+    )
+    names = "".join(f'id:{robot} irt:has_Information [ irt:IR_Name "{robot}" ] .' for robot in done)
+    prefixes = f"@prefix irt: <{IRT}> . @prefix id: <{ID}> ."
+    store.load(f"{prefixes} {told} {names} id:A_three a irt:Saving_Action ; irt:saves_at id:A .", RdfFormat.TURTLE)
+    rows = cast(QuerySolutions, store.query(page.questions()["actions"].text))
+    said = [(row["action"].value.removeprefix(ID), row["state"].value, row["others"]) for row in rows]
+    assert [(name, state, None if others is None else int(others.value)) for name, state, others in sorted(said)] == [
+        ("A_one", "done, not verified yet", 1),
+        ("A_three", "proposed", None),
+        ("A_two", "done, not verified yet", 1),
+        ("B_one", "done, not verified yet", 0),
+    ]
 
 
 def test_the_table_says_energies_in_kwh() -> None:
