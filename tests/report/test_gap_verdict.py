@@ -24,7 +24,7 @@ def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9, ve
             {"finding": "f1", "cause": "c1", "effect": "x/external_contact", "label": None, "confidence": 0.2},
         ],
         "closed": [{"closed": 0.5, "lower": None, "upper": None}],
-        "causes": [{"cause": "c1", "confidence": sure}],
+        "causes": [{"cause": "c1", "confidence": sure, "told": True}],
         "cause_parameters": parameters,
         "odd_stretches": odd,
     }

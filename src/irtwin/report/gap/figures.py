@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from irtwin.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
-from irtwin.report.gap.verdict import matters
 from irtwin.report.questions import Answers, Row
 from irtwin.report.traces import Figure, axis, band, bars, beside, level, plain, trace
 
@@ -89,8 +88,8 @@ def foremost_curves(curves: Sequence[Followed], answers: Answers) -> list[Follow
 
     Effects that close little have none.
     """
-    causes = [(wording.local_name(row["effect"]), matters(row["cause"], answers)) for row in answers["causes"].rows]
-    little = {effect for effect, _ in causes} - {effect for effect, much in causes if much}
+    causes = [(wording.local_name(row["effect"]), row["told"]) for row in answers["causes"].rows]
+    little = {effect for effect, _ in causes} - {effect for effect, told in causes if told}
     order = list(dict.fromkeys(row["joint"] for row in answers["locations"].rows))
     first = {joint: place for place, joint in enumerate(order)}
     of_effect: dict[str | None, list[int]] = {}

@@ -142,7 +142,6 @@ def _cause(row: Row, answers: Answers) -> dict[str, Any]:
     return {
         **row,
         "name": effect_name(row),
-        "told": gap_verdict.matters(cause, answers),
         "likely": row["confidence"] >= LIKELY,
         "joints": gap_verdict.joints_of(cause, answers),
         "rivals": gap_verdict.rivals_of(cause, answers),

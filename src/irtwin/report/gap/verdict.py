@@ -21,11 +21,11 @@ def sentence(answers: Answers) -> str:
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
     played = judged["tracking_error"] is not None
-    likely = {one["cause"] for one in answers["causes"].rows if one["confidence"] >= LIKELY}
+    likely = {one["cause"] for one in answers["causes"].rows if one["told"] and one["confidence"] >= LIKELY}
     numbers = findings.other_numbers([
         (one["name"], one["joint"], one["simulator"], one["robot"], one["unit"])
         for one in answers["cause_parameters"].rows
-        if one["simulator"] is not None and one["cause"] in likely and matters(one["cause"], answers)
+        if one["simulator"] is not None and one["cause"] in likely
     ])  # fmt: skip
     said = findings.sentence(
         wording.local_name(judged["verdict"]),
@@ -54,12 +54,6 @@ def _odd_stretches(answers: Answers) -> list[OddStretch]:
 def told(answers: Answers) -> list[ToldFinding]:
     """Return the findings, the largest first."""
     return [_finding(row, answers) for row in answers["findings"].rows]
-
-
-def matters(cause: str, answers: Answers) -> bool:
-    """Return whether a cause (its IRI) is of a finding that matters."""
-    of = {one["finding"] for one in of_cause(cause, answers, "finding_members")}
-    return any(row["matters"] for row in answers["findings"].rows if row["finding"] in of)
 
 
 def _finding(row: Row, answers: Answers) -> ToldFinding:
