@@ -103,7 +103,7 @@ def test_without_torque_constants_torque_is_not_said_and_why() -> None:
 
 
 def test_a_connection_that_breaks_is_made_again_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rtde, "_AGAIN", 0.05)
+    monkeypatch.setattr("irtwin.live.controller.AGAIN", 0.05)
     follower, client = followed(Controller(breaks=10), 25)
     assert follower.said[:2] == [
         f"{client.address}: the connection is lost (it closed the connection); trying again",
@@ -114,7 +114,7 @@ def test_a_connection_that_breaks_is_made_again_and_told(monkeypatch: pytest.Mon
 
 
 def test_a_controller_that_falls_silent_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rtde, "_AGAIN", 0.05)
+    monkeypatch.setattr("irtwin.live.controller.AGAIN", 0.05)
     monkeypatch.setattr(rtde, "_PATIENCE", 0.3)
     follower, _ = followed(Controller(quiet=10), 15)
     assert "the connection is lost (no whole package within 0.3 s); trying again" in follower.said[0]
@@ -133,7 +133,7 @@ def test_a_controller_that_falls_silent_is_told(monkeypatch: pytest.MonkeyPatch)
     ],
 )
 def test_nonsense_breaks_off_and_is_told(sent: bytes, reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rtde, "_AGAIN", 0.05)
+    monkeypatch.setattr("irtwin.live.controller.AGAIN", 0.05)
     monkeypatch.setattr(rtde, "_PATIENCE", 0.5)
     follower, _ = followed(Controller(spoilt={5: sent}), 12)
     assert len(follower.said) >= 2

@@ -69,7 +69,7 @@ class Rtde(Controller):
             self.connect()
         except self.lost as error:
             raise InputError(
-                f"{self.address}: no controller answers by RTDE ({_reason(error)}); check address and port"
+                f"{self.address}: no controller answers by RTDE ({self.reason(error)}); check address and port"
             ) from error
 
     def _described(self) -> str:
@@ -94,18 +94,13 @@ class Rtde(Controller):
 
     def reason(self, error: BaseException) -> str:
         """Say in words why a connection broke."""
-        return _reason(error)
-
-    def connect(self) -> None:
-        """Connect, agree on variables, and start the data."""
-        self._socket = self._connected()
-        self.what = self._described()
+        return f"no whole package within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
 
     @property
     def _has_power(self) -> bool:
         return {"actual_robot_voltage", "actual_robot_current"} <= self._fields.keys()
 
-    def _connected(self) -> socket.socket:
+    def connect(self) -> None:
         """Connect, agree on version and variables, and start the data."""
         give_up = time.monotonic() + _PATIENCE  # for all of it
         connection = socket.create_connection(self._where, timeout=_PATIENCE)
@@ -118,7 +113,7 @@ class Rtde(Controller):
         except BaseException:
             connection.close()
             raise
-        return connection
+        self._socket, self.what = connection, self._described()
 
     def _set_up(self, connection: socket.socket, give_up: float) -> None:
         """Ask for the variables, and once more without those that the controller does not have."""
@@ -218,10 +213,6 @@ def _exactly(connection: socket.socket, count: int, give_up: float, done: thread
             raise LostError("it closed the connection")
         parts += part
     return bytes(parts)
-
-
-def _reason(error: BaseException) -> str:
-    return f"no whole package within {_PATIENCE:g} s" if isinstance(error, TimeoutError) else str(error)
 
 
 def _read_address(text: str) -> tuple[str, int]:
