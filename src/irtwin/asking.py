@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from irtwin.resources import Resources, resources_of
 if TYPE_CHECKING:
     from irtwin.knowledge.explain.explanation import Explanation
 
+Current = Callable[[bool], KnowledgeGraph]  # the graph as it is now; True: not even half a second old
 BEHIND, UPDATING = "behind", "updating"  # the standing of a graph that is not whole
 
 
@@ -63,22 +64,28 @@ def open_graph(location: Location) -> Iterator[KnowledgeGraph]:
     One that is behind the database is told by the warning GraphBehind. Raises InputError where there is none, or for a
     fault in what extends the workspace.
     """
-    workspace, folder = location.folder, location.graph_folder
+    workspace = location.folder
     checked(workspace)
-    if location.graph_url is not None:
-        with KnowledgeGraph(location.graph_url, workspace) as graph:
-            _warn(graph, workspace)
-            yield graph
-        return
-    if not folder.is_dir():
+    if location.graph_url is None and not location.graph_folder.is_dir():
         from irtwin.storage.database import Workspace
 
         with Workspace.existing(workspace) as place:  # says that there is none, or that its graph is lost
             place.check_graph()
         raise InputError(f"{workspace}: no graph here; run `irtwin run DATASET --workspace {workspace}` first")
-    with Snapshot(folder) as snapshot:
-        _warn(snapshot.graph, workspace)
-        yield snapshot.graph
+    with reading(location) as current:
+        _warn(current(False), workspace)
+        yield current(False)
+
+
+@contextmanager
+def reading(location: Location) -> Iterator[Current]:
+    """Give what gives the graph as it is. Raises InputError where there is none."""
+    if location.graph_url is None:
+        with Snapshot(location.graph_folder) as snapshot:
+            yield snapshot.current
+    else:
+        with KnowledgeGraph(location.graph_url, location.folder) as graph:
+            yield lambda at_once: graph
 
 
 def standing(graph: KnowledgeGraph, workspace: Path) -> str | None:

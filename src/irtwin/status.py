@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
 
 from sqlalchemy import select
 
-from irtwin.asking import BEHIND, contradictions_of, in_words, standing
+from irtwin.asking import BEHIND, contradictions_of, in_words, reading, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED
 from irtwin.location import Location
 from irtwin.report.extensions import check
@@ -110,15 +109,13 @@ def _robots(place: Workspace) -> list[str]:
 
 
 def _look_at_graph(status_now: Status, place: Workspace) -> None:
-    with ExitStack() as held:
-        if place.location.graph_url is not None:
-            graph = held.enter_context(KnowledgeGraph.of_workspace(place))
-        else:
-            place.check_graph()
-            if not (place.graph_folder / "CURRENT").is_file():
-                status_now.parts["graph"] = ["none yet"]
-                return
-            graph = held.enter_context(Snapshot(place.graph_folder)).graph
+    if place.location.graph_url is None:
+        place.check_graph()
+        if not (place.graph_folder / "CURRENT").is_file():
+            status_now.parts["graph"] = ["none yet"]
+            return
+    with reading(place.location) as current:
+        graph = current(False)
         status_now.parts["graph"] = [_size(graph)]
         stands = standing(graph, place.folder)
         if stands is not None:

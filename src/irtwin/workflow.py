@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
 from irtwin import resources
-from irtwin.asking import open_graph
+from irtwin.asking import open_graph, reading
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.identification.progress import telling
@@ -16,7 +15,6 @@ from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.explain.explain import Explainer
 from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.snapshot import Snapshot
 from irtwin.location import WORKSPACE, Location
 from irtwin.modelling import Announce, clocked, read_sound
 from irtwin.next_experiment import next_experiment
@@ -151,13 +149,11 @@ def catch_up(location: Location, announce: Announce = lambda line: None) -> None
 def backup(archive: Path, location: Location) -> None:
     """Write a workspace into one archive: graph, database, series, twins, diagnoses and reports; others may write."""
     check_place(archive)
-    with Workspace.existing(location) as place, ExitStack() as held:
-        if location.graph_url:
-            graph = KnowledgeGraph(location.graph_url)
-        else:
+    with Workspace.existing(location) as place:
+        if location.graph_url is None:
             place.check_graph()
-            graph = held.enter_context(Snapshot(place.graph_folder)).current()  # takes no lock
-        keep(place, graph, archive)
+        with reading(location) as current:  # takes no lock
+            keep(place, current(False), archive)
 
 
 def unpack_demo(workspace: Path) -> Path:

@@ -12,6 +12,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
+from irtwin.asking import reading
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.sparql_server import ServerFault
@@ -23,7 +24,6 @@ from irtwin.serve.page import FOLDER, POLICY
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
 from irtwin.serve.shares import client
-from irtwin.serve.source import reading
 from irtwin.serve.worker import SERVER_FAILS
 from irtwin.virtual.robot_data import robot_data
 

@@ -22,7 +22,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from irtwin.asking import checked
+from irtwin.asking import checked, reading
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge.questions.queries import named_questions
@@ -41,7 +41,6 @@ from irtwin.serve.plant_pages import PlantPages
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
-from irtwin.serve.source import reading
 from irtwin.serve.updates import Updates
 from irtwin.storage.database import Workspace
 from irtwin.storage.tariff import read_tariff

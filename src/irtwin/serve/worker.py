@@ -17,7 +17,7 @@ from typing import IO, Any, cast
 
 from pyoxigraph import QueryBoolean, QueryResultsFormat, QuerySolutions, RdfFormat, serialize
 
-from irtwin.asking import standing
+from irtwin.asking import reading, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
@@ -26,7 +26,6 @@ from irtwin.limits import limit_memory, limit_processor_time
 from irtwin.location import Location
 from irtwin.serve import negotiation
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.source import reading
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
