@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,6 +12,9 @@ import click
 from irtwin.cli.options import FILE, FOLDER, PLACE, Number, announce, located, located_graph, say, tell_contradictions
 from irtwin.cli.upkeep import workspace
 from irtwin.location import Location
+
+_MODELS = ("urdf", "mjcf", "sdf", "usd")
+_FORMS = ("owl", "ros", *_MODELS, "aas", "mcap", "bag")
 
 
 def _known_questions(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -171,19 +175,7 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
     help="Twin that `irtwin diagnose --save-twin` wrote, instead of the workspace's.",
 )
 def export(
-    location: Location,
-    owl: Path | None,
-    ros: Path | None,
-    urdf: Path | None,
-    mjcf: Path | None,
-    sdf: Path | None,
-    usd: Path | None,
-    aas: Path | None,
-    mcap: Path | None,
-    bag: Path | None,
-    robot: str | None,
-    run_name: str | None,
-    twin: Path | None,
+    location: Location, robot: str | None, run_name: str | None, twin: Path | None, **places: Path | None
 ) -> None:
     """Write the graph for Protégé, a robot for ROS or simulators, or a run for ROS.
 
@@ -204,40 +196,38 @@ def export(
     \b
     Example: irtwin export --mjcf kr6.xml --robot KUKA_KR6_R700
     """
-    models = {"urdf": urdf, "mjcf": mjcf, "sdf": sdf, "usd": usd}
-    every = {"owl": owl, "ros": ros, **models, "aas": aas, "mcap": mcap, "bag": bag}
-    form, out = _asked(every)
+    form, out = _asked(places)
     if (run_name is not None) != (form in ("mcap", "bag")):
         raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
-    if form in models:
-        _export_model(form, out, location, robot, twin)
-    elif twin is not None:
+    if twin is not None and form not in _MODELS:
         raise click.UsageError("--twin goes with --urdf, --mjcf, --sdf or --usd.")
-    elif owl is not None:
+    if form in _MODELS:
+        _export_model(form, out, location, robot, twin)
+    elif run_name is not None:
+        _export_run(form, out, location, run_name, robot)
+    elif form == "owl":
         from irtwin import asking
 
         if robot is not None:
             raise click.UsageError("--owl writes the whole graph; leave --robot out.")
-        asking.export(owl, location)
-    elif aas is not None:
+        asking.export(out, location)
+    elif form == "aas":
         from irtwin.report.aas import export_shell
 
-        export_shell(aas, location, robot)
-    elif ros is not None:
+        export_shell(out, location, robot)
+    else:
         from irtwin.ros.export import export_package
 
-        for line in export_package(ros, location, robot):
+        for line in export_package(out, location, robot):
             say(f"irtwin: {line}")
-    elif run_name is not None:
-        _export_run(form, out, location, run_name, robot)
     click.echo(out)
 
 
-def _asked(every: dict[str, Path | None]) -> tuple[str, Path]:
+def _asked(places: Mapping[str, Path | None]) -> tuple[str, Path]:
     """Return the one form that is asked for, and the place to write it to."""
-    asked = [(form, place) for form, place in every.items() if place is not None]
+    asked = [(form, place) for form in _FORMS if (place := places[form]) is not None]
     if len(asked) != 1:
-        raise click.UsageError(f"Give one of {', '.join(f'--{form}' for form in every)}.")
+        raise click.UsageError(f"Give one of {', '.join(f'--{form}' for form in _FORMS)}.")
     return asked[0]
 
 

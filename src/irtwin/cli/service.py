@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -92,13 +93,11 @@ def _announce(address: str) -> None:
 def live(
     location: Location,
     port: int | None,
-    replay: Path | None,
-    rtde: str | None,
-    opcua: str | None,
     nodes: Path | None,
     robot: str | None,
     speed: float,
     performs: str | None,
+    **of_one: Any,
 ) -> None:
     """Watch robots: store their samples and keep the graph up to date, with power, energy, gap and alarms.
 
@@ -115,28 +114,16 @@ def live(
     from irtwin.live.watch import watch
     from irtwin.workflow import catch_up
 
-    of_one = {"replay": replay, "rtde": rtde, "opcua": opcua}
     given = [source for source in (port, *of_one.values()) if source is not None]
     if len(given) > 1:
         raise click.UsageError("Give one of --port, --replay, --rtde and --opcua.")
     if (robot is None) != all(source is None for source in of_one.values()):
         raise click.UsageError("--robot goes with --replay, --rtde or --opcua: it says whose log or controller it is.")
-    if speed != 1.0 and replay is None:
+    if speed != 1.0 and of_one["replay"] is None:
         raise click.UsageError("--speed is for --replay.")
-    if nodes is not None and opcua is None:
+    if nodes is not None and of_one["opcua"] is None:
         raise click.UsageError("--nodes is for --opcua.")
     if performs is not None and robot is None:
         raise click.UsageError("--performs goes with --robot; lines of a stream say it by themselves.")
     catch_up(location, say)  # while it watches, nobody else can; a fault in what extends the workspace is said here
-    watch(
-        location,
-        port=port,
-        replayed=replay,
-        rtde=rtde,
-        opcua=opcua,
-        nodes=nodes,
-        robot=robot,
-        speed=speed,
-        performs=performs,
-        announce=say,
-    )
+    watch(location, port=port, nodes=nodes, robot=robot, speed=speed, performs=performs, announce=say, **of_one)

@@ -22,6 +22,7 @@ from irtwin.live.rtde import Rtde
 from irtwin.location import Location
 from irtwin.providers.names import find_robot, find_run
 from irtwin.providers.records import load_robot
+from irtwin.robot.description import Robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
@@ -35,7 +36,7 @@ def watch(
     location: Location,
     *,
     port: int | None = None,
-    replayed: Path | None = None,
+    replay: Path | None = None,
     rtde: str | None = None,
     opcua: str | None = None,
     nodes: Path | None = None,
@@ -47,7 +48,7 @@ def watch(
     """Watch a workspace's robots until the stream on standard input ends, or SIGINT or SIGTERM comes.
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
-    With `replayed`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
+    With `replay`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
     With `rtde`: what the controller there says of the robot of this name, until a signal comes; with `opcua`, what the
     OPC UA server there says, by a file of `nodes` where one is given.
     With `performs`: the first run of that robot carries out the plan of this name.
@@ -64,28 +65,31 @@ def watch(
         _alone(place),
         KnowledgeGraph.of_workspace(place) as graph,
         Broadcast(place.folder / LIVE) as broadcast,
-        LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replayed is None else REPLAYED_RUN) as twin,
+        LiveTwin(place, graph, announce, broadcast, LIVE_RUN if replay is None else REPLAYED_RUN) as twin,
     ):
-        replay = None if replayed is None or robot is None else _replay(place, replayed, robot, speed)
-        receive: Callable[[State], None] = twin.receive
-        if performs is not None and robot is not None:
-            find_run(place, find_robot(place, robot), performs, PLANNED_RUN)
-            receive = _performing(receive, performs)
-        reader = StateReader(twin.robots.joints, twin.robots.names)
-
-        def take(lines: Iterable[bytes]) -> None:
-            feed(lines, reader, twin.receive, refusals.refuse)
-
-        if replay is not None:
-            start = replay.start(after=twin.robots.times.end(replay.robot_id), ahead=AHEAD)
-            announce(f"Playing {replayed}: {replay.seconds:.1f} s at {speed:g} times its speed")
-            _receive(replay.play(done, start), receive, refusals.refuse, twin.check)
-        elif robot is not None:
-            source = _controller(place, robot, rtde=rtde, opcua=opcua, nodes=nodes)
-            announce(f"Following {source.address}: {source.what}")
-            _receive(source.states(done, announce), receive, refusals.refuse, twin.check)
+        if robot is None:
+            reader = StateReader(twin.robots.joints, twin.robots.names)
+            _read(lambda lines: feed(lines, reader, twin.receive, refusals.refuse), port, twin, done, announce)
         else:
-            _read(take, port, twin, done, announce)
+            robot_id = find_robot(place, robot)
+            described = load_robot(place, robot_id)
+            take: Callable[[State], None] = twin.receive
+            if performs is not None:
+                find_run(place, robot_id, performs, PLANNED_RUN)
+                take = _performing(take, performs)
+            states: Iterable[State | InputError]
+            if replay is not None:
+                log = Replay(replay, described, robot_id, speed)
+                start = log.start(after=twin.robots.times.end(robot_id), ahead=AHEAD)
+                announce(f"Playing {replay}: {log.seconds:.1f} s at {speed:g} times its speed")
+                states = log.play(done, start)
+            else:
+                source = (
+                    Rtde(str(rtde), described, robot_id) if opcua is None else _opcua(opcua, nodes, described, robot_id)
+                )
+                announce(f"Following {source.address}: {source.what}")
+                states = source.states(done, announce)
+            _receive(states, take, refusals.refuse, twin.check)
     announce(f"{twin.stored} samples stored, {refusals.count} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
 
@@ -129,11 +133,6 @@ def _receive(
             check()  # whether it was refused as nothing can be stored any more
 
 
-def _replay(place: Workspace, log: Path, robot: str, speed: float) -> Replay:
-    robot_id = find_robot(place, robot)
-    return Replay(log, load_robot(place, robot_id), robot_id, speed)
-
-
 def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:
     """Return what takes states, the first of which says the plan that its run carries out."""
     told = False
@@ -146,11 +145,7 @@ def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], N
     return take_with_plan
 
 
-def _controller(place: Workspace, name: str, *, rtde: str | None, opcua: str | None, nodes: Path | None) -> Controller:
-    robot_id = find_robot(place, name)
-    robot = load_robot(place, robot_id)
-    if opcua is None:
-        return Rtde(str(rtde), robot, robot_id)
+def _opcua(address: str, nodes: Path | None, robot: Robot, robot_id: str) -> Controller:
     from irtwin.live.opcua import OpcUa  # an extra
 
-    return OpcUa(opcua, robot, robot_id, nodes)
+    return OpcUa(address, robot, robot_id, nodes)
