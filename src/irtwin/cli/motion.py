@@ -85,16 +85,12 @@ def plan(
     goal: str,
     via: tuple[str, ...],
     out: Path | None,
-    line: bool,
     boxes: tuple[tuple[float, ...], ...],
     objective: str,
-    seconds: float | None,
     rate: float,
-    search: float,
-    payload_mass: float,
-    payload_com: tuple[float, float, float],
     location: Location | None,
     name: str | None,
+    **asked: Any,
 ) -> None:
     """Plan a motion from pose to pose, around obstacles, and say what it costs.
 
@@ -121,12 +117,8 @@ def plan(
         goal=read_target(goal, joints, "--to"),
         via=[read_target(one, joints, "--via") for one in via],
         obstacles=[Obstacle((x, y, z), (a, b, c)) for x, y, z, a, b, c in boxes],
-        line=line,
         least_energy=objective == "energy",
-        seconds=seconds,
-        search=search,
-        payload_mass=payload_mass,
-        payload_com=payload_com,
+        **asked,
     )
     if location is None:
         made, kept = modelling.plan(twin, task, out, rate), None
