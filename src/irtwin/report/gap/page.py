@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,8 +26,7 @@ from irtwin.report.gap import friction as gap_friction
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
-from irtwin.report.gap.verdict import of_cause
-from irtwin.report.questions import Answers, Graph, Row, added_to, ask, effect_name, questions_of
+from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot
@@ -110,7 +108,7 @@ def _page(
         verdict=gap_verdict.sentence(answers),
         findings=[one for one in verdict if one.matters],
         counted=counted([one for one in verdict if not one.matters]),
-        causes=[_cause(row, answers) for row in answers["causes"].rows],
+        likely_from=LIKELY,
         foremost=gap_figures.foremost_joint(answers),
         follows=follows,
         hidden_curves=len(curves.follows) - len(follows),
@@ -135,40 +133,3 @@ def _places(rows: Sequence[Row]) -> list[Row]:
     """Return the places that have a part of the gap worth a line; all, where none has. `sure`: beyond chance."""
     marked: list[Row] = [{**row, "sure": row["rate"] <= FALSE_PLACES} for row in rows]
     return [row for row in marked if row["excess"] > 0 and row["share"] >= LEAST_SHARE] or marked
-
-
-def _cause(row: Row, answers: Answers) -> dict[str, Any]:
-    cause = row["cause"]
-    return {
-        **row,
-        "name": effect_name(row),
-        "likely": row["confidence"] >= LIKELY,
-        "joints": gap_verdict.joints_of(cause, answers),
-        "rivals": gap_verdict.rivals_of(cause, answers),
-        "parameters": of_cause(cause, answers, "cause_parameters"),
-        "kept": _kept(cause, answers),
-        "evidence": [
-            ("channel", row["channel"]),
-            *((one["name"], _said(one["value"], one["unit"])) for one in of_cause(cause, answers, "evidence")),
-            ("probability of rivals", _competitors(of_cause(cause, answers, "competitors"))),
-            ("runs", ", ".join(one["run_name"] for one in of_cause(cause, answers, "cause_runs"))),
-        ],
-    }
-
-
-def _kept(cause: str, answers: Answers) -> Row | None:
-    """Return what is left of a tracking error without a cause that no number of the simulator holds."""
-    held = any(one["simulator"] is not None for one in of_cause(cause, answers, "cause_parameters"))
-    left = (row for row in of_cause(cause, answers, "changes_by_cause") if row["part"] == "without")
-    return None if held else next((row for row in left if row["measure"] == "position_rmse"), None)
-
-
-def _competitors(rows: Sequence[Row]) -> str:
-    """Return the effects that could be in a cause's place, with their probabilities."""
-    return "; ".join(f"{effect_name(row)} {wording.share(row['probability'])}" for row in rows)
-
-
-def _said(value: float | str, unit: str | None) -> str:
-    if isinstance(value, str):
-        return value
-    return wording.quantity(value, wording.unit_symbol(unit)).rstrip()

@@ -111,23 +111,3 @@ def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
 def misses(error: float) -> str:
     """Say a tracking error, rad."""
     return f"{1e3 * error:.3g} mrad RMS"
-
-
-def of_cause(cause: str, answers: Answers, question: str) -> list[Row]:
-    """Return what a question answers of a cause (its IRI)."""
-    return [row for row in answers[question].rows if row["cause"] == cause]
-
-
-def joints_of(cause: str, answers: Answers) -> list[str]:
-    """Return the joints of a cause (its IRI), none for the whole robot."""
-    return [row["joint"] for row in of_cause(cause, answers, "cause_joints")]
-
-
-def rivals_of(cause: str, answers: Answers) -> list[str]:
-    """Return the effects that the data do not tell from a cause (its IRI), with their probabilities if known."""
-    return [_rival(row) for row in of_cause(cause, answers, "rivals")]
-
-
-def _rival(row: Row) -> str:
-    sure = row["probability"]
-    return effect_name(row, "rival") + ("" if sure is None else f" ({wording.share(sure)})")
