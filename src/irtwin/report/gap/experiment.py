@@ -9,7 +9,6 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 from irtwin.report.questions import Answers, Row, effect_name
 
-_MANY = 100.0  # standard deviations: more is said as "over 100"
 _KINDS = {
     "speed_ladder": "a ladder of constant speeds",
     "slow_sweep": "a slow sweep both ways",
@@ -24,55 +23,17 @@ _SETTINGS = {"speed": "Speeds of {}", "amplitude": "Amplitudes of {}", "accelera
 
 
 def experiment(answers: Answers) -> dict[str, Any] | None:
-    """Return what a page says of the next experiment, None where there is none."""
+    """Return what a page says of the next experiment beside the rows of its questions, None where there is none."""
     given = answers["next_experiment"].first
     if given is None:
         return None
     names = {wording.local_name(row["effect"]): effect_name(row) for row in answers["experiment_effects"].rows}
     return {
         "purpose": _named(given["purpose"], names),
-        "motions": [row["text"] for row in answers["experiment_instructions"].rows],
-        "facts": _facts(given, answers) if given["motion_s"] is not None else [],
-        "settings": _settings(answers["experiment_settings"].rows),
-        "command": given["command"],
-        "enough": given["enough"],
-        "questions": [
-            {
-                "effects": [effect_name(row), *([effect_name(row, "rival")] if row["rival"] else [])],
-                "now": _separation(row["now"]),
-                "expected": _separation(row["expected"]),
-            }
-            for row in answers["experiment_questions"].rows
-        ],
-        "considered": [
-            {
-                "kind": _kind(row["kind"]),
-                "duration": _minutes(row["whole_s"]),
-                "separation": _separation(row["separation"]),
-                "chosen": row["chosen"],
-            }
-            for row in answers["experiments_considered"].rows
-        ],
         "note": _named(given["note"], names) if given["note"] else None,
+        "settings": _settings(answers["experiment_settings"].rows),
+        "kinds": {row["kind"]: _kind(row["kind"]) for row in answers["experiments_considered"].rows},
     }
-
-
-def _facts(given: Row, answers: Answers) -> list[tuple[str, str]]:
-    runs = answers["planned_runs"].rows
-    loads = [row["payload_kg"] for row in runs if row["payload_kg"]]
-    named = [row["joint"] for row in answers["experiment_joints"].rows]
-    warm = [row["temperature_degc"] for row in runs if row["temperature_degc"] is not None]
-    return [
-        ("Motion", wording.duration(given["motion_s"])),
-        ("Set-up", _minutes(given["set_up_s"])),
-        ("Joints", "all" if given["all_joints"] else wording.listed(named)),
-        ("Payload", f"without, then with {wording.quantity(loads[0], 'kg', 2)}" if loads else ""),
-        ("Temperatures", " and ".join(f"{value:g} °C" for value in warm)),
-    ]
-
-
-def _minutes(seconds: float) -> str:
-    return f"{seconds / 60:.2g} min" if seconds else ""
 
 
 def _kind(kind: str) -> str:
@@ -104,10 +65,6 @@ def _by_joint(rows: Sequence[Row], kind: str) -> dict[str, str]:
             values.setdefault(row["joint"], []).append(wording.given(row["value"]))
             units[row["joint"]] = wording.unit_symbol(row["unit"])
     return {joint: f"{', '.join(numbers)} {units[joint]}" for joint, numbers in values.items()}
-
-
-def _separation(value: float) -> str:
-    return f"over {_MANY:g}" if value > _MANY else wording.number(value, 2)
 
 
 def _named(text: str, names: Mapping[str, str]) -> str:
