@@ -30,9 +30,3 @@ def test_conclusions_gather_what_they_are_about_and_who_drew_them(graph: Knowled
     assert by_label["idle-heavy run"].about == ("cycle_6",)
     assert by_label["dominant joint"].about == ("cycle_6: joint_2",)
     assert by_label["twin to identify again"].by == ("SWRL rules",)
-
-
-def test_fits_by_joint_and_by_run(graph: KnowledgeGraph):
-    found = answers(graph, six_axis(graph))
-    assert tables.fits(found["torque_fit_per_joint"].rows)["joint_2"]["held_out"]["runs"] == 2
-    assert tables.run_fits(found["torque_fit"].rows)["cycle_6", "held_out"]["joint_1"]["rmse_nm"] == 8.0

@@ -88,8 +88,6 @@ def _page(
         energy=verdict.energy(answers),
         limits=limits(answers),
         parameters=tables.parameters(answers["parameters"].rows, answers["joints"].rows),
-        run_fits=tables.run_fits(answers["torque_fit"].rows),
-        fits=tables.fits(answers["torque_fit_per_joint"].rows),
         conclusions=tables.conclusions(answers["conclusions"].rows, explain),
         drawn=drawn,
         curves=curves,

@@ -79,22 +79,6 @@ def parameters(rows: Sequence[Row], joints: Sequence[Row]) -> Parameters:
     return Parameters(tuple(row["joint"] for row in joints), tuple(per_joint), tuple(others))
 
 
-def fits(rows: Sequence[Row]) -> dict[str, dict[str, Row]]:
-    """Return the torque fits by joint and part."""
-    by_joint: dict[str, dict[str, Row]] = {}
-    for row in rows:
-        by_joint.setdefault(row["joint"], {})[row["part"]] = row
-    return by_joint
-
-
-def run_fits(rows: Sequence[Row]) -> dict[tuple[str, str], dict[str, Row]]:
-    """Return the torque fits by (run, part), and for each by joint."""
-    by_run: dict[tuple[str, str], dict[str, Row]] = {}
-    for row in rows:
-        by_run.setdefault((row["run_name"], row["part"]), {})[row["joint"]] = row
-    return by_run
-
-
 def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> tuple[Conclusion, ...]:
     """Gather the individuals about which the same was concluded; `explain` says of one how it is known."""
     gathered = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from irtwin.report.gap import friction as gap_friction
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
-from irtwin.report.questions import Answers, Graph, Row, added_to, ask, questions_of
+from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
 from irtwin.report.templates import style, written
 from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot
@@ -113,7 +113,8 @@ def _page(
         follows=follows,
         hidden_curves=len(curves.follows) - len(follows),
         kinds=NOT_REPEATING,
-        places=_places(answers["locations"].rows),
+        least_share=LEAST_SHARE,
+        chance=FALSE_PLACES,
         effect_names=effect_names,
         friction=list(friction),
         friction_numbers=gap_friction.table(curves.friction or (), effect_names),
@@ -127,9 +128,3 @@ def _page(
         picture=None if picture is None else picture.html,
         policy=content_policy([*scripts.scripts, *(picture.scripts if picture else ())]),
     )  # fmt: skip
-
-
-def _places(rows: Sequence[Row]) -> list[Row]:
-    """Return the places that have a part of the gap worth a line; all, where none has. `sure`: beyond chance."""
-    marked: list[Row] = [{**row, "sure": row["rate"] <= FALSE_PLACES} for row in rows]
-    return [row for row in marked if row["excess"] > 0 and row["share"] >= LEAST_SHARE] or marked

@@ -45,11 +45,6 @@ class ShownProperty:
     label: str
     values: list[Value] = field(default_factory=list)
 
-    @property
-    def hidden(self) -> int:
-        """How many values are not shown."""
-        return max(0, len(self.values) - MOST_VALUES)
-
 
 @dataclass(frozen=True)
 class ShownIndividual:
