@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -15,7 +14,6 @@ from irtwin.report.questions import Answers, Row
 
 TREND = 30  # days in a robot's trend
 PLANT_TREND = 90
-MOST_ALARMS = 20  # shown of the newest
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,6 @@ class Overview:
 
     groups: tuple[Group, ...]
     trends: tuple[tuple[EnergyKind, Days], ...]
-    alarms: Sequence[Row]
-    active: int
     robots: int
     electrical_j: float | None
     cost: float | None
@@ -101,12 +97,9 @@ def overview(answers: Answers, asked: Selection = ALL) -> Overview:
               for one in KINDS.values())  # fmt: skip
     electrical = [group for group in groups if group.kind is not None and group.kind.electrical]
     rows = [row for row in energies if kind(row["energy_from"]).electrical]
-    alarms = answers["alarms"].rows
     return Overview(
         groups=groups,
         trends=tuple((one, trend) for one, trend in plants if trend is not None),
-        alarms=alarms[:MOST_ALARMS],
-        active=sum(row["state"] == "active" for row in alarms),
         robots=len({line.robot for group in groups for line in group.lines}),
         electrical_j=_sum(group.total("energy_j") for group in electrical),
         cost=_sum(group.total("cost") for group in electrical),
