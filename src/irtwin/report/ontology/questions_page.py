@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,9 +10,8 @@ from pyoxigraph import QuerySolutions, Store
 
 from irtwin.knowledge.questions.queries import THEMES, NamedQuery, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.report import wording
 from irtwin.report.energy.page import content_policy
-from irtwin.report.heading import heading
+from irtwin.report.questions import Row
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resources, shipped
 from irtwin.storage.files import check_place, write
@@ -33,12 +32,11 @@ ASKED_BY = {
 
 @dataclass(frozen=True)
 class Competency:
-    """A named question as the page shows it: its columns by variable and heading, and rows of a sample answer."""
+    """A named question as the page shows it: the variables that it selects, and a graph's answer."""
 
     asked: NamedQuery
-    columns: Mapping[str, str]
-    rows: tuple[tuple[str, ...], ...] = ()
-    more: int = 0  # rows that the answer has beyond
+    columns: Sequence[str]
+    answer: Sequence[Row] = ()
 
 
 def write_page(out: Path, known: Resources | None = None, graph: KnowledgeGraph | None = None) -> None:
@@ -61,6 +59,7 @@ def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
             asked_by=ASKED_BY,
             count=len(competencies_found),
             answered=graph is not None,
+            most_rows=MOST_ROWS,
             policy=content_policy([]),
             style=style(shipped()),
             page_style=style(shipped(), "ontology/style.css"),
@@ -69,15 +68,9 @@ def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
 
 
 def competencies(known: Resources, graph: KnowledgeGraph | None = None) -> Iterator[Competency]:
-    """Yield the questions, theme by theme, each with the first rows that a graph answers if one is given."""
+    """Yield the questions, theme by theme, each with what a graph answers if one is given."""
     for question in named_questions(known).values():
-        columns = {name: heading(name) for name in _columns(question)}
-        if graph is None:
-            yield Competency(question, columns)
-            continue
-        answer = list(graph.query(question.text))
-        rows = tuple(tuple(wording.shown(row[name]) for name in columns) for row in answer[:MOST_ROWS])
-        yield Competency(question, columns, rows, max(len(answer) - MOST_ROWS, 0))
+        yield Competency(question, _columns(question), () if graph is None else graph.query(question.text))
 
 
 def _columns(question: NamedQuery) -> list[str]:
