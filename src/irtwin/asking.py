@@ -115,13 +115,7 @@ def _warn(graph: KnowledgeGraph, workspace: Path) -> None:
         warnings.warn(GraphBehind(in_words(standing_now, workspace)), stacklevel=5)  # whoever asks a question
 
 
-def contradictions(location: Location) -> list[str]:
-    """Return, in words, which statements of a graph contradict each other. Raises InputError as `open_graph`."""
-    with open_graph(location) as graph:
-        return contradictions_of(graph)
-
-
-def contradictions_of(graph: KnowledgeGraph) -> list[str]:
+def contradictions(graph: KnowledgeGraph) -> list[str]:
     """Return, in words, which statements of a graph contradict each other."""
     return [row["why"] for row in graph.query("SELECT DISTINCT ?why { ?of irt:Contradiction ?why } ORDER BY ?why")]
 

@@ -184,9 +184,7 @@ def _joined(known: Resources, added: Iterable[Resource]) -> Resources:
     files = {(file.kind, file.name): file for file in known.files}
     for file in added:
         key = (file.kind, file.name)
-        files[key] = Resource(
-            file.kind, file.name, file.path, file.origin, replaces=key in files, checksum=file.checksum
-        )
+        files[key] = replace(file, replaces=key in files)
     order = list(KINDS)
     return Resources(tuple(sorted(files.values(), key=lambda file: (order.index(file.kind), file.name))))
 

@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 from sqlalchemy import select
 
-from irtwin.asking import BEHIND, contradictions_of, in_words, reading, standing
+from irtwin.asking import BEHIND, contradictions, in_words, reading, standing
 from irtwin.errors import InputError
 from irtwin.knowledge.extensions import check_mappings
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -122,7 +122,7 @@ def _look_at_graph(status_now: Status, place: Workspace) -> None:
             (status_now.faults if stands == BEHIND else status_now.parts["graph"]).append(
                 in_words(stands, place.folder)
             )
-        status_now.faults.extend(contradictions_of(graph) if place.knows_robots() else ())
+        status_now.faults.extend(contradictions(graph) if place.knows_robots() else ())
 
 
 def _size(graph: KnowledgeGraph) -> str:

@@ -154,9 +154,10 @@ def refuse(names: Collection[str], why: str) -> None:
 
 def tell_contradictions(location: Location) -> None:
     """Say which statements of a workspace contradict each other; where there are any, end with status 3."""
-    from irtwin.asking import contradictions
+    from irtwin.asking import contradictions, open_graph
 
-    lines = contradictions(location)
+    with open_graph(location) as graph:
+        lines = contradictions(graph)
     for line in lines:
         say(f"irtwin: {location.folder}: {line}")
     if lines:

@@ -64,7 +64,7 @@ def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, 
     return left
 
 
-def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float | None = None) -> Tables:
+def energy_tables(energy: LiveEnergy, header: Header, began: float) -> Tables:
     """Return the rows of a run's energy with their activity, which was from `began` on, s since 1970."""
     activity_id = live_run.activities(header.run_id)[1]
     if energy.known is None:
@@ -72,10 +72,9 @@ def energy_tables(energy: LiveEnergy, header: Header, began: float, ended: float
     made = energy.tables(activity_id)
     if not made:
         return {}
-    activity = live_run.activity(header, activity_id, "energy", began, ended)
     uses = live_energy.used(header.run_id, energy.known)
     return {
-        "activity": [activity],
+        "activity": [live_run.activity(header, activity_id, "energy", began)],
         "activity_use": [_use(activity_id, entity) for entity in uses],
         **made,
     }

@@ -125,9 +125,9 @@ def activities(run_id: str) -> tuple[str, str]:
     return watching(run_id), f"energy.{run_id}"
 
 
-def activity(header: Header, activity_id: str, provider: str, began: float, ended: float | None = None) -> Values:
-    """Return the row of an activity on a run; times in s since 1970."""
-    row = {
+def activity(header: Header, activity_id: str, provider: str, began: float) -> Values:
+    """Return the row of an activity on a run that was from `began` on, s since 1970."""
+    return {
         "activity_id": activity_id,
         "robot_id": header.robot_id,
         "provider": provider,
@@ -135,7 +135,6 @@ def activity(header: Header, activity_id: str, provider: str, began: float, ende
         "started": moment_of(began),
         "software": f"irtwin {version('irtwin')}",
     }
-    return row if ended is None else row | {"ended": moment_of(ended)}
 
 
 def together(*parts: Tables) -> Tables:

@@ -8,7 +8,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from irtwin.report.plant import page
-from irtwin.report.plant.energies import Days, EnergyKind, by_day, days, kind, share
+from irtwin.report.plant.energies import by_day, days, kind, share
 from irtwin.report.plant.load import load
 from irtwin.report.plant.overview import PLANT_TREND, states
 from irtwin.report.plant.sheet import Sheet
@@ -51,7 +51,9 @@ def of_robot(answers: Answers, zone: ZoneInfo) -> dict[str, Any]:
     daily = {of: found for (_, of), found in by_day(answers["days"].rows).items()}
     standing = answers["standstill"].first
     return {
-        "energies": [_energy(row, daily) for row in energies],
+        "energies": [
+            (kind(row["energy_from"]), row, days(daily.get(row["energy_from"], {}), PLANT_TREND)) for row in energies
+        ],
         "standing": share(standing["idle_s"], standing["known_s"]) if standing else None,
         "state": next(iter(states(answers).values()), None),
         "most_runs": MOST_RUNS,
@@ -83,10 +85,6 @@ def runs_sheet(answers: Answers) -> Sheet:
 def ledger_sheet(answers: Answers) -> Sheet:
     """Return a run's energy by joint and effect, which `ledger.rq` answers."""
     return _sheet(answers["ledger"].rows, _LEDGER)
-
-
-def _energy(row: Row, daily: Mapping[str, Mapping[str, float]]) -> tuple[EnergyKind, Row, Days | None]:
-    return kind(row["energy_from"]), row, days(daily.get(row["energy_from"], {}), PLANT_TREND)
 
 
 def _sheet(rows: tuple[Row, ...], columns: Mapping[str, str]) -> Sheet:
