@@ -57,13 +57,13 @@ def test_shares_of_time_and_of_energy(answers: Answers) -> None:
     line = overview.overview(answers).groups[0].lines[0]
     assert line.standing == pytest.approx((0.1 * 10 + 0.2 * 20 + 0.8 * 30) / 60)
     assert line.standby == pytest.approx((500 + 1000 + 1500) / (980 + 1760 + 1568))
-    assert (line.state.words, line.state.live, line.alarms, line.reidentify) == ("standing still", None, 0, True)
+    assert (line.state["words"], line.state["live"], line.alarms, line.reidentify) == ("standing still", None, 0, True)
     assert line.gap is not None and (line.gap["verdict"], line.gap["closed"]) == ("attributed", 0.8)
 
 
 def test_a_robot_that_is_watched(answers: Answers) -> None:
     line = overview.overview(answers).groups[0].lines[1]
-    assert (line.name, line.state.words, line.state.live, line.alarms) == (
+    assert (line.name, line.state["words"], line.state["live"], line.alarms) == (
         "Arm_B", "no news: no state came for 2.0 s", "stale", 1
     )  # fmt: skip
     assert "/live/Arm_B" in drawn(answers)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from irtwin.report.plant.choice import ALL, Selection
@@ -17,15 +16,6 @@ PLANT_TREND = 90
 
 
 @dataclass(frozen=True)
-class RobotState:
-    """What a robot does, in words; `live` is "flowing" or "stale" where it is watched just now."""
-
-    words: str
-    live: str | None = None
-    at: datetime | None = None
-
-
-@dataclass(frozen=True)
 class RobotLine:
     """A robot's energy of one kind, with all that is known of the robot beside it."""
 
@@ -33,7 +23,7 @@ class RobotLine:
     name: str
     measured_at: str | None
     simulated: bool
-    state: RobotState
+    state: Row  # `words`: what it does; `live`: "flowing" or "stale" where it is watched just now; `began`: since when
     runs: int
     time_s: float | None
     energy_j: float | None
@@ -110,11 +100,6 @@ def overview(answers: Answers, asked: Selection = ALL) -> Overview:
     )
 
 
-def states(answers: Answers) -> dict[str, RobotState]:
-    """Return what each robot that is watched just now does, by its IRI."""
-    return {row["robot"]: _watched(row) for row in answers["live"].rows}
-
-
 def sheet(plant: Overview) -> Sheet:
     """Return the table of robots, a row for each kind of energy of each."""
     tariff = plant.tariff
@@ -127,7 +112,7 @@ def sheet(plant: Overview) -> Sheet:
     ]  # fmt: skip
     rows = [
         (
-            line.name, line.robot, line.state.words, group.kind.name if group.kind else None,
+            line.name, line.robot, line.state["words"], group.kind.name if group.kind else None,
             line.measured_at if group.kind is KINDS["measured"] else None, line.runs, line.time_s,
             kwh(line.energy_j),
             *([line.cost] if tariff["price"] is not None else []),
@@ -194,7 +179,7 @@ class _Beside:
         self.alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
         self.reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
         self.gaps = {row["robot"]: row for row in answers["gaps"].rows}  # the last of each
-        self.states = states(answers)
+        self.states = {row["robot"]: row for row in answers["live"].rows}
 
 
 def _line(
@@ -208,7 +193,7 @@ def _line(
         name=robot["name"],
         measured_at=robot["measured_at"],
         simulated=bool(robot["simulated"]),
-        state=beside.states.get(iri) or _left(robot),
+        state=beside.states.get(iri) or {"words": robot["words"], "live": None, "began": robot["last_began"]},
         runs=(energy["runs"] if energy is not None else robot["runs"]) or 0,
         time_s=energy["time_s"] if energy is not None else robot["time_s"],
         energy_j=joules,
@@ -223,22 +208,6 @@ def _line(
         saving=beside.savings.get(iri) if electrical is not None else None,
         of=of_group,
     )  # fmt: skip
-
-
-_STATES = {"moving": "moving", "standstill": "standing still"}
-
-
-def _watched(row: Row) -> RobotState:
-    if row["stream"] == "stale":
-        return RobotState(f"no news: {row['why']}" if row["why"] else "no news", "stale", row["began"])
-    return RobotState(_STATES.get(row["state"], "watched"), "flowing", row["began"])
-
-
-def _left(robot: Row) -> RobotState:
-    """Return what a robot did at the end of its last run."""
-    if robot["last_began"] is None:
-        return RobotState("no run yet" if not robot["runs"] else "not known")
-    return RobotState(_STATES.get(robot["state"], "not known"), None, robot["last_began"])
 
 
 def _saving(line: RobotLine) -> list[float | None]:

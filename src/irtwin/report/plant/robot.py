@@ -10,7 +10,7 @@ from zoneinfo import ZoneInfo
 from irtwin.report.plant import page
 from irtwin.report.plant.energies import by_day, days, kind, share
 from irtwin.report.plant.load import load
-from irtwin.report.plant.overview import PLANT_TREND, states
+from irtwin.report.plant.overview import PLANT_TREND
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion, Row
 
@@ -55,7 +55,6 @@ def of_robot(answers: Answers, zone: ZoneInfo) -> dict[str, Any]:
             (kind(row["energy_from"]), row, days(daily.get(row["energy_from"], {}), PLANT_TREND)) for row in energies
         ],
         "standing": share(standing["idle_s"], standing["known_s"]) if standing else None,
-        "state": next(iter(states(answers).values()), None),
         "most_runs": MOST_RUNS,
         "load": load(answers["load"].rows, zone),
     }
