@@ -48,28 +48,32 @@ ANSWERS = answered(
 )
 
 
-def test_proposals_come_first_and_the_greatest_of_them() -> None:
-    found = actions(ANSWERS)
-    assert [one["what"] for one in found] == ["large", "small", "second", "done", "first"]
+def test_actions_are_of_the_robots_that_are_asked_for() -> None:
     assert [one["name"] for one in actions(ANSWERS, Selection(find="b"))] == ["B", "B"]
 
 
-def test_two_changes_of_one_day_are_told_together() -> None:
+def test_proposals_come_first_and_changes_of_one_day_are_told_together() -> None:
     store = Store()
-    done = {"A": ("one", "two"), "B": ("one",)}
+    done = {"A": {"one": 1, "two": 1}, "B": {"one": 1, "later": 2}}
     told = "".join(
-        f'id:{robot}_{what} a irt:Saving_Action ; irt:saves_at id:{robot} ; irt:Done_On "2026-03-01" .'
+        f'id:{robot}_{what} a irt:Saving_Action ; irt:saves_at id:{robot} ; irt:Done_On "2026-03-0{day}" .'
         for robot, some in done.items()
-        for what in some
+        for what, day in some.items()
     )
     names = "".join(f'id:{robot} irt:has_Information [ irt:IR_Name "{robot}" ] .' for robot in done)
     prefixes = f"@prefix irt: <{IRT}> . @prefix id: <{ID}> ."
-    store.load(f"{prefixes} {told} {names} id:A_three a irt:Saving_Action ; irt:saves_at id:A .", RdfFormat.TURTLE)
+    proposed = " ".join(
+        f"id:A_{what} a irt:Saving_Action ; irt:saves_at id:A ; irt:called_for_by [ irt:Yearly_Saving {year}.0e0 ] ."
+        for what, year in (("small", 1), ("large", 5))
+    )
+    store.load(f"{prefixes} {told} {names} {proposed}", RdfFormat.TURTLE)
     rows = cast(QuerySolutions, store.query(page.questions()["actions"].text))
     said = [(row["action"].value.removeprefix(ID), row["state"].value, row["others"]) for row in rows]
-    assert [(name, state, None if others is None else int(others.value)) for name, state, others in sorted(said)] == [
+    assert [(name, state, None if others is None else int(others.value)) for name, state, others in said] == [
+        ("A_large", "proposed", None),
+        ("A_small", "proposed", None),
+        ("B_later", "done, not verified yet", 0),
         ("A_one", "done, not verified yet", 1),
-        ("A_three", "proposed", None),
         ("A_two", "done, not verified yet", 1),
         ("B_one", "done, not verified yet", 0),
     ]

@@ -9,15 +9,9 @@ from irtwin.report.questions import Answers, Row
 
 
 def actions(answers: Answers, asked: Selection = ALL) -> tuple[Row, ...]:
-    """Return what `actions.rq` answers of those `robots.rq` that are asked for.
-
-    Proposals come first, the greatest saving a year before all; then what was done, the newest first.
-    """
+    """Return what `actions.rq` answers of those `robots.rq` that are asked for."""
     robots = {robot["robot"] for robot in answers["robots"].rows if asked.finds(robot)}
-    found = [row for row in answers["actions"].rows if row["robot"] in robots]
-    found.sort(key=lambda row: (-(row["year_j"] or 0.0), row["name"], row["what"]))
-    found.sort(key=lambda row: row["done_on"] or "~", reverse=True)
-    return tuple(found)
+    return tuple(row for row in answers["actions"].rows if row["robot"] in robots)
 
 
 def actions_sheet(found: tuple[Row, ...]) -> Sheet:
