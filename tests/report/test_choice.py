@@ -30,7 +30,7 @@ def test_a_form_is_read() -> None:
 def test_days_narrow_energies(plant: KnowledgeGraph) -> None:
     asked = Selection(first="2026-03-03", last="2026-03-04")
     found = overview.overview(ask(plant, asked.of_days(page.questions()), {}), asked)
-    energies = {line.name: line.energy_j for group in found.groups for line in group.lines if group.kind}
+    energies = {line["name"]: line["energy_j"] for group in found.groups for line in group.lines if group.kind}
     assert energies == {"Arm_A": 1600.0, "Arm_B": 800.0, "Arm_C": 400.0}
     assert found.robots == 4
 
@@ -40,7 +40,7 @@ def test_robots_are_found_grouped_and_sorted(answers: Answers) -> None:
     said = {**answers, "robots": replace(answers["robots"], rows=tuple(rows))}
 
     def names(asked: Selection) -> list[str]:
-        return [line.name for line in overview.overview(said, asked).groups[0].lines]
+        return [line["name"] for line in overview.overview(said, asked).groups[0].lines]
 
     assert names(Selection(find="arm_b")) == names(Selection(find="7")) == ["Arm_B"]
     assert names(Selection(group="cell")) == ["Arm_B", "Arm_A"]
@@ -58,7 +58,7 @@ def test_what_saves_most_comes_first(answers: Answers) -> None:
     waiting = (ten, fifty)
     said = {**answers, "waiting": replace(answers["waiting"], rows=waiting)}
     (first, second) = overview.overview(said).groups[0].lines
-    assert (first.name, second.name) == ("Arm_B", "Arm_A")
+    assert (first["name"], second["name"]) == ("Arm_B", "Arm_A")
     found = overview.overview(said)
     assert found.saving_j == pytest.approx(60 * 3.6e6)
     html = page.render("page.html.jinja", said, {}, found=found, trouble="", file="", excel=True, reports=[])

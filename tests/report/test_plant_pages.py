@@ -41,10 +41,15 @@ def text(html: str) -> str:
 
 def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> None:
     found = overview.overview(answers)
-    groups = {group.kind.name if group.kind else None: [line.name for line in group.lines] for group in found.groups}
+    groups = {group.kind.name if group.kind else None: [line["name"] for line in group.lines] for group in found.groups}
     assert groups == {"measured": ["Arm_A", "Arm_B"], "mechanical": ["Arm_C"], None: [plants.HOSTILE]}
     (mechanical,) = (group.lines[0] for group in found.groups if group.kind is KINDS["mechanical"])
-    assert (mechanical.energy_j, mechanical.cost, mechanical.co2_kg, mechanical.standby) == (840.0, None, None, None)
+    assert (mechanical["energy_j"], mechanical["cost"], mechanical["co2_kg"], mechanical["standby"]) == (
+        840.0,
+        None,
+        None,
+        None,
+    )
     assert found.electrical_j == 5900.0
     assert found.cost == pytest.approx(5900 / 3.6e6 * 0.2)
     assert found.co2_kg == pytest.approx(5900 / 3.6e6 * 0.4)
@@ -55,15 +60,20 @@ def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> No
 
 def test_shares_of_time_and_of_energy(answers: Answers) -> None:
     line = overview.overview(answers).groups[0].lines[0]
-    assert line.standing == pytest.approx((0.1 * 10 + 0.2 * 20 + 0.8 * 30) / 60)
-    assert line.standby == pytest.approx((500 + 1000 + 1500) / (980 + 1760 + 1568))
-    assert (line.state["words"], line.state["live"], line.alarms, line.reidentify) == ("standing still", None, 0, True)
-    assert line.gap is not None and (line.gap["verdict"], line.gap["closed"]) == ("attributed", 0.8)
+    assert line["standing"] == pytest.approx((0.1 * 10 + 0.2 * 20 + 0.8 * 30) / 60)
+    assert line["standby"] == pytest.approx((500 + 1000 + 1500) / (980 + 1760 + 1568))
+    assert (line["state"]["words"], line["state"]["live"], line["alarms"], line["reidentify"]) == (
+        "standing still",
+        None,
+        0,
+        True,
+    )
+    assert line["gap"] is not None and (line["gap"]["verdict"], line["gap"]["closed"]) == ("attributed", 0.8)
 
 
 def test_a_robot_that_is_watched(answers: Answers) -> None:
     line = overview.overview(answers).groups[0].lines[1]
-    assert (line.name, line.state["words"], line.state["live"], line.alarms) == (
+    assert (line["name"], line["state"]["words"], line["state"]["live"], line["alarms"]) == (
         "Arm_B", "no news: no state came for 2.0 s", "stale", 1
     )  # fmt: skip
     assert "/live/Arm_B" in drawn(answers)
@@ -73,8 +83,8 @@ def test_energies_of_two_kinds_of_one_robot_are_two_lines(answers: Answers) -> N
     rows = answers["energy"].rows
     other = {**next(row for row in rows if row["robot"].endswith("Arm_A")), "energy_from": "modelled", "energy_j": 9e9}
     found = overview.overview({**answers, "energy": replace(answers["energy"], rows=(*rows, other))})
-    lines = [(group.kind.name, line.energy_j) for group in found.groups if group.kind for line in group.lines
-             if line.name == "Arm_A"]  # fmt: skip
+    lines = [(group.kind.name, line["energy_j"]) for group in found.groups if group.kind for line in group.lines
+             if line["name"] == "Arm_A"]  # fmt: skip
     assert lines == [("measured", 4600.0), ("modelled", 9e9)]
 
 

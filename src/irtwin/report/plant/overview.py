@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 from irtwin.report.plant.choice import ALL, Selection
@@ -16,51 +19,31 @@ PLANT_TREND = 90
 
 
 @dataclass(frozen=True)
-class RobotLine:
-    """A robot's energy of one kind, with all that is known of the robot beside it."""
-
-    robot: str
-    name: str
-    measured_at: str | None
-    simulated: bool
-    state: Row  # `words`: what it does; `live`: "flowing" or "stale" where it is watched just now; `began`: since when
-    runs: int
-    time_s: float | None
-    energy_j: float | None
-    cost: float | None
-    co2_kg: float | None
-    standing: float | None  # share of time
-    standby: float | None  # share of energy
-    trend: Days | None
-    alarms: int
-    reidentify: bool
-    gap: Row | None
-    saving: Row | None  # J in a year, were it off while it waits; its 95 % interval, where that is known
-    of: str  # what it is grouped by
-
-
-@dataclass(frozen=True)
 class Group:
-    """Energies of one kind, the largest first; `kind` is None for robots that have none."""
+    """Energies of one kind, the largest first; `kind` is None for robots that have none.
+
+    A line is a robot's: what `robots.rq` and `_robots` say of it, with `runs`, `time_s`, `energy_j` and `trend` of that
+    kind; of electrical energy also `cost`, `co2_kg`, `standby` (share of energy) and `saving` (J in a year, were it off
+    while it waits, with its 95 % interval).
+    """
 
     kind: EnergyKind | None
-    lines: tuple[RobotLine, ...]
+    lines: tuple[Row, ...]
 
     def total(self, name: str) -> float | None:
         """Add up a column that can be added up."""
-        return _sum(getattr(line, name) for line in self.lines)
+        return _sum(line[name] for line in self.lines)
 
     @property
     def parts(self) -> tuple[tuple[str, Group], ...]:
         """The lines by what they are grouped by, in its order; none where all are of one."""
-        names = sorted({line.of for line in self.lines})
-        parts = tuple((name, Group(self.kind, tuple(line for line in self.lines if line.of == name))) for name in names)
+        parts = tuple((name, Group(self.kind, tuple(own))) for name, own in groupby(self.lines, key=itemgetter("of")))
         return parts if len(parts) > 1 else ()
 
     @property
     def saving_j(self) -> float | None:
         """What its robots would save in a year, as far as that is known."""
-        return _sum(line.saving["energy_j"] for line in self.lines if line.saving is not None)
+        return _sum(line["saving"]["energy_j"] for line in self.lines if line["saving"] is not None)
 
 
 @dataclass(frozen=True)
@@ -90,7 +73,7 @@ def overview(answers: Answers, asked: Selection = ALL) -> Overview:
     return Overview(
         groups=groups,
         trends=tuple((one, trend) for one, trend in plants if trend is not None),
-        robots=len({line.robot for group in groups for line in group.lines}),
+        robots=len({line["robot"] for group in groups for line in group.lines}),
         electrical_j=_sum(group.total("energy_j") for group in electrical),
         cost=_sum(group.total("cost") for group in electrical),
         co2_kg=_sum(group.total("co2_kg") for group in electrical),
@@ -112,13 +95,13 @@ def sheet(plant: Overview) -> Sheet:
     ]  # fmt: skip
     rows = [
         (
-            line.name, line.robot, line.state["words"], group.kind.name if group.kind else None,
-            line.measured_at if group.kind is KINDS["measured"] else None, line.runs, line.time_s,
-            kwh(line.energy_j),
-            *([line.cost] if tariff["price"] is not None else []),
-            *([line.co2_kg] if tariff["co2"] is not None else []),
-            line.standing, line.standby, line.alarms, line.gap["verdict"] if line.gap else None,
-            line.gap["closed"] if line.gap else None,
+            line["name"], line["robot"], line["state"]["words"], group.kind.name if group.kind else None,
+            line["measured_at"] if group.kind is KINDS["measured"] else None, line["runs"], line["time_s"],
+            kwh(line["energy_j"]),
+            *([line["cost"]] if tariff["price"] is not None else []),
+            *([line["co2_kg"]] if tariff["co2"] is not None else []),
+            line["standing"], line["standby"], line["alarms"], line["gap"]["verdict"] if line["gap"] else None,
+            line["gap"]["closed"] if line["gap"] else None,
             *(_saving(line) if tariff["hours"] is not None else []),
         )
         for group in plant.groups for line in group.lines
@@ -146,73 +129,64 @@ def _groups(answers: Answers, asked: Selection) -> list[Group]:
     for row in answers["energy"].rows:
         known.setdefault(row["robot"], []).append(row)
     daily = by_day(answers["days"].rows)
-    beside = _Beside(answers)
-    lines: dict[EnergyKind | None, list[RobotLine]] = {}
-    for robot in {row["robot"]: row for row in answers["robots"].rows}.values():
-        if not asked.finds(robot):
-            continue
-        of_group = (robot[asked.group] or "not said") if asked.group else ""
+    lines: dict[EnergyKind | None, list[Row]] = {}
+    for robot in _robots(answers, asked):
         for energy in known.get(robot["robot"], [None]):
             of = kind(energy["energy_from"]) if energy is not None else None
             trend = days(daily.get((robot["robot"], energy["energy_from"]), {}), TREND) if energy is not None else None
-            lines.setdefault(of, []).append(_line(robot, energy, of, trend, beside, of_group))
+            lines.setdefault(of, []).append({**robot, "trend": trend, **_of_energy(robot, energy, of)})
     order = [*KINDS.values(), *(of for of in lines if of is not None and of.name not in KINDS), None]
     return [
         Group(of, tuple(sorted(lines[of], key=lambda line: _place(line, asked.sort)))) for of in order if of in lines
     ]  # fmt: skip
 
 
-def _place(line: RobotLine, by: str) -> tuple[Any, ...]:
+def _robots(answers: Answers, asked: Selection) -> Iterator[Row]:
+    """Yield the robots that are asked for, with what is known of each beside its energies.
+
+    `state`: what it does, in `words`, and how its stream goes where it is watched; `standing`: share of time; `alarms`:
+    how many are active; `of`: what it is grouped by.
+    """
+    waiting, gaps, live = ({row["robot"]: row for row in answers[name].rows} for name in ("waiting", "gaps", "live"))
+    standing = {row["robot"]: share(row["idle_s"], row["known_s"]) for row in answers["standstill"].rows}
+    alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
+    reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
+    for iri, robot in {row["robot"]: row for row in answers["robots"].rows}.items():
+        if asked.finds(robot):
+            yield {
+                **robot,
+                "state": live.get(iri) or {"words": robot["words"], "live": None, "began": robot["last_began"]},
+                "standing": standing.get(iri),
+                "alarms": alarms[iri],
+                "reidentify": iri in reidentify,
+                "gap": gaps.get(iri),
+                "waiting": waiting.get(iri),
+                "of": (robot[asked.group] or "not said") if asked.group else "",
+            }
+
+
+def _of_energy(robot: Row, energy: Row | None, of: EnergyKind | None) -> Row:
+    """Return what a line says of an energy of a robot; only an electrical one has a price."""
+    nothing = dict.fromkeys(("energy_j", "cost", "co2_kg", "standby", "saving"))
+    if energy is None or of is None:
+        return {**nothing, "runs": robot["runs"] or 0}
+    line = {**nothing, **{name: energy[name] for name in ("runs", "time_s", "energy_j")}}
+    if of.electrical:
+        line |= {name: energy[name] for name in ("cost", "co2_kg")}
+        line |= {"standby": share(energy["standby_j"], energy["modelled_j"]), "saving": robot["waiting"]}
+    return line
+
+
+def _place(line: Row, by: str) -> tuple[Any, ...]:
     """Return what a line is sorted by: its group; then what is asked for, else what it could save; then its energy."""
-    saving = line.saving["energy_j"] if line.saving is not None else None
-    first = {"standby": line.standby, "standing": line.standing, "alarms": line.alarms, "runs": line.runs,
-             "energy": line.energy_j}.get(by, saving)  # fmt: skip
-    return line.of, -(first if first is not None else -1.0), -(line.energy_j or 0.0), line.name
+    saving = line["saving"]["energy_j"] if line["saving"] is not None else None
+    first = saving if by in ("", "saving") else line["energy_j" if by == "energy" else by]
+    return line["of"], -(first if first is not None else -1.0), -(line["energy_j"] or 0.0), line["name"]
 
 
-class _Beside:
-    """What is known of robots beside their energies, by their IRIs."""
-
-    def __init__(self, answers: Answers) -> None:
-        self.savings = {row["robot"]: row for row in answers["waiting"].rows}
-        self.standing = {row["robot"]: share(row["idle_s"], row["known_s"]) for row in answers["standstill"].rows}
-        self.alarms = Counter(row["robot"] for row in answers["alarms"].rows if row["state"] == "active")
-        self.reidentify = {row["robot"] for row in answers["to_reidentify"].rows}
-        self.gaps = {row["robot"]: row for row in answers["gaps"].rows}  # the last of each
-        self.states = {row["robot"]: row for row in answers["live"].rows}
-
-
-def _line(
-    robot: Row, energy: Row | None, of: EnergyKind | None, trend: Days | None, beside: _Beside, of_group: str
-) -> RobotLine:
-    iri = robot["robot"]
-    joules = energy["energy_j"] if energy is not None else None
-    electrical = energy if of is not None and of.electrical else None
-    return RobotLine(
-        robot=iri,
-        name=robot["name"],
-        measured_at=robot["measured_at"],
-        simulated=bool(robot["simulated"]),
-        state=beside.states.get(iri) or {"words": robot["words"], "live": None, "began": robot["last_began"]},
-        runs=(energy["runs"] if energy is not None else robot["runs"]) or 0,
-        time_s=energy["time_s"] if energy is not None else robot["time_s"],
-        energy_j=joules,
-        cost=electrical["cost"] if electrical is not None else None,
-        co2_kg=electrical["co2_kg"] if electrical is not None else None,
-        standing=beside.standing.get(iri),
-        standby=share(electrical["standby_j"], electrical["modelled_j"]) if electrical is not None else None,
-        trend=trend,
-        alarms=beside.alarms[iri],
-        reidentify=iri in beside.reidentify,
-        gap=beside.gaps.get(iri),
-        saving=beside.savings.get(iri) if electrical is not None else None,
-        of=of_group,
-    )  # fmt: skip
-
-
-def _saving(line: RobotLine) -> list[float | None]:
+def _saving(line: Row) -> list[float | None]:
     ends = ("energy_j", "lower_j", "upper_j")
-    return [None if line.saving is None else kwh(line.saving[end]) for end in ends]
+    return [None if line["saving"] is None else kwh(line["saving"][end]) for end in ends]
 
 
 def _sum(values: Any) -> float | None:
