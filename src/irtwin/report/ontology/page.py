@@ -36,17 +36,11 @@ _ALIGNED = {  # vocabularies that only the alignment speaks of
 
 @dataclass
 class DocumentedTerm:
-    """A class, property or individual, with what the page says of it; links lead to IRIs."""
+    """A class, property or individual: what `terms.rq` says of it, and what it leads to, by IRIs."""
 
     iri: str
-    kind: str
     label: str
-    definition: str
-    example: str | None
-    source: str | None
-    unit: str | None
-    unit_symbol: str | None
-    unit_given_by: str | None
+    said: Mapping[str, Any]
     extends: str | None = None  # the module that it is of, where that does not ship
     links: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     values: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
@@ -149,10 +143,7 @@ def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[s
     known: dict[str, DocumentedTerm] = {}
     for row in _ask(store, "terms"):
         kind, extension = row["kind"].removeprefix(OWL), extensions.get(row["module"])
-        term = DocumentedTerm(
-            row["term"], kind, row["label"], row["definition"], row["example"], row["source"], row["unit"],
-            row["symbol"], row["beside"], None if extension is None else _stem(extension),
-        )  # fmt: skip
+        term = DocumentedTerm(row["term"], row["label"], row, None if extension is None else _stem(extension))
         known[term.iri] = term
         terms.setdefault(row["module"], {}).setdefault(kind, []).append(term)
     for row in _ask(store, "links"):
