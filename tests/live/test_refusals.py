@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from irtwin.errors import InputError
-from irtwin.live.refusals import _MOST_REASONS, RefusedLines
 from irtwin.live.stream_clock import WrongTime
+from irtwin.live.watch import _MOST_REASONS, RefusedLines
 
 
 def test_a_reason_is_told_once() -> None:

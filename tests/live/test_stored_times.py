@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from irtwin.live.stored_times import StoredTimes
+from irtwin.live.known_robots import StoredTimes
 from irtwin.storage.database import Workspace
 
 

@@ -6,7 +6,7 @@ import pytest
 from tests import gap_cases
 
 from irtwin.document.document import Document
-from irtwin.report.gap.headline import line, refused
+from irtwin.report.gap.summary import line, refused
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from irtwin.report.heading import heading
+from irtwin.report.wording import heading
 
 
 @pytest.mark.parametrize(

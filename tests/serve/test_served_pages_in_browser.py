@@ -11,7 +11,7 @@ import pytest
 from tests.endpoint import Server
 from tests.screens import complaints_of, faults, is_dark, narrow_and_dark
 
-from irtwin.report.heading import heading
+from irtwin.report.wording import heading
 
 pytestmark = pytest.mark.system
 

@@ -14,7 +14,7 @@ from tests import gap_cases, servo_arm
 from tests.data_sets import irtwin
 
 from irtwin.document.document import Change, Document
-from irtwin.report.gap.headline import line
+from irtwin.report.gap.summary import line
 from irtwin.simulator.playing import diagnose
 from irtwin.simulator.writing import together
 

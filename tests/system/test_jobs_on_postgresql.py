@@ -17,7 +17,7 @@ from tests.synthetic import as_run, measure, swing
 from irtwin import asking, workflow
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.live.stored_times import StoredTimes
+from irtwin.live.known_robots import StoredTimes
 from irtwin.location import Location
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import WATCHED_RUNS, ImprovementRound, Run

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from irtwin import __version__
-from irtwin.cli import alarms, bring, docs, graph, motion, robot, service, twin, upkeep
+from irtwin.cli import bring, docs, graph, motion, robot, service, twin, upkeep
 from irtwin.cli.options import add_speech, say, speech
 from irtwin.cli.sections import Sections
 from irtwin.errors import GraphBehind, InputError
@@ -81,7 +81,7 @@ def _check_system() -> None:
         "Find the gap": (twin.diagnose,),
         "Plan and save": (motion.plan, motion.predict, motion.optimise),
         "Ask": (graph.query, graph.explain, graph.export),
-        "Watch": (service.serve, service.live, alarms.alarms),
+        "Watch": (service.serve, service.live, service.alarms),
         "Keep": (upkeep.workspace,),
         "Learn": (docs.docs,),
     },

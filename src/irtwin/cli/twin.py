@@ -217,7 +217,6 @@ def diagnose(
     """
     from irtwin.diagnosing import diagnose as judge
     from irtwin.report.gap import summary
-    from irtwin.report.gap.headline import line, refused
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
@@ -241,8 +240,8 @@ def diagnose(
         announce=announce,
         **asked,
     )
-    click.echo(line(diagnosis.document, diagnosis.against))
-    for said in (*refused(diagnosis.document), *summary.filtered(diagnosis.document)):
+    click.echo(summary.line(diagnosis.document, diagnosis.against))
+    for said in (*summary.refused(diagnosis.document), *summary.filtered(diagnosis.document)):
         click.echo(said)
     for table in (
         summary.gap(diagnosis.document),

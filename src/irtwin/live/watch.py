@@ -16,9 +16,9 @@ from irtwin.live.broadcast import Broadcast
 from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
-from irtwin.live.refusals import RefusedLines
 from irtwin.live.replay import Replay
 from irtwin.live.rtde import Rtde
+from irtwin.live.stream_clock import WrongTime
 from irtwin.location import Location
 from irtwin.providers.names import find_robot, find_run
 from irtwin.providers.records import load_robot
@@ -29,7 +29,29 @@ from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
 from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
+_MOST_REASONS = 100  # of refused lines that are told: some for each robot of a cell; further ones are counted alone
 Announce = Callable[[str], None]
+
+
+class RefusedLines:
+    """Lines that were refused: all are counted, and each reason is told once; threads may refuse at once."""
+
+    def __init__(self, announce: Announce) -> None:
+        self.count = 0
+        self._announce = announce
+        self._told: set[str] = set()
+        self._lock = threading.Lock()
+
+    def refuse(self, error: InputError) -> None:
+        """Refuse a line by its error; one of a wrong time is told with the seconds of the first."""
+        reason = error.reason if isinstance(error, WrongTime) else str(error)
+        with self._lock:
+            self.count += 1
+            is_news = reason not in self._told and len(self._told) < _MOST_REASONS
+            if is_news:
+                self._told.add(reason)
+        if is_news:
+            self._announce(f"line refused: {error}")
 
 
 def watch(

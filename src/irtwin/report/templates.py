@@ -14,7 +14,6 @@ from irtwin.input_file import read_text
 from irtwin.report import wording
 from irtwin.report.apart import written_apart
 from irtwin.report.energy import tables
-from irtwin.report.heading import heading
 from irtwin.report.questions import effect_name
 from irtwin.resources import MOST_BYTES, Resources
 
@@ -65,7 +64,7 @@ def environment(resources: Resources) -> jinja2.Environment:
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,
         wording.angle, wording.position, wording.angular_speed, wording.moment, wording.local_name,
         wording.short_checksum, wording.decimals, wording.given, wording.unit_symbol, wording.listed,
-        wording.shown, tables.is_unsure, tables.scaled_interval, heading, effect_name,
+        wording.shown, tables.is_unsure, tables.scaled_interval, wording.heading, effect_name,
     )  # fmt: skip
     environment.filters |= {function.__name__: function for function in words}
     return environment

@@ -14,8 +14,8 @@ from starlette.responses import Response
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import prefixes
 from irtwin.report.energy.page import plotly, script
-from irtwin.report.heading import UNITS, WORDS
 from irtwin.report.plant.page import style as plant_style
+from irtwin.report.wording import UNITS, WORDS
 from irtwin.resources import Resources
 from irtwin.serve.protocol import Refusal
 from irtwin.virtual.robot_data import asset as scene_asset

@@ -5,7 +5,7 @@
   const OURS = "https://w3id.org/irtwin", XSD = "http://www.w3.org/2001/XMLSchema#";
   const NUMBERS = new Set(["integer", "decimal", "double", "float", "int", "long", "nonNegativeInteger"].map((name) => XSD + name));
 
-  // As report/heading.py does it, by the same tables.
+  // As report/wording.py does it, by the same tables.
   function headingOf(name, { units, words }) {
     const parts = name.replace(/([a-z])([A-Z][a-z])/g, "$1_$2").split("_").filter((part) => part);
     let unit = "";
