@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing
+from itertools import islice
 
 from irtwin.errors import InputError
 from irtwin.live.controller import Controller
@@ -156,12 +157,9 @@ class Rtde(Controller):
             yield values, math.nan if offset is None else offset
 
     def _by_name(self, values: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
-        said, place = {}, 0
-        for name, kind in self._fields.items():
-            width = _JOINTS if kind == "VECTOR6D" else 1
-            said[name] = values[place : place + width]
-            place += width
-        return said
+        left = iter(values)
+        widths = {name: _JOINTS if kind == "VECTOR6D" else 1 for name, kind in self._fields.items()}
+        return {name: tuple(islice(left, width)) for name, width in widths.items()}
 
     def _state(self, said: Mapping[str, tuple[float, ...]], offset: float) -> State:
         """Return the state of a data package. Raises InputError where a value is none of a robot."""
