@@ -20,8 +20,8 @@ def test_the_twin_is_judged_on_what_it_never_saw(graph: KnowledgeGraph):
     variances = [error / (0.035 + 0.01 * k) for k, error in enumerate(errors)]
     pooled = 1 - sum(errors) / sum(variances)
     torque, energy = verdict.torque(found), verdict.energy(found)
-    assert torque and torque.row["r_squared"] == pytest.approx(pooled)
-    assert energy and energy.row["runs"] == 2
+    assert torque and torque["r_squared"] == pytest.approx(pooled)
+    assert energy and energy["runs"] == 2
 
 
 def test_a_run_cut_in_time_is_said_to_be_so(graph: KnowledgeGraph):

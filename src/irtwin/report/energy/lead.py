@@ -109,6 +109,6 @@ def trust(answers: Answers) -> str:
 def constant_power(answers: Answers) -> Row | None:
     """Return how a constant power does on the held-out runs that judge the twin; None where others judge it."""
     judged, constant = verdict.energy(answers), answers["baseline"].first
-    if judged is None or constant is None or judged.row["part"] != "held_out":
+    if judged is None or constant is None or judged["part"] != "held_out":
         return None
-    return constant if constant["runs"] == judged.row["runs"] else None
+    return constant if constant["runs"] == judged["runs"] else None

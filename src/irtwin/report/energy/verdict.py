@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from irtwin.report import wording
 from irtwin.report.questions import Answers, Row, limits
@@ -17,20 +16,12 @@ _ENERGY_PARTS = (
 )
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A summary row, and in words the data it was judged on."""
-
-    row: Row
-    on: str
-
-
-def torque(answers: Answers) -> Judged | None:
+def torque(answers: Answers) -> Row | None:
     """Return how well the twin explains joint torque, None where no torque was measured."""
     return _best(answers["torque_verdict"].rows, _TORQUE_PARTS)
 
 
-def energy(answers: Answers) -> Judged | None:
+def energy(answers: Answers) -> Row | None:
     """Return how well the twin gives energy, None where no power was measured."""
     return _best(answers["energy_verdict"].rows, _ENERGY_PARTS)
 
@@ -50,23 +41,24 @@ def sentence(answers: Answers) -> str:
     return "The twin was identified, but no measurement can check it."
 
 
-def _explains(judged: Judged, answers: Answers) -> str:
+def _explains(judged: Row, answers: Answers) -> str:
     least = limits(answers)["torque_explained"]
     weak = [
         row["joint"]
         for row in answers["torque_fit_per_joint"].rows
-        if row["part"] == judged.row["part"] and row["r_squared"] < least
+        if row["part"] == judged["part"] and row["r_squared"] < least
     ]
     but = f", though little of {wording.listed(weak)}," if weak else ""
-    return f"explains {wording.share(judged.row['r_squared'])} of joint-torque variance {judged.on}{but}"
+    return f"explains {wording.share(judged['r_squared'])} of joint-torque variance {judged['on']}{but}"
 
 
-def _misses(judged: Judged, answers: Answers) -> str:
-    error = wording.percent(judged.row["error_percent"])
+def _misses(judged: Row, answers: Answers) -> str:
+    error = wording.percent(judged["error_percent"])
     seed = wording.percent(limits(answers)["seed_energy_error"], 3)
-    return f"misses the energy {judged.on} by {error}; the seed paper (Yan et al., 2018) reached {seed}"
+    return f"misses the energy {judged['on']} by {error}; the seed paper (Yan et al., 2018) reached {seed}"
 
 
-def _best(rows: Sequence[Row], parts: Sequence[tuple[str, str]]) -> Judged | None:
+def _best(rows: Sequence[Row], parts: Sequence[tuple[str, str]]) -> Row | None:
     by_part = {row["part"]: row for row in rows}
-    return next((Judged(by_part[part], on) for part, on in parts if part in by_part), None)
+    """Return the row of the first part that there is, with the data it was judged on in words, `on`."""
+    return next(({**by_part[part], "on": on} for part, on in parts if part in by_part), None)
