@@ -49,17 +49,6 @@ class Parameters:
     others: tuple[tuple[str, tuple[ParameterLine, ...]], ...]
 
 
-@dataclass(frozen=True)
-class Conclusion:
-    """What was concluded, about which individuals, by which reasoner or rules, and how the first is known."""
-
-    label: str
-    definition: str | None
-    about: tuple[str, ...]
-    by: tuple[str, ...]
-    known: Explanation | None
-
-
 # A rigid body's parameters are many, and few people read them one by one: they stay a list.
 _MATRIX_NAMES = 4
 
@@ -79,23 +68,23 @@ def parameters(rows: Sequence[Row], joints: Sequence[Row]) -> Parameters:
     return Parameters(tuple(row["joint"] for row in joints), tuple(per_joint), tuple(others))
 
 
-def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> tuple[Conclusion, ...]:
-    """Gather the individuals about which the same was concluded; `explain` says of one how it is known."""
-    gathered = []
+def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> list[Row]:
+    """Gather the individuals about which the same was concluded, and who concluded it.
+
+    `explain` says of the first of them how it is `known`.
+    """
+    gathered: list[Row] = []
     for iri, group in groupby(rows, key=lambda row: row["conclusion"]):
         found = list(group)
-        gathered.append(
-            Conclusion(
-                label=found[0]["label"] or wording.local_name(iri).replace("_", " "),
-                definition=found[0]["definition"],
-                about=tuple(dict.fromkeys(_about(row) for row in found)),
-                by=tuple(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
-                known=None
-                if explain is None or found[0]["object"] is None
-                else explain(*(found[0][name] for name in ("about", "property", "object"))),
-            )
-        )
-    return tuple(gathered)
+        first, fact = found[0], [found[0][name] for name in ("about", "property", "object")]
+        gathered.append({
+            "label": first["label"] or wording.local_name(iri).replace("_", " "),
+            "definition": first["definition"],
+            "about": list(dict.fromkeys(map(_about, found))),
+            "by": list(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
+            "known": None if explain is None or first["object"] is None else explain(*fact),
+        })  # fmt: skip
+    return gathered
 
 
 def _about(row: Row) -> str:

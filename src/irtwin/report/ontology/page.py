@@ -68,16 +68,6 @@ class Module:
     terms: Mapping[str, list[DocumentedTerm]]
 
 
-@dataclass(frozen=True)
-class Node:
-    """A class in the tree: its label, the anchor that it leads to, its superclasses elsewhere, the classes below it."""
-
-    label: str
-    anchor: str
-    beside: list[str]
-    below: list[Node]
-
-
 def write_page(out: Path, known: Resources | None = None) -> None:
     """Write the documentation of the ontology that is `known`, or else ships. Raises InputError where it cannot."""
     check_place(out)
@@ -168,8 +158,11 @@ def _imported(store: Store) -> list[str]:
     return sorted(imports, key=text.index)
 
 
-def _forests(modules: list[Module], known: Mapping[str, DocumentedTerm]) -> dict[str, list[Node]]:
-    """Return the trees of each module's classes; superclasses that are not of the module stand beside a class."""
+def _forests(modules: list[Module], known: Mapping[str, DocumentedTerm]) -> dict[str, list[dict[str, Any]]]:
+    """Return the trees of each module's classes: a label, the anchor that it leads to, and the classes `below`.
+
+    `beside` are its superclasses that are not of the module.
+    """
     forests = {}
     for module in modules:
         classes = [term for term in module.terms.get("Class", []) if term.own]
@@ -178,14 +171,17 @@ def _forests(modules: list[Module], known: Mapping[str, DocumentedTerm]) -> dict
     return forests
 
 
-def _nodes(classes: list[DocumentedTerm], above: str | None, known: Mapping[str, DocumentedTerm]) -> Iterator[Node]:
+def _nodes(
+    classes: list[DocumentedTerm], above: str | None, known: Mapping[str, DocumentedTerm]
+) -> Iterator[dict[str, Any]]:
     names = {term.iri for term in classes}
     for term in classes:
         inside = [parent for parent in term.links["subclass of"] if parent in names]
         outside = [parent for parent in term.links["subclass of"] if parent not in names]
         if (inside[0] if inside else None) == above:
             beside = [known[it].label if it in known and known[it].own else short(it) for it in outside]
-            yield Node(term.label, term.anchor, beside, list(_nodes(classes, term.iri, known)))
+            below = list(_nodes(classes, term.iri, known))
+            yield {"label": term.label, "anchor": term.anchor, "beside": beside, "below": below}
 
 
 def _link(iri: Any, known: Mapping[str, DocumentedTerm]) -> Markup:
