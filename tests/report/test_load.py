@@ -14,16 +14,17 @@ def test_hours_are_those_of_the_plants_clock() -> None:
     rows = [{"first_hour": FRIDAY, "by_hour": "10,20,40"}]
     found = load(rows, ZoneInfo("UTC"))
     assert found is not None
-    assert {(cell.weekday, cell.hour): cell.energy_j for row in found.week for cell in row if cell.energy_j} == {
+    taken = {(cell["weekday"], cell["hour"]): cell["energy_j"] for row in found["week"] for cell in row}
+    assert {at: energy for at, energy in taken.items() if energy} == {
         ("Friday", 22): 10.0, ("Friday", 23): 20.0, ("Saturday", 0): 40.0
     }  # fmt: skip
-    assert [(shift.name, shift.hours, shift.energy_j) for shift in found.shifts] == [
+    assert [(shift["name"], shift["hours"], shift["energy_j"]) for shift in found["shifts"]] == [
         (NIGHT, 2, 30.0),
         (WEEKEND, 1, 40.0),
     ]
-    assert (found.greatest.weekday, found.greatest.hour, found.greatest.height) == ("Saturday", 0, 1.0)
+    assert found["greatest"] == {"weekday": "Saturday", "hour": 0, "energy_j": 40.0, "height": 1.0}
     tokyo = load(rows, ZoneInfo("Asia/Tokyo"))
-    assert tokyo is not None and [shift.name for shift in tokyo.shifts] == [WEEKEND]
+    assert tokyo is not None and [shift["name"] for shift in tokyo["shifts"]] == [WEEKEND]
 
 
 def test_the_same_hour_of_several_weeks_is_its_mean() -> None:
@@ -34,11 +35,11 @@ def test_the_same_hour_of_several_weeks_is_its_mean() -> None:
     ]
     found = load(rows, ZoneInfo("UTC"))
     assert found is not None
-    assert found.week[0][6].energy_j == 20.0
-    assert [(shift.name, shift.hours, shift.energy_j) for shift in found.shifts] == [(EARLY, 2, 40.0)]
+    assert found["week"][0][6]["energy_j"] == 20.0
+    assert [(shift["name"], shift["hours"], shift["energy_j"]) for shift in found["shifts"]] == [(EARLY, 2, 40.0)]
 
 
 def test_nothing_and_nothing_taken() -> None:
     assert load([], ZoneInfo("UTC")) is None
     found = load([{"first_hour": FRIDAY, "by_hour": "0"}], ZoneInfo("UTC"))
-    assert found is not None and found.greatest.height == 0.0
+    assert found is not None and found["greatest"]["height"] == 0.0

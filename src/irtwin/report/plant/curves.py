@@ -7,39 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from irtwin.report import wording
 from irtwin.report.questions import Answers, Row
 from irtwin.signals.channels import CHANNELS, Channel
 
+Line = dict[str, Any]
 MEASURED, MODELLED = "measured", "modelled"
 _MODEL = "_model"
 _FIRST = ("power", "torque", "q", "command", "dq")  # what people look at first; other channels follow
 _SPANS = ("standing", "held_out")  # columns of yes and no, drawn as shades
-
-
-@dataclass(frozen=True)
-class CurveLine:
-    """A curve: `channel` of the series `kind` of a run, told by its place; `joint` is empty of the whole robot."""
-
-    run: int
-    kind: str
-    channel: str
-    joint: str
-    name: str
-    modelled: bool = False
-
-
-@dataclass
-class Panel:
-    """Lines of one quantity; samples times `scale` are in `unit`."""
-
-    title: str
-    unit: str
-    scale: float
-    lines: list[CurveLine] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -65,15 +44,18 @@ def of_run(answers: Answers) -> dict[str, Any] | None:
 def curves(runs: Sequence[Drawn], joints: Iterable[Row]) -> dict[str, Any] | None:
     """Return what a page's script draws of runs of one robot, None where they have no samples.
 
-    Of several runs it is what was measured alone: they are drawn over each other.
+    A panel is of one quantity: samples of its lines times `scale` are in `unit`. A line is a `channel` of the series
+    `kind` of a run, told by its place; `joint` is empty of the whole robot. Of several runs it is what was measured
+    alone: they are drawn over each other.
     """
     kinds = {row["joint_name"]: row["kind"] or "" for row in joints}
-    panels: dict[tuple[str, str], Panel] = {}
+    panels: dict[tuple[str, str], dict[str, Any]] = {}
     for number, run in enumerate(runs):
         for line, field_, channel in _lines(number, run, tuple(kinds), alone=len(runs) == 1):
-            unit, scale = _unit(channel, kinds.get(line.joint, ""))
+            unit, scale = _unit(channel, kinds.get(line["joint"], ""))
             title = CHANNELS["q"].label if field_ == "command" else channel.label
-            panels.setdefault((title, unit), Panel(title, unit, scale)).lines.append(line)
+            panel = {"title": title, "unit": unit, "scale": scale, "lines": []}
+            panels.setdefault((title, unit), panel)["lines"].append(line)
     if not panels:
         return None
     there = {name for row in runs[0].series if row["kind"] == MODELLED for name in _columns(row)}
@@ -81,12 +63,12 @@ def curves(runs: Sequence[Drawn], joints: Iterable[Row]) -> dict[str, Any] | Non
     return {
         "runs": [{"iri": run.iri, "name": run.name, "marks": run.marks} for run in runs],
         "joints": list(kinds),
-        "panels": [asdict(panel) for panel in panels.values()],
+        "panels": list(panels.values()),
         "spans": spans,
     }
 
 
-def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Iterable[tuple[CurveLine, str, Channel]]:
+def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Iterable[tuple[Line, str, Channel]]:
     """Yield the lines of a run in the order of their panels: measured, then what only the twin's series has."""
     has = {kind: set[str]() for kind in (MEASURED, MODELLED)}
     for row in run.series:
@@ -101,10 +83,14 @@ def _lines(number: int, run: Drawn, joints: Sequence[str], alone: bool) -> Itera
             label = joint or run.name if not alone else joint or MEASURED
             kind = next((kind for kind in (MEASURED, *has) if column in has[kind]), None)
             if kind is not None:
-                yield CurveLine(number, kind, column, joint, label, name == "command"), name, channel
+                yield _line(number, kind, column, joint, label, name == "command"), name, channel
             if alone and f"{column}{_MODEL}" in has[MODELLED]:
                 label = f"{joint}, by the twin" if joint else "by the twin"
-                yield CurveLine(number, MODELLED, f"{column}{_MODEL}", joint, label, True), name, channel
+                yield _line(number, MODELLED, f"{column}{_MODEL}", joint, label, True), name, channel
+
+
+def _line(run: int, kind: str, channel: str, joint: str, name: str, modelled: bool) -> Line:
+    return {"run": run, "kind": kind, "channel": channel, "joint": joint, "name": name, "modelled": modelled}
 
 
 def _columns(row: Row) -> list[str]:

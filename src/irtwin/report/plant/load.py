@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import timedelta
+from typing import Any
 from zoneinfo import ZoneInfo
 
 from irtwin.report.questions import Row
@@ -15,40 +15,12 @@ EARLY, LATE, NIGHT, WEEKEND = "early, 6 to 14 h", "late, 14 to 22 h", "night, 22
 _HOUR = timedelta(hours=1)
 
 
-@dataclass(frozen=True)
-class HourOfWeek:
-    """The hours of one weekday and time of day: their mean energy (J), None where none was logged; `height` 0 to 1."""
+def load(rows: Iterable[Row], zone: ZoneInfo) -> dict[str, Any] | None:
+    """Add up the hours that `load.rq` answers; None where it answers none.
 
-    weekday: str
-    hour: int
-    energy_j: float | None
-    height: float
-
-
-@dataclass(frozen=True)
-class Shift:
-    """The hours of a shift: how many, and their energy (J)."""
-
-    name: str
-    hours: int
-    energy_j: float
-
-
-@dataclass(frozen=True)
-class Load:
-    """When energy was taken: `week` a row a weekday, 24 cells each; the shifts in which something was logged."""
-
-    week: tuple[tuple[HourOfWeek, ...], ...]
-    shifts: tuple[Shift, ...]
-
-    @property
-    def greatest(self) -> HourOfWeek:
-        """The weekday and hour with the greatest mean energy."""
-        return max((cell for row in self.week for cell in row), key=lambda cell: cell.energy_j or 0.0)
-
-
-def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
-    """Add up the hours that `load.rq` answers; None where it answers none."""
+    `week` has a row a weekday, 24 cells each: their mean `energy_j`, None where none was logged, and `height`, 0 to 1;
+    the `greatest` cell is named. `shifts` are those in which something was logged, with their `hours` and `energy_j`.
+    """
     powers: dict[tuple[int, int], list[float]] = defaultdict(list)
     for row in rows:
         for number, joules in enumerate(map(float, row["by_hour"].split(","))):
@@ -58,20 +30,19 @@ def load(rows: Iterable[Row], zone: ZoneInfo) -> Load | None:
         return None
     means = {at: sum(energies) / len(energies) for at, energies in powers.items()}
     greatest = max(means.values())
-    week = tuple(
-        tuple(_cell(weekday, hour, means.get((weekday, hour)), greatest) for hour in range(24)) for weekday in range(7)
-    )
-    shifts = (
-        Shift(name, sum(map(len, hours)), sum(map(sum, hours)))
+    week = [[_cell(weekday, hour, means.get((weekday, hour)), greatest) for hour in range(24)] for weekday in range(7)]
+    shifts = [
+        {"name": name, "hours": sum(map(len, hours)), "energy_j": sum(map(sum, hours))}
         for name in (EARLY, LATE, NIGHT, WEEKEND)
         if (hours := [energies for at, energies in powers.items() if _shift(*at) == name])
-    )
-    return Load(week, tuple(shifts))
+    ]
+    cells = (cell for row in week for cell in row)
+    return {"week": week, "shifts": shifts, "greatest": max(cells, key=lambda cell: cell["energy_j"] or 0.0)}
 
 
-def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> HourOfWeek:
+def _cell(weekday: int, hour: int, energy: float | None, greatest: float) -> dict[str, Any]:
     height = max(energy or 0.0, 0.0) / greatest if greatest > 0 else 0.0
-    return HourOfWeek(WEEKDAYS[weekday], hour, energy, height)
+    return {"weekday": WEEKDAYS[weekday], "hour": hour, "energy_j": energy, "height": height}
 
 
 def _shift(weekday: int, hour: int) -> str:
