@@ -33,6 +33,8 @@ _FARTHEST = 1.0  # m from the flange to the centre of a load
 _OVERLOAD = 2.0  # times it
 _STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
+_BALANCE = 1000.0  # N m that a balancer may bear in its first order,
+_FALLING = 1 / 3  # and in each further one of the order before: the nearer its anchors are to each other, the more
 _TURN = np.linspace(0, 2 * np.pi, 181)
 
 
@@ -143,17 +145,21 @@ class GravityCompensation(JointEffect):
     orders: int = 2
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return one order and two, at the joint that makers balance: the first that gravity loads."""
-        shapes = self.variants(orders=(1, 2))
+        """Return one order to three, at the joint that makers balance: the first that gravity loads."""
+        shapes = self.variants(orders=(1, 2, 3))
         return shapes if robot is None else tuple(one.on(balanced_joint(robot)) for one in shapes)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return the torques that go with cos q, sin q, cos 2 q and sin 2 q."""
-        names = ("cos", "sin", "cos 2", "sin 2")[: 2 * self.orders]
-        return tuple(Term(name, force_unit(joint), joint.name, spread=1000.0) for name in names)
+        """Return the torques that go with cosine and sine of each order of the angle."""
+        unit = force_unit(joint)
+        return tuple(
+            Term(f"{wave} {order}" if order > 1 else wave, unit, joint.name, spread=_BALANCE * _FALLING ** (order - 1))
+            for order in range(1, self.orders + 1)
+            for wave in ("cos", "sin")
+        )
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return cos q, sin q, cos 2 q, sin 2 q."""
+        """Return cosine and sine of each order of the angle."""
         return self._waves(motion.q)
 
     def _waves(self, q: np.ndarray) -> tuple[np.ndarray, ...]:
