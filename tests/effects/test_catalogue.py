@@ -20,6 +20,7 @@ OTHER_MEANINGS = {
     "gap/localisation/operating_variable.py": {"mechanical_power"},  # what a residual follows
     "gap/localisation/locations.py": {"mechanical_power"},
     "identification/programmes.py": {"payload"},  # a kind of programme
+    "providers/records.py": {"rotor_inertia"},  # a joint's field
     "report/gap/experiment.py": {"payload"},
     "live/joint_stream.py": {"payload"},  # a field of a message
     "live/rtde.py": {"payload"},

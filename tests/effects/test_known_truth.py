@@ -258,9 +258,9 @@ CASES = [
     ),
     Case(load.CableDrag(joints=J2), {("k", "joint_2"): 6.0}, lambda s: only(6 * s.motion.q[:, 1]), off=0.1),
     Case(
-        load.CableDrag(stiffens=True, joints=J2),
+        load.CableDrag(stiffens=True, rest=0.5, joints=J2),
         {("k", "joint_2"): 6.0},
-        lambda s: only(6 * (s.motion.q[:, 1] - 0.3) + 4 * (s.motion.q[:, 1] - 0.3) ** 3),
+        lambda s: only(6 * s.motion.q[:, 1] + 4 * (s.motion.q[:, 1] - 0.5) ** 3),
         off=0.1,
     ),
     # a spring without length of its own: of one order, which gravity itself imitates

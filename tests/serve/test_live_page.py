@@ -104,7 +104,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
         )
     wait_for(lambda: page.inner_text("#energy") == written(row["energy"]))
     assert page.locator("#by-joint .bar").count() == 2
-    assert page.locator("#gaps .bar").count() == 3
+    wait_for(lambda: page.locator("#gaps .bar").count() == 3)
     page.goto(f"{robot.url}/live")
     wait_for(lambda: page.locator("#robots tr").count() == 1)
     assert page.inner_text("#robots a") == "Arm"

@@ -33,6 +33,7 @@ _FARTHEST = 1.0  # m from the flange to the centre of a load
 _OVERLOAD = 2.0  # times it
 _STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
+_RESTS = (-0.5, 0.0, 0.5)  # rad (m), tried for a hose: between two of them both forms are alike
 _BALANCE = 1000.0  # N m that a balancer may bear in its first order,
 _FALLING = 1 / 3  # and in each further one of the order before: the nearer its anchors are to each other, the more
 _TURN = np.linspace(0, 2 * np.pi, 181)
@@ -48,9 +49,9 @@ def balanced_joint(robot: Robot) -> str:
 
 @dataclass(frozen=True)
 class CableDrag(JointEffect):
-    """k (q - q0), or k (q - q0) + c (q - q0)^3 of one that `stiffens`: a hose package that pulls.
+    """k (q - q0), and c (q - rest)^3 of one that `stiffens` as it is stretched: a hose package that pulls.
 
-    Its constant part is a twin's torque offset.
+    Its constant part is a twin's torque offset. `rest`: where it is at rest, rad or m.
     """
 
     id: ClassVar[str] = "cable_drag"
@@ -59,51 +60,29 @@ class CableDrag(JointEffect):
     taken_off: ClassVar[str | None] = "with the hose package off"
 
     stiffens: bool = False
-
-    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return one as stiff wherever the joint is, and one that stiffens as it is stretched."""
-        return self.variants(stiffens=(False, True))
+    rest: float = 0.0
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return what goes with the angle, N m/rad, and of one that stiffens with its square and cube, N m at 1 rad."""
+        """Return k, and of one that stiffens c, N m (N) at 1 rad (m)."""
         straight = Term("k", f"{force_unit(joint)}/{joint.unit}", joint.name, spread=20.0)
-        if not self.stiffens:
-            return (straight,)
-        square, cube = (Term(f"c {power}", force_unit(joint), joint.name, spread=10.0) for power in (2, 3))
-        return straight, square, replace(cube, lowest=0.0)
+        return (straight, Term("c", force_unit(joint), joint.name, spread=10.0)) if self.stiffens else (straight,)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
-        """Return q, and of one that stiffens its square and cube."""
-        return tuple(motion.q**power for power in range(1, 4 if self.stiffens else 2))
+        """Return q, and (q - rest)^3 of one that stiffens."""
+        return (motion.q, (motion.q - self.rest) ** 3) if self.stiffens else (motion.q,)
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
-        """Return k, the stiffness where it is least: where the hose is at rest."""
-        if not self.stiffens:
-            return super().parameters(robot, given)
-        quantities = []
-        for place, joint in enumerate(self.acting(robot)):
-            own = slice(3 * place, 3 * place + 3)
-            least, slope = _least_stiffness(*given.values[own])
-            deviation = float(np.sqrt(slope @ given.covariance[own, own] @ slope))
-            quantities.append(quantity("k", joint.name, least, f"{force_unit(joint)}/{joint.unit}", deviation))
-        return tuple(quantities)
+        """Return k, the stiffness at rest."""
+        return tuple(one for one in super().parameters(robot, given) if one.name == "k")
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return that a hose pulls back."""
         return {"k": Possible(0.0, np.inf, "a hose pulls a joint back to where it is at rest")}
 
     def changes(self) -> tuple[Effect, ...]:
-        """Return the changes of the constant part, too: no offset beside it has to bring that."""
+        """Return the changes of the constant part, too: no offset beside it has to bring that. One may stiffen."""
         changed = ChangedCableDrag(joints=self.joints, runs=self.runs)
-        return changed.candidates()
-
-
-def _least_stiffness(straight: float, square: float, cube: float) -> tuple[float, np.ndarray]:
-    """Return the least of (straight + 2 square q + 3 cube q^2), and how it goes with each of the three."""
-    if cube <= 0:
-        return straight, np.array([1.0, 0.0, 0.0])
-    turned = square / (3 * cube)
-    return straight - turned * square, np.array([1.0, -2 * turned, 3 * turned**2])
+        return (changed, *replace(changed, stiffens=True).variants(rest=_RESTS))
 
 
 @dataclass(frozen=True)
@@ -115,7 +94,7 @@ class ChangedCableDrag(CableDrag):
 
     def standing(self) -> Effect:
         """Return it in a twin, whose torque offset has the constant part."""
-        return CableDrag(self.stiffens, joints=self.joints, runs=self.runs)
+        return CableDrag(self.stiffens, self.rest, joints=self.joints, runs=self.runs)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the terms of a hose, and k q0."""
@@ -124,12 +103,6 @@ class ChangedCableDrag(CableDrag):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return those of a hose, and -1."""
         return (*super().samples(robot, motion, predicted), np.full_like(motion.q, -1.0))
-
-    def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
-        """Return k."""
-        of_joint = len(given.values) // len(self.acting(robot))
-        own = np.flatnonzero(np.arange(len(given.values)) % of_joint < of_joint - 1)
-        return self.standing().parameters(robot, Coefficients(given.values[own], given.covariance[np.ix_(own, own)]))
 
 
 @dataclass(frozen=True)
