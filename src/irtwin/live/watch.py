@@ -106,9 +106,7 @@ def watch(
                 announce(f"Playing {replay}: {log.seconds:.1f} s at {speed:g} times its speed")
                 states = log.play(done, start)
             else:
-                source = (
-                    Rtde(str(rtde), described, robot_id) if opcua is None else _opcua(opcua, nodes, described, robot_id)
-                )
+                source = _controller(rtde, opcua, nodes, described, robot_id)
                 announce(f"Following {source.address}: {source.what}")
                 states = source.states(done, announce)
             _receive(states, take, refusals.refuse, twin.check)
@@ -167,7 +165,9 @@ def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], N
     return take_with_plan
 
 
-def _opcua(address: str, nodes: Path | None, robot: Robot, robot_id: str) -> Controller:
+def _controller(rtde: str | None, opcua: str | None, nodes: Path | None, robot: Robot, robot_id: str) -> Controller:
+    if opcua is None:
+        return Rtde(str(rtde), robot, robot_id)
     from irtwin.live.opcua import OpcUa  # an extra
 
-    return OpcUa(address, robot, robot_id, nodes)
+    return OpcUa(opcua, robot, robot_id, nodes)
