@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import update
@@ -12,6 +15,7 @@ from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, RDFS
+from irtwin.report.questions import Answers
 from irtwin.resources import folder
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
@@ -55,3 +59,16 @@ def make_empty_plant(place: Path) -> Path:
     with KnowledgeGraph(place / "graph") as graph:
         graph.load_ontology()
     return place / "graph"
+
+
+def many(answers: Answers, times: int) -> Answers:
+    """Return what would be answered of so many plants in one."""
+    return {
+        name: replace(answer, rows=tuple(_renamed(row, number) for number in range(times) for row in answer.rows))
+        for name, answer in answers.items()
+    }
+
+
+def _renamed(row: Mapping[str, Any], number: int) -> dict[str, Any]:
+    return {name: value.replace("Arm_", f"Arm_{number}_") if isinstance(value, str) else value
+            for name, value in row.items()}  # fmt: skip

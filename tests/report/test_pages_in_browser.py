@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
-from tests import gap_cases
+from tests import gap_cases, plants
 from tests.gap_pages import page_of as gap_page
 from tests.report.robots import PageOf, six_axis
 from tests.screens import faults, is_dark, narrow_and_dark, on_screen
@@ -15,6 +15,9 @@ from tests.screens import faults, is_dark, narrow_and_dark, on_screen
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
 from irtwin.report.ontology.page import write_page
+from irtwin.report.plant import overview
+from irtwin.report.plant import page as plant_page
+from irtwin.report.questions import ask
 
 pytestmark = pytest.mark.system
 LARGEST = 3_000_000  # bytes of a report
@@ -57,6 +60,22 @@ def test_the_energy_page(browser: Any, energy: Path) -> None:
     assert not page.locator(".modebar").first.is_visible() and not is_dark(page)
     paper = page.locator("#figure-torque .main-svg").first.evaluate("one => one.style.background")
     assert "255, 255, 255" in paper
+    page.context.close()
+
+
+@pytest.mark.parametrize(("width", "scheme", "screens"), [(1440, "light", 1.0), (400, "dark", 4.0)])
+def test_a_hundred_robots_fit_a_screen(
+    browser: Any, plant: KnowledgeGraph, width: int, scheme: str, screens: float
+) -> None:
+    answers = plants.many(ask(plant, plant_page.questions(), {}), 25)
+    beside = {"trouble": "", "file": "", "excel": False, "reports": []}
+    found = overview.overview(answers)
+    html = plant_page.render("page.html.jinja", answers, {}, found=found, **beside)
+    page = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme).new_page()
+    page.set_content(html.replace("</head>", f"<style>{plant_page.style()}</style></head>"))
+    assert page.locator("#glance").bounding_box()["height"] < screens * 900
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert faults(page, "#glance") == []
     page.context.close()
 
 

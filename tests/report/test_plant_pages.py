@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -128,10 +127,7 @@ def test_a_piece_and_a_cycle(answers: Answers) -> None:
 
 
 def test_more_than_a_hundred_robots(answers: Answers) -> None:
-    answers = {
-        name: replace(answer, rows=tuple(renamed(row, number) for number in range(30) for row in answer.rows))
-        for name, answer in answers.items()
-    }
+    answers = plants.many(answers, 30)
     found = overview.overview(answers)
     assert found.robots == sum(len(group.lines) for group in found.groups) == 120
     assert found.electrical_j == 30 * 5900.0
@@ -141,9 +137,20 @@ def test_more_than_a_hundred_robots(answers: Answers) -> None:
     assert len(overview.sheet(found).rows) == 120
 
 
-def renamed(row: Mapping[str, Any], number: int) -> dict[str, Any]:
-    return {name: value.replace("Arm_", f"Arm_{number}_") if isinstance(value, str) else value
-            for name, value in row.items()}  # fmt: skip
+def test_a_hundred_robots_at_a_glance(answers: Answers) -> None:
+    few, many = overview.overview(answers), overview.overview(plants.many(answers, 30))
+    assert few.glance == () and "glance" not in drawn(answers)
+    names = [line["name"] for line in many.glance]
+    assert len(names) == 120 and names[:2] == ["Arm_0_A", "Arm_10_A"] and names[60:61] == ["Arm_0_C"]
+    html = drawn(plants.many(answers, 30))
+    _, *parts = html.split('id="glance"')[1].split("</section>")[0].split("<table>")
+    assert [part.count('<th scope="row">') for part in parts] == [34, 34, 34]
+    assert [re.findall('colspan="6">(.*?)</th>', part) for part in parts] == [
+        ["Electrical energy, measured"], ["Electrical energy, measured", "Mechanical energy by the twin"],
+        ["Mechanical energy by the twin", "No energy yet"],
+    ]  # fmt: skip
+    assert "Arm_0_A: 3 runs; cost 0.000256 EUR; CO₂ 0.000511 kg; stands still 48" in html
+    assert 'href="?page=2#glance"' in html
 
 
 @pytest.mark.parametrize("name", ["Arm_A", "Arm_C", "Arm_D"])

@@ -14,6 +14,8 @@ from irtwin.report.plant.energies import KINDS, Days, EnergyKind, added_up, by_d
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, Row
 
+FIT = 20  # robots that a screen shows in full; more are shown at a glance, too
+SCREEN = 102  # robots at a glance on a screen of 1440 x 900: three columns of lines of 20 pixels
 TREND = 30  # days in a robot's trend
 PLANT_TREND = 90
 
@@ -59,6 +61,15 @@ class Overview:
     standby: float | None
     saving_j: float | None  # a year
     tariff: Row
+
+    @property
+    def glance(self) -> tuple[Row, ...]:
+        """A line of each robot where they are many: of the first kind of energy that is known, which is its `kind`."""
+        lines: dict[str, Row] = {}
+        for group in self.groups:
+            for line in group.lines:
+                lines.setdefault(line["robot"], {**line, "kind": group.kind})
+        return tuple(lines.values()) if len(lines) > FIT else ()
 
 
 def overview(answers: Answers, asked: Selection = ALL) -> Overview:

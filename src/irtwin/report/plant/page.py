@@ -13,6 +13,7 @@ from irtwin.knowledge.vocabulary import ID
 from irtwin.providers.verification import FEWEST
 from irtwin.report.plant import choice, links
 from irtwin.report.plant.energies import kwh
+from irtwin.report.plant.overview import SCREEN
 from irtwin.report.questions import Answers, PageQuestion, read_questions
 from irtwin.report.templates import environment
 
@@ -54,6 +55,7 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: A
             "asked": choice.ALL,
             "groups": choice.GROUPS,
             "sorts": choice.SORTS,
+            "screen": SCREEN,
             **values,
         },
     )
@@ -78,15 +80,15 @@ def _templates(base: str) -> jinja2.Environment:
     return templates
 
 
-def pages(lines: Sequence[object]) -> int:
-    """Return how many pages so many lines take, one at least."""
-    return max(1, -(-len(lines) // PAGE))
+def pages(lines: Sequence[object], size: int = PAGE) -> int:
+    """Return how many pages of a size so many lines take, one at least."""
+    return max(1, -(-len(lines) // size))
 
 
-def on_page(lines: Sequence[T], number: int) -> Sequence[T]:
+def on_page(lines: Sequence[T], number: int, size: int = PAGE) -> Sequence[T]:
     """Return the lines of a page, the first of which is 1; beyond the last, those of the last."""
-    start = (min(number, pages(lines)) - 1) * PAGE
-    return lines[start : start + PAGE]
+    start = (min(number, pages(lines, size)) - 1) * size
+    return lines[start : start + size]
 
 
 def page_number(text: str | None) -> int:
