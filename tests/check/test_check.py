@@ -230,7 +230,15 @@ def test_measured_logs_show_what_is_known_of_them(name: str):
 
 @pytest.mark.system
 @pytest.mark.parametrize(
-    ("log", "robot"), [("ur10", "kuka_kr6_r700"), ("ur10", "staubli_tx40"), ("airbot_coarse", "ur10")]
+    ("log", "robot"),
+    [
+        ("ur10", "kuka_kr6_r700"),
+        ("ur10", "staubli_tx40"),
+        ("airbot_coarse", "ur10"),
+        ("staubli_tx40", "ur10"),
+        ("staubli_tx40", "shanghai_6r"),
+        ("ur10", "airbot_coarse"),
+    ],
 )
 def test_a_measured_log_is_not_of_another_robot(log: str, robot: str):
     described = robot_of(robot)[0] if robot == "kuka_kr6_r700" else measured(robot).robot

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from irtwin.check.arrangement import arrangement_findings
 from irtwin.check.channels import channel_findings
 from irtwin.check.estimates import estimate_findings
+from irtwin.check.gravity import gravity_findings
 from irtwin.check.moving import Moving, moving
 from irtwin.check.plausibility import plausibility_findings
 from irtwin.check.speeds import speed_findings
@@ -72,7 +73,9 @@ def _by_bodies(robot: Robot, seen: Moving) -> list[LogFinding]:
         ]  # fmt: skip
     named = {finding.channel for finding in arranged}
     findings = arranged + [finding for finding in findings if finding.channel not in named]
-    return findings if any(finding.certain for finding in findings) else findings + estimate_findings(robot, seen)
+    if any(finding.certain for finding in findings):
+        return findings
+    return findings + (gravity_findings(robot, seen) or estimate_findings(robot, seen))
 
 
 def checked(data_set: DataSet) -> Checked:
