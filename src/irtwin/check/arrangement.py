@@ -25,7 +25,6 @@ from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 
 _ROWS = 900  # over all runs
-_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _GAIN = 2.0  # in the product of all residuals that undoing a fault has to bring
 _SURE = 4.0  # standard deviations between stretches of time, of 20: one in 50 faults tried in 2,500 healthy logs
 _ALIKE = 2.0  # standard deviations: a rival that is no further behind explains the torques as well
@@ -128,7 +127,7 @@ def says_position(robot: Robot, moving: Moving, joint: int) -> float:
 def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> RigidBodyRows | None:
     """Return the rows that show such a fault; None where there are too few."""
     rows = rows_of(robot, moving, _ROWS) if len(robot.joint_names) <= _MOST_JOINTS else None
-    if rows is None or len(rows.q) < _FEWEST:
+    if rows is None:
         return None
     names = CHANNELS["torque"].columns(robot.joint_names)
     return replace(rows, torque=rows.torque * np.where([name in reversed_torques for name in names], -1.0, 1.0))

@@ -20,7 +20,6 @@ from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 
 _ROWS = 1500  # over all runs
-_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _MOST_JOINTS = 12
 _SURE = 4.0  # standard deviations of a number from none
 _BEYOND = 2.0  # standard deviations by which a number exceeds what is tolerated
@@ -44,7 +43,7 @@ _TURN = 1e-3  # rad over which a torque's change with a position is taken
 def estimate_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques that are late or of another scale than the others', and positions whose zero is off."""
     rows = rows_of(robot, moving, _ROWS)
-    if rows is None or len(rows.q) < _FEWEST or len(robot.joint_names) > _MOST_JOINTS:
+    if rows is None or len(robot.joint_names) > _MOST_JOINTS:
         return []
     fitted = _fit(rows)
     return _scales(robot, moving, fitted) or _delays(robot, moving, rows, fitted) or _zeros(robot, moving, rows, fitted)

@@ -20,7 +20,6 @@ from irtwin.robot.description import Robot
 from irtwin.signals.finding import LogFinding
 
 _ROWS = 900  # over all runs
-_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _LOADED = 0.2  # of the most loaded joint's gravity, by the URDF: what less turns is as much tool as robot
 _SEEN = 0.15  # of the variance that losses, inertia and springs leave of a torque: gravity must explain as much
 _SURE = 4.0  # standard deviations
@@ -44,7 +43,7 @@ class _Load:
 def gravity_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the clearest of the joints that gravity turns as no load of this robot would."""
     rows = rows_of(robot, moving, _ROWS)
-    if rows is None or len(rows.q) < _FEWEST:
+    if rows is None:
         return []
     loads = list(_loads(robot, rows, moving.joints))
     turned = [load for load in loads if load.surely > _TURNED]

@@ -12,6 +12,7 @@ from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _REVERSAL = 0.1  # of a joint's usual speed: friction has its full size there
 _INDEPENDENT = 1e-5  # of the largest singular value
 _EXACT = 0.01  # of a torque's deviation: less is left in simulated logs alone, and means nothing
@@ -64,14 +65,14 @@ class RigidBodyRows:
 def rows_of(
     robot: Robot, moving: Moving, most: int, later: float = 0.0, of_torque: float = 0.0
 ) -> RigidBodyRows | None:
-    """Return at most so many samples of the runs with torque, of the payload that most have; None where none has it.
+    """Return at most so many samples of the runs with torque, of the payload that most have; None where they are few.
 
     `later`, `of_torque`: by how much (s) the motion, and the torque, are those of a later time.
     """
     motions = _alike([motion for motion in moving.motions if motion.torque is not None])
-    if not motions:
-        return None
     step = -(-sum(len(motion.time) for motion in motions) // most)
+    if sum(len(motion.time[::step]) for motion in motions) < _FEWEST:
+        return None
     q, dq, ddq = (
         np.vstack([_at(motion.time[::step] + later, motion.time, getattr(motion, name)) for motion in motions])
         for name in ("q", "dq", "ddq")

@@ -19,7 +19,6 @@ from irtwin.signals.finding import LogFinding
 
 _ROWS = 1500  # over all runs
 _SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
-_FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _SURE = 4.0  # standard deviations
 _LIKELY = 2.0
 _SCALED = 1.6  # times the other joints' gain, or its inverse
@@ -31,7 +30,7 @@ _EXPLAINED = 0.4  # of a torque's variance by its own joint's motion, without wh
 def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the torque channels that are reversed, or no torque of their joint."""
     rows = rows_of(robot, moving, _ROWS)
-    if rows is None or len(rows.q) < _FEWEST:
+    if rows is None:
         return []
     nominal = rows.nominal()
     findings = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
@@ -60,7 +59,7 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
 def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
     rows = rows_of(robot, moving, _ROWS)
-    return [] if rows is None or len(rows.q) < _FEWEST else _scales(robot, moving, rows, rows.nominal())
+    return [] if rows is None else _scales(robot, moving, rows, rows.nominal())
 
 
 def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray, joint: int) -> LogFinding | None:
