@@ -14,7 +14,6 @@ from typing import Self
 from pyoxigraph import Literal, NamedNode, Quad, Store, Triple
 
 from irtwin.knowledge.engines import NATIVE
-from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules import running
@@ -55,7 +54,7 @@ class Conclusions:
 def by_rules(
     ontology: Ontology,
     known: Iterable[Triple],
-    closure: Closure | Beside | None = None,
+    closure: Closure | None = None,
     aside: AbstractSet[Triple] = frozenset(),
 ) -> Conclusions:
     """Return what the rules conclude of what is known, each into a named graph of its own.
@@ -66,8 +65,7 @@ def by_rules(
     def close(concluded: set[Triple]) -> Iterable[Triple]:
         if closure is None:
             return ()
-        closure.add(concluded - aside)
-        return closure.worth_keeping()
+        return closure.worth_keeping(after=closure.add(concluded - aside))
 
     seen = chain(known, closure.worth_keeping() if closure else ())
     concluded = Conclusions(running.conclusions(seen, all_rules(ontology.resources), close)).without(aside)

@@ -1,238 +1,105 @@
-"""The closure of facts that do not model beside an ontology: what `Closure` finds, by tables.
-
-Facts of one predicate, or of one type, lead to conclusions of one kind: they are held and followed together, as sets.
-"""
+"""The closure of facts that do not model beside an ontology: what `Closure` finds, by tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from collections.abc import Set as AbstractSet
-from typing import Any
+from itertools import chain, islice
 
-from pyoxigraph import NamedNode, Triple
+from pyoxigraph import Triple
 
 from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.closure import contradiction, is_hidden, not_of, show
-from irtwin.knowledge.owl_rl.program import program
+from irtwin.knowledge.owl_rl.closure import Closure, contradiction
 from irtwin.knowledge.owl_rl.rules import Fact, Facts, Number
 from irtwin.knowledge.owl_rl.schema import OBJECT, SUBJECT, Key, Schema
-from irtwin.knowledge.owl_rl.terms import Terms
-
-Groups = dict[Key, set[Any]]  # subjects by predicate and object, or pairs of subject and object by predicate
 
 
 class Equality(Exception):
     """Two terms are the same: what follows of that is not in an ontology's table."""
 
 
-class Beside:
+class Beside(Closure):
     """Facts and what follows of them beside a closed ontology, but nothing that follows from the ontology alone.
 
     What the facts may say is told in `irtwin.knowledge.parts`: statements that model are not followed. Raises Equality
-    where terms are the same, and Contradiction as `Closure` does.
+    where terms are the same, and Contradiction as `Closure` does. How something was inferred it does not tell.
     """
 
     def __init__(self, schema: Schema, triples: Iterable[Triple]):
-        self._schema = schema
-        self._type, self._same = program().type, program().same
-        self._terms = schema.closure.terms.copy()
-        self._first = len(self._terms.forms)
-        self._facts = schema.closure.facts.copy(schema.looked_at)  # for loops alone, as are the next
-        self._new = Facts()
-        self._triples: set[Triple] = set()
-        self._given: Groups = {}
-        self._known: Groups = {}
-        self._followed: Groups = {}  # since the joins were last looked at
-        self._waiting: Groups = {}  # known, and to be followed
+        of_ontology = schema.closure
+        self._begin(of_ontology.terms.copy(), of_ontology.facts.copy(schema.looked_at), of_ontology.known)
+        self._schema, self._one, self._typed = schema, dict(schema.one), 0
         self.add(triples)
 
-    def add(self, triples: Iterable[Triple]) -> None:
-        """Take more triples as given, and infer what follows of them."""
-        more = set(triples) - self._triples
-        self._triples |= more
-        self._new = Facts()
-        given = self._grouped(self._terms.facts(more))
-        self._refuse_ill_typed()
-        for key, some in given.items():
-            self._given.setdefault(key, set()).update(some)
-            self._put(key, some)
-        if self._schema.reads_values:
-            self._type_values()
-        self._saturate()
-        self._refuse_contradictions()
+    def add(self, triples: Iterable[Triple]) -> int:
+        """Take more triples as given, and infer what follows of them; return the last round before."""
+        before, facts = self._rounds, self._taken(triples)
+        self._saturate([*facts, *self._types_of_values()])
+        return before
 
-    @property
-    def known(self) -> Groups:
-        """All that is known beside the ontology: subjects by predicate and object, or pairs by predicate."""
-        return self._known
-
-    @property
-    def terms(self) -> Terms:
-        """The numbers of terms."""
-        return self._terms
-
-    def worth_keeping(self) -> set[Triple]:
-        """Return what follows and is worth keeping in a graph, as `Closure` has it."""
-        forms: list[Any] = self._terms.forms
-        literals, helpers = self._terms.literals, self._schema.helpers
-        own = range(self._first, len(forms))
-        hidden = self._schema.hidden.union(number for number in own if is_hidden(forms[number][0]))
-        kept: set[Triple] = set()
-        for key, facts in self._known.items():
-            predicate, object = key if isinstance(key, tuple) else (key, None)
-            new = facts - self._given.get(key, set())
-            if not new or predicate in helpers or predicate in literals or object in hidden:
-                continue
-            property = forms[predicate][0]
-            if object is not None:
-                kind = forms[object][0]
-                kept.update([Triple(forms[it][0], property, kind) for it in new - hidden - literals])
-            else:
-                kept.update(
-                    [
-                        Triple(forms[one][0], property, forms[other][0])
-                        for one, other in new
-                        if one not in hidden and one not in literals and other not in hidden
-                    ]
-                )
-        return kept
-
-    def _grouped(self, facts: Iterable[Fact]) -> Groups:
-        by_object, groups = self._schema.by_object, Groups()
-        for subject, predicate, object in facts:
-            if predicate in by_object:
-                groups.setdefault((predicate, object), set()).add(subject)
-            else:
-                groups.setdefault(predicate, set()).add((subject, object))
-        return groups
-
-    def _put(self, key: Key, facts: AbstractSet[Any]) -> None:
-        """Note facts that were found, and let those that are new be followed."""
-        known = self._known.get(key)
-        new = facts - self._schema.known(key) if known is None else facts - known - self._schema.known(key)
-        if not new:
-            return
-        if key == self._same and any(one != other for one, other in new):
-            raise Equality
-        self._known.setdefault(key, set()).update(new)
-        self._waiting.setdefault(key, set()).update(new)
-
-    def _put_pairs(self, predicate: Number, pairs: AbstractSet[tuple[Number, Number]]) -> None:
-        if predicate in self._schema.by_object:
-            for key, some in self._grouped((one, predicate, other) for one, other in pairs).items():
-                self._put(key, some)
-        else:
-            self._put(predicate, pairs)
-
-    def _put_subjects(self, predicate: Number, object: Number, subjects: AbstractSet[Number]) -> None:
-        if predicate in self._schema.by_object:
-            self._put((predicate, object), subjects)
-        else:
-            self._put(predicate, {(one, object) for one in subjects})
-
-    def _saturate(self) -> None:
-        while self._waiting:
-            while self._waiting:
-                key = next(iter(self._waiting))
-                new = self._waiting.pop(key)
-                self._followed.setdefault(key, set()).update(new)
-                if isinstance(key, tuple):
-                    self._follow_subjects(key, new)
-                else:
-                    self._follow_pairs(key, new)
-            self._join()
-
-    def _follow_subjects(self, key: tuple[Number, Number], subjects: set[Number]) -> None:
-        table, (predicate, end) = self._schema.table, key
-        for s, p, o in (*table.get(key, ()), *table.get(predicate, ())):
-            if s == SUBJECT and o not in (SUBJECT, OBJECT):
-                self._put_subjects(p, o, subjects)
-            else:
-                of_end = {SUBJECT: None, OBJECT: end}
-                one, other = of_end.get(s, s), of_end.get(o, o)
-                self._put_pairs(p, {(it if one is None else one, it if other is None else other) for it in subjects})
-
-    def _follow_pairs(self, predicate: Number, pairs: set[tuple[Number, Number]]) -> None:
-        conclusions = self._schema.table.get(predicate)
-        if not conclusions:
-            return
-        ends = {SUBJECT: {one for one, _ in pairs}, OBJECT: {other for _, other in pairs}}
-        for s, p, o in conclusions:
-            if s in ends and o not in ends:
-                self._put_subjects(p, o, ends[s])
-            elif (s, o) == (SUBJECT, OBJECT):
-                self._put_pairs(p, pairs)
-            else:
-                at = {SUBJECT: 0, OBJECT: 1}
-                self._put_pairs(p, {(pair[at[s]] if s in at else s, pair[at[o]] if o in at else o) for pair in pairs})
-
-    def _join(self) -> None:
-        """Note what follows from several facts, of which some were followed since this was last asked."""
-        followed, self._followed = self._followed, {}
-        for predicate, end in self._schema.single:
-            if predicate in followed or predicate in self._schema.by_object:
-                self._refuse_several(predicate, end)
-        if self._schema.looked_at:
-            new = Facts(list(self._looked_at(followed)))
+    def _saturate(self, facts: Iterable[Fact]) -> None:
+        fresh = self._unknown(facts)
+        while fresh:
+            self._rounds += 1
+            self._refuse_equal(fresh)
+            new = Facts(self._looked_at(fresh))
             for fact in new:
                 self._facts.add(fact)
-                self._new.add(fact)
-            for key, some in self._grouped(
-                fact for join in self._schema.joins for fact in join(self._facts, new)
-            ).items():
-                self._put(key, some)
+            self._refuse_clashes(fresh, new)
+            by_joins = (fact for join in self._schema.joins for fact in join(self._facts, new))
+            fresh = self._unknown(chain(self._of_one(fresh), by_joins))
 
-    def _refuse_several(self, predicate: Number, end: int) -> None:
-        """Raise Equality where several objects of a subject (or the other way round) are to be one."""
-        pairs = set(self._schema.known(predicate))
-        if predicate in self._schema.by_object:
-            keys = (key for key in self._known if isinstance(key, tuple) and key[0] == predicate)
-            pairs.update((it, key[1]) for key in keys for it in self._known[key])
-        else:
-            pairs |= self._known.get(predicate, set())
-        if len({pair[0 if end == SUBJECT else 1] for pair in pairs}) < len(pairs):
-            raise Equality
+    def _of_one(self, fresh: list[Fact]) -> Iterator[Fact]:
+        """Yield what follows from one fact; of all facts with a predicate, or of a type, the same does."""
+        table, by_object = self._schema.table, self._schema.by_object
+        ends: dict[Key, list[tuple[Number, Number]]] = {}
+        for subject, predicate, object in fresh:
+            ends.setdefault(predicate, []).append((subject, object))
+            if predicate in by_object:
+                ends.setdefault((predicate, object), []).append((subject, object))
+        for key in ends.keys() & table.keys():
+            of_end = {SUBJECT: {one for one, _ in ends[key]}, OBJECT: {other for _, other in ends[key]}}
+            for s, p, o in table[key]:
+                if o not in of_end:
+                    yield from [(one, p, o) for one in of_end[s]]
+                elif s not in of_end:
+                    yield from [(s, p, one) for one in of_end[o]]
+                else:
+                    at, to = -1 - s, -1 - o
+                    yield from [(pair[at], p, pair[to]) for pair in ends[key]]
 
-    def _looked_at(self, groups: Groups) -> Iterator[Fact]:
-        """Yield the facts that loops look at."""
+    def _looked_at(self, fresh: list[Fact]) -> list[Fact]:
+        """Return the facts that loops look at."""
         looked_at = self._schema.looked_at
-        for key, facts in groups.items():
-            predicate, end = key if isinstance(key, tuple) else (key, None)
-            objects = looked_at.get(predicate, set()) | looked_at.get(None, set())
-            if end is not None:
-                if None in objects or end in objects:
-                    yield from ((one, predicate, end) for one in facts)
-            elif objects:
-                yield from ((one, predicate, it) for one, it in facts if None in objects or it in objects)
+        always = looked_at.get(None, set())
+        if None in always:
+            return fresh
+        return [
+            fact
+            for fact in fresh
+            if fact[2] in always or ((some := looked_at.get(fact[1])) and (None in some or fact[2] in some))
+        ]
 
-    def _type_values(self) -> None:
-        """Say of each literal which datatypes contain it (dt-type2)."""
-        numbers = {iri: self._terms.number(NamedNode(iri)) for iri in datatypes.names()}
-        for number, value in self._terms.values.items():
-            for iri in datatypes.datatypes_of(value):
-                self._put((self._type, numbers[iri]), {number})
+    def _types_of_values(self) -> Iterator[Fact]:
+        """Say of each new literal which of the datatypes that rules ask for contain it (dt-type2)."""
+        values, asked = self._terms.values, self._schema.datatypes
+        if asked:
+            for number, value in list(islice(values.items(), self._typed, None)):
+                for iri in datatypes.datatypes_of(value) & asked.keys():
+                    yield (number, self._program.type, asked[iri])
+            self._typed = len(values)
 
-    def _refuse_ill_typed(self) -> None:
-        for literal in self._terms.ill_typed:
-            raise not_of(self._use(self._terms.number(literal)), literal.datatype.value)
+    def _refuse_equal(self, fresh: list[Fact]) -> None:
+        """Raise Equality where two terms are the same, or are to be as a property has one value."""
+        same, one = self._program.same, self._one
+        if any(predicate == same and subject != object for subject, predicate, object in fresh):
+            raise Equality
+        for of_what, value in self._schema.values_of_single(fresh):
+            if one.setdefault(of_what, value) != value:
+                raise Equality
 
-    def _refuse_contradictions(self) -> None:
+    def _refuse_clashes(self, fresh: list[Fact], new: Facts) -> None:
         for rule, join in self._schema.contradictions:
-            for culprits in join(self._facts, self._new):
+            for culprits in join(self._facts, new):
                 raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
-        for key, some in self._known.items():
-            if isinstance(key, tuple) and key[0] == self._type and datatypes.is_datatype(iri := self._iri(key[1])):
-                for number in some & self._terms.values.keys():  # dt-not-type
-                    if iri not in datatypes.datatypes_of(self._terms.values[number]):
-                        raise not_of(self._use(number), iri)
-
-    def _use(self, number: Number) -> str:
-        """Return a given triple, as people write it, whose object has the number."""
-        triple = next(it for it in self._triples if self._terms.number(it.object) == number)
-        return " ".join(map(show, triple))
-
-    def _iri(self, number: Number) -> str:
-        return str(getattr(self._terms.forms[number][0], "value", "")) if number not in self._terms.literals else ""
-
-    def _name(self, number: Number) -> str:
-        return show(self._terms.forms[number][0])
+        values = self._terms.values
+        self._refuse_other_datatypes(Facts([it for it in fresh if it[0] in values and it[1] == self._program.type]))

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, product
 from typing import Self
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+from pyoxigraph import Literal, NamedNode, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import DatalogRule, Fact, Facts, Number
-from irtwin.knowledge.owl_rl.terms import Node, Terms
+from irtwin.knowledge.owl_rl.terms import Node, Terms, is_hidden
 from irtwin.knowledge.vocabulary import ID, OWL, RDFS, XSD, shorten
 
-_TRIVIAL = (OWL + "Thing", OWL + "Nothing")
 _REFLEXIVE = (  # what everything, every class or every property is to itself
     *(OWL + "sameAs", OWL + "equivalentClass", OWL + "equivalentProperty"),
     *(RDFS + "subClassOf", RDFS + "subPropertyOf"),
@@ -53,9 +52,14 @@ class Closure:
     """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one."""
 
     def __init__(self, triples: Iterable[Triple]):
+        self._begin(program().terms.copy(), Facts())
+        self._saturate(self._program.axioms)
+        self.add(triples)
+
+    def _begin(self, terms: Terms, facts: Facts, before: Container[Fact] = frozenset()) -> None:
+        """Know nothing yet, but what was known `before`."""
         self._program = program()
-        self._terms = self._program.terms.copy()
-        self._facts = Facts()
+        self._terms, self._facts, self._before = terms, facts, before
         self._drawn = 0
         self._rounds = 0
         self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
@@ -63,19 +67,23 @@ class Closure:
         self._named_values: set[Number] = set()
         self._triples: set[Triple] = set()
         self._given: set[Fact] = set()
-        self._saturate(self._program.axioms)
-        self.add(triples)
 
-    def add(self, triples: Iterable[Triple]) -> None:
-        """Take more triples as given, and infer what follows of them."""
-        more = set(triples) - self._triples
-        self._triples |= more
-        facts = list(map(self._terms.fact, more))
-        self._given.update(facts)
-        self._refuse_ill_typed()
+    def add(self, triples: Iterable[Triple]) -> int:
+        """Take more triples as given, and infer what follows of them; return the last round before."""
+        before, facts = self._rounds, self._taken(triples)
         self._saturate([*facts, *self._types_of_mentioned()])
         self._add_reflexives()
         self._refuse_contradictions()
+        return before
+
+    def _taken(self, triples: Iterable[Triple]) -> list[Fact]:
+        """Return what of the triples was not given before."""
+        more = set(triples) - self._triples
+        self._triples |= more
+        facts = self._terms.facts(more)
+        self._given.update(facts)
+        self._refuse_ill_typed()
+        return facts
 
     def copy(self) -> Self:
         """Return the same, to be added to apart."""
@@ -98,17 +106,16 @@ class Closure:
             elif len(forms[fact[2]]) > 1:  # a given value in the other ways that literals write it
                 yield from (triple for triple in self._terms.triples(fact) if triple not in self._triples)
 
-    def worth_keeping(self) -> set[Triple]:
-        """Return what follows and is worth keeping in a graph.
+    def worth_keeping(self, after: int = -1) -> set[Triple]:
+        """Return what follows and is worth keeping in a graph; of that what was found after a round.
 
         Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous
         class expressions and of datatypes, and one more way to write a literal that stands there already.
         """
-        terms, helpers = self._terms, self.helpers()
-        hidden = {number for number, forms in enumerate(terms.forms) if forms and is_hidden(forms[0])}
+        terms, hidden, helpers = self._terms, self._terms.hidden, self.helpers()
         reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
-        for fact in self._round.keys() - self._given - _truisms():
+        for fact in {fact for fact, found in self._round.items() if found > after} - self._given - _truisms():
             subject, predicate, object = fact
             if subject == object and predicate in reflexive:
                 continue
@@ -200,12 +207,13 @@ class Closure:
 
     def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
         """Return those facts that are not known yet, and note the round that they are found in."""
-        known, unknown, drawn, number_of_round = self._round, [], self._drawn, self._rounds
+        known, before, unknown, drawn, number_of_round = self._round, self._before, [], self._drawn, self._rounds
+        most = len(self._given) + MOST_FACTS
         for drawn, fact in enumerate(facts, self._drawn):
-            if fact not in known:
+            if fact not in known and fact not in before:
                 known[fact] = number_of_round
                 unknown.append(fact)
-            if drawn > MOST_CONCLUSIONS or len(known) - len(self._given) > MOST_FACTS:
+            if drawn > MOST_CONCLUSIONS or len(known) > most:
                 raise InputError(
                     f"OWL 2 RL draws more than {MOST_CONCLUSIONS:,} conclusions or {MOST_FACTS:,} different ones: "
                     "look for large groups of owl:sameAs, or long chains of a transitive property"
@@ -324,13 +332,6 @@ def says_something(triple: Triple) -> bool:
     if triple.subject == triple.object and triple.predicate.value in _REFLEXIVE:
         return False
     return not is_hidden(triple.subject) and not is_hidden(triple.object)
-
-
-def is_hidden(term: Node) -> bool:
-    """Whether what is said of a term is not worth keeping: of everything, of anonymous classes, of datatypes."""
-    if isinstance(term, NamedNode):
-        return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
-    return isinstance(term, BlankNode)
 
 
 def show(term: Node, base: str = ID) -> str:

@@ -44,7 +44,7 @@ class Program:
         for name, text in _NUMBERS.items():
             self.terms.reserve(_node(name), datatypes.value(text, XSD + "integer"))
         axioms = sorted(read_turtle(folder("rules") / "owl2_rl_axioms.ttl"), key=str)
-        self.axioms = [self.terms.fact(triple) for triple in axioms]
+        self.axioms = self.terms.facts(axioms)
         self.type, self.same, self.different = map(self.number, ("rdf:type", "owl:sameAs", "owl:differentFrom"))
         self.rules = read_rules(folder("rules") / "owl2_rl.rq")
         self.helpers = {

@@ -9,62 +9,52 @@ long as the ontology gives them anything to do.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from collections.abc import Set as AbstractSet
-from typing import Any
 
 from pyoxigraph import Triple
 
 from irtwin.knowledge.owl_rl import datatypes
-from irtwin.knowledge.owl_rl.closure import Closure, is_hidden
+from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.rules import DatalogRule, Fact, Join, Number, Pattern, Term, compile_join
 
-SUBJECT, OBJECT = -1, -2  # in a conclusion of the table: the ends of the fact that it follows from
+SUBJECT, OBJECT = -1, -2  # in a conclusion of the table: the ends of the fact that it follows from, 0 and 1 of a pair
 Key = Number | tuple[Number, Number]  # a predicate, or a predicate and an object
-_NOTHING: frozenset[Any] = frozenset()
 
 
 class Schema:
     """An ontology, closed. Contradiction where it contradicts itself.
 
-    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `single` the predicates by
-    which a subject has one object (SUBJECT), or an object one subject (OBJECT). `joins` are the loops of the other
-    rules, and `contradictions` those that find one; `looked_at` are the predicates of the facts that these loops look
-    at, with the objects where these are known, and None for any. `by_object` are the predicates whose facts are told
-    apart by their objects. `reads_values` tells whether rules ask of which datatypes a literal is. `unfit` says in
-    words why facts cannot be closed by all that, None where they can: terms of the ontology are the same, and the rules
-    of equality are left out here.
+    `table` are the conclusions from one fact, by its predicate, or by predicate and object; `by_object` are the
+    predicates of the latter. `single` are the predicates by which a subject has one object (SUBJECT), or an object one
+    subject (OBJECT), and `one` what the ontology says of these. `joins` are the loops of the other rules, and
+    `contradictions` those that find one; `looked_at` are the predicates of the facts that these loops look at, with the
+    objects where these are known, and None for any. `datatypes` are those that rules ask for, by their IRIs. `unfit`
+    says in words why facts cannot be closed by all that, None where they can: terms of the ontology are the same, and
+    the rules of equality are left out here.
     """
 
     def __init__(self, triples: Iterable[Triple]):
         self._program = program()
         self.closure = Closure(triples)
         self.kept = self.closure.worth_keeping()
-        self.helpers = self.closure.helpers()
-        forms = self.closure.terms.forms
-        self.hidden = {number for number, terms in enumerate(forms) if terms and is_hidden(terms[0])}
         self.table: dict[Key, list[Fact]] = {}
-        self.single: set[tuple[Number, int]] = set()
+        self.single: dict[Number, set[int]] = {}
         self.joins: list[Join] = []
         self.contradictions: list[tuple[DatalogRule, Join]] = []
         self.looked_at: dict[Number | None, set[Number | None]] = {}
-        self.reads_values = False
-        self._pairs: dict[Number, frozenset[tuple[Number, Number]]] = {}
+        self.datatypes: dict[str, Number] = {}
         self.unfit = next(self._equalities(), None)
         for rule in self._program.rules:
             if not any(predicate == "owl:sameAs" for _, predicate, _ in rule.body):
                 self._take(rule)
-        self.by_object = {key[0] for key in self.table if isinstance(key, tuple)} | {self._program.type}
+        self.by_object = {key[0] for key in self.table if isinstance(key, tuple)}
+        self.one = dict(self.values_of_single(self.closure.facts))
 
-    def known(self, key: Key) -> AbstractSet[Any]:
-        """Return what the ontology knows by a key: subjects, or by a predicate alone pairs of subject and object."""
-        facts = self.closure.facts
-        if isinstance(key, tuple):
-            return facts.subjects.get(key[0], {}).get(key[1], _NOTHING)
-        if key not in self._pairs:
-            objects = facts.objects.get(key, {})
-            self._pairs[key] = frozenset((subject, one) for subject, values in objects.items() for one in values)
-        return self._pairs[key]
+    def values_of_single(self, facts: Iterable[Fact]) -> Iterator[tuple[tuple[Number, int, Number], Number]]:
+        """Yield the value that facts say, by predicate, which end has it, and of what, if there may be but one."""
+        for subject, predicate, object in facts:
+            for end in self.single.get(predicate, ()):
+                yield ((predicate, end, subject), object) if end == SUBJECT else ((predicate, end, object), subject)
 
     def _equalities(self) -> Iterator[str]:
         """Yield what the rules of equality would conclude from."""
@@ -87,10 +77,11 @@ class Schema:
                     self.table.setdefault(key, []).extend(conclusions)
                 return
         values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
-        self.reads_values |= any(self._is_datatype(pattern[2]) for of_one in values for pattern in of_one)
+        self._ask(pattern[2] for of_one in values for pattern in of_one)
         single = [self._one_value(rule, patterns, of_one) for of_one in values]
         if None not in single:
-            self.single.update(filter(None, single))
+            for one_value in filter(None, single):
+                self.single.setdefault(one_value[0], set()).add(one_value[1])
             return
         for _, predicate, object in (pattern for of_one in values for pattern in of_one):
             looked_at = self.looked_at.setdefault(None if isinstance(predicate, str) else predicate, set())
@@ -121,8 +112,8 @@ class Schema:
         if not isinstance(subject, str) or isinstance(predicate, str) or subject == object or not decided:
             return None
         ends = {subject: SUBJECT} | ({object: OBJECT} if isinstance(object, str) else {})
-        if not isinstance(object, str) and self._is_datatype(object):
-            self.reads_values |= not all(self._is_datatype(self._value(head[2], bound)) for head in rule.head)
+        if not all(self._is_datatype(self._value(head[2], bound)) for head in rule.head):
+            self._ask([object])
         values = {term: self._value(term, bound) for head in rule.head for term in head}
         numbers = {term: ends[value] if isinstance(value, str) else value for term, value in values.items()}
         facts = [(numbers[s], numbers[p], numbers[o]) for s, p, o in rule.head]
@@ -146,6 +137,11 @@ class Schema:
 
     def _value(self, term: Term, bound: dict[Term, Number]) -> Number | Term:
         return bound.get(term, term) if term.startswith("?") else self._program.number(term)
+
+    def _ask(self, values: Iterable[Number | Term]) -> None:
+        """Note the datatypes among some values, of which literals are to be told whether they contain them."""
+        numbers = (value for value in values if not isinstance(value, str) and self._is_datatype(value))
+        self.datatypes |= {self.closure.iri(number): number for number in numbers}
 
     def _is_datatype(self, value: Number | Term) -> bool:
         return not isinstance(value, str) and datatypes.is_datatype(self.closure.iri(value))

@@ -10,8 +10,10 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Triple
 from irtwin.knowledge.owl_rl import datatypes
 from irtwin.knowledge.owl_rl.datatypes import IllTyped, Value
 from irtwin.knowledge.owl_rl.rules import Fact, Number
+from irtwin.knowledge.vocabulary import OWL
 
 Node = NamedNode | BlankNode | Literal | Triple
+_TRIVIAL = (OWL + "Thing", OWL + "Nothing")
 
 
 class Terms:
@@ -19,12 +21,14 @@ class Terms:
 
     `forms[number]` are the terms that have the number: several literals where one value is written in several ways.
     `values[number]` is the value, for literals of known datatypes alone; `ill_typed` are literals that have none.
+    `hidden` are those of terms that nothing is worth keeping of.
     """
 
     def __init__(self) -> None:
         self.forms: list[list[Node]] = []
         self.values: dict[Number, Value] = {}
         self.literals: set[Number] = set()
+        self.hidden: set[Number] = set()
         self.ill_typed: list[Literal] = []
         self._numbers: dict[Hashable, Number] = {}
 
@@ -32,7 +36,7 @@ class Terms:
         """Return a table that begins with the same numbers."""
         other = type(self)()
         other.forms = [list(forms) for forms in self.forms]
-        other.values, other.literals = dict(self.values), set(self.literals)
+        other.values, other.literals, other.hidden = dict(self.values), set(self.literals), set(self.hidden)
         other.ill_typed, other._numbers = list(self.ill_typed), dict(self._numbers)
         return other
 
@@ -50,10 +54,6 @@ class Terms:
         self.literals.add(number)
         if value is not None:
             self.values[number] = value
-
-    def fact(self, triple: Triple) -> Fact:
-        """Return a triple as numbers."""
-        return (self.number(triple.subject), self.number(triple.predicate), self.number(triple.object))
 
     def facts(self, triples: Iterable[Triple]) -> list[Fact]:
         """Return triples as numbers."""
@@ -76,6 +76,8 @@ class Terms:
 
     def _add(self, term: Node) -> Number:
         self.forms.append([term])
+        if is_hidden(term):
+            self.hidden.add(len(self.forms) - 1)
         return len(self.forms) - 1
 
     def _literal(self, literal: Literal) -> Number:
@@ -94,3 +96,10 @@ class Terms:
             self._numbers[value] = number
             self.values[number] = value
         return number
+
+
+def is_hidden(term: Node) -> bool:
+    """Whether what is said of a term is not worth keeping: of everything, of anonymous classes, of datatypes."""
+    if isinstance(term, NamedNode):
+        return term.value in _TRIVIAL or datatypes.is_datatype(term.value)
+    return isinstance(term, BlankNode)

@@ -49,13 +49,15 @@ def _run(
     """Run rules of one order until nothing is new."""
     for _ in range(MOST_ROUNDS):
         before = len(store)
-        concluded = [(rule, _construct(store, rule)) for rule in rules]
-        for rule, some in concluded:
+        concluded: set[Triple] = set()
+        for rule in rules:
+            some = _construct(store, rule)
             made.setdefault(rule.graph, set()).update(some)
             store.extend(in_graph(some))
+            concluded |= some
         if len(store) == before:
             return
-        store.extend(in_graph(close(set().union(*(some for _, some in concluded)))))
+        store.extend(in_graph(close(concluded)))
     raise InputError(
         f"the rules still find something new after {MOST_ROUNDS} rounds; check whether they create blank nodes"
     )

@@ -20,8 +20,10 @@ class BySubject:
     def __init__(self, triples: Iterable[Triple], namespace: str) -> None:
         self._namespace = namespace
         self._objects: dict[Node, dict[str, list[Node]]] = {}
+        self._having: dict[str, dict[Node, None]] = {}
         for triple in triples:
             values = self._objects.setdefault(triple.subject, {}).setdefault(triple.predicate.value, [])
+            self._having.setdefault(triple.predicate.value, {})[triple.subject] = None
             if triple.object not in values:
                 values.append(triple.object)
 
@@ -31,11 +33,9 @@ class BySubject:
 
     def having(self, name: str, value: str | None = None) -> list[Node]:
         """Return the subjects that have a property, by its whole IRI; with that value, an IRI, if one is given."""
-        return [
-            subject
-            for subject, objects in self._objects.items()
-            if name in objects and (value is None or NamedNode(value) in objects[name])
-        ]
+        wanted = None if value is None else NamedNode(value)
+        subjects = self._having.get(name, {})
+        return [one for one in subjects if wanted is None or wanted in self._objects[one][name]]
 
     def said_of(self, node: Node | None) -> list[tuple[str, list[Node]]]:
         """Return all properties of a node, by their whole IRIs, with their values."""
