@@ -159,6 +159,7 @@ class Payload(Effect):
     id: ClassVar[str] = "payload"
     family: ClassVar[str] = "load"
     within_bodies: ClassVar[bool] = True
+    smooth: ClassVar[bool] = True
     taken_off: ClassVar[str | None] = "with the tool off"
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:

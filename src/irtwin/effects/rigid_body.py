@@ -31,6 +31,7 @@ class RigidBody(Effect):
     id: ClassVar[str] = "rigid_body"
     family: ClassVar[str] = "bodies"
     bodies: ClassVar[bool] = True
+    smooth: ClassVar[bool] = True
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return ten terms per moving body, expected as in the URDF."""

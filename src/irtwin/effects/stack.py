@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import groupby
+from typing import TypeVar
 
 import numpy as np
+import scipy
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, JointEffect, Predicted, Term
@@ -14,9 +17,15 @@ from irtwin.effects.prior import Prior
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
+from irtwin.signals.sparse import Sparse, at_all, at_some, factor_at_some
 
 _LARGEST = 1e15  # SI: beyond, squares of what a coefficient does are no numbers
 _PIECE = 4096  # samples whose columns are held at once
+_STATES = 400  # random ones, many more than a joint has columns
+_INDEPENDENT = 1e-9  # of a scaled column: less is rounding
+
+Span = tuple[np.ndarray, np.ndarray]  # places (r,) of columns that span others, and the (r, k) matrix that makes them
+AnyColumns = TypeVar("AnyColumns")
 
 
 @dataclass(frozen=True)
@@ -156,9 +165,30 @@ class Stack:
 
         It is `torque_columns` without the zeros, which are most of it; `values` as there.
         """
+        return [side_by_side(columns) for columns in self._by_joint(motion, values, self._dense)]
+
+    def sparse_by_joint(self, motion: Motion, values: np.ndarray | None = None) -> list[list[np.ndarray | Sparse]]:
+        """Return `columns_by_joint` as arrays to stand side by side, those of smooth effects sparse."""
+        some = at_some(motion)
+
+        def columns(effect: Effect, part: Motion, below: Predicted | None) -> list[np.ndarray | Sparse]:
+            if not (effect.smooth and effect.acts_in(part)):
+                return [*self._dense(effect, part, below)]
+            dense = effect.columns(self.robot, some)
+            return [Sparse(dense[:, joint, own], mixed) for joint, (own, mixed) in enumerate(self._spans[effect])]
+
+        return [_joined(columns) for columns in self._by_joint(motion, values, columns)]
+
+    def _by_joint(
+        self,
+        motion: Motion,
+        values: np.ndarray | None,
+        columns: Callable[[Effect, Motion, Predicted | None], Sequence[AnyColumns]],
+    ) -> list[list[np.ndarray | AnyColumns]]:
+        """Return arrays of columns for each joint; `columns` gives those of an effect of more than one."""
         below = self._torques(motion, values).below if self.coupled else {}
-        by_joint: list[list[np.ndarray]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
-        for effect, own in self._torque_places:
+        by_joint: list[list[np.ndarray | AnyColumns]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
+        for effect in self._torque:
             if isinstance(effect, JointEffect) and effect.acts_in(motion) and not effect.memory:
                 before = below.get(effect.stage)
                 stop = motion.start + len(motion.time)
@@ -167,17 +197,38 @@ class Stack:
                     place = self.robot.index(joint.name)
                     by_joint[place] += [sample[:, place : place + 1] for sample in samples]
             else:
-                columns = self.columns(effect, motion, below.get(effect.stage))
-                for place, used in enumerate(self.pattern[:, own]):
-                    by_joint[place].append(columns[:, place, used])
-        return [side_by_side(columns) for columns in by_joint]
+                for mine, own in zip(by_joint, columns(effect, motion, below.get(effect.stage)), strict=True):
+                    mine.append(own)
+        return by_joint
 
-    def shift_torque(self, motion: Motion, columns: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the torque (N, n), N m, of what is known to be added, by the columns of each joint."""
-        shift = self.shift(motion)
-        if not shift.any():
-            return np.zeros(motion.dq.shape)
-        return np.column_stack([own @ shift[used] for own, used in zip(columns, self.pattern, strict=True)])
+    def _dense(self, effect: Effect, motion: Motion, below: Predicted | None) -> list[np.ndarray]:
+        columns, own = self.columns(effect, motion, below), dict(self._torque_places)[effect]
+        return [columns[:, place, used] for place, used in enumerate(self.pattern[:, own])]
+
+    @cached_property
+    def _spans(self) -> dict[Effect, list[Span]]:
+        """Of each smooth effect, for each joint, its columns that span those which can act on it."""
+        states = np.random.default_rng(0).uniform(-2, 2, (3, _STATES, len(self.robot.joints)))
+        probe = Motion(np.arange(float(_STATES)), *states, run="probe")
+        return {
+            effect: [
+                _span(effect.columns(self.robot, probe)[:, joint], used) for joint, used in enumerate(self.pattern[:, own])
+            ]
+            for effect, own in self._torque_places
+            if effect.smooth
+        }
+
+    def shift_torque(self, motion: Motion, *, sparse: bool = False) -> np.ndarray:
+        """Return the torque (N, n), N m, of what is known to be added; `sparse` as in `torque_of`."""
+        shift, torque = self.shift(motion), np.zeros(motion.dq.shape)
+        for effect, own in self._torque_places:
+            if shift[own].any():
+                add = partial(self._shift_torque, effect, shift[own])
+                torque += at_all(add, motion) if sparse and effect.smooth else add(motion)
+        return torque
+
+    def _shift_torque(self, effect: Effect, shift: np.ndarray, motion: Motion) -> np.ndarray:
+        return np.asarray(self.columns(effect, motion, None) @ shift)
 
     def carried(self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """Return (N, R), for each coefficient of real torque, its column in each joint times `along` (N, n), summed.
@@ -185,11 +236,27 @@ class Stack:
         It is the power that the column carries, if along is a speed; `values` as in `torque_columns`.
         """
         below = self._torques(motion, values).below if self.coupled else {}
-        found = [np.zeros((len(along), 0))]
-        for effect in self._torque:
-            if effect.channel == "torque":
-                found.append(self._carried(effect, motion, along, below.get(effect.stage)))
-        return side_by_side(found)
+        found = [self._carried(effect, motion, along, below.get(effect.stage)) for effect in self._real]
+        return side_by_side([np.zeros((len(along), 0)), *found])
+
+    def sparse_carried(
+        self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None
+    ) -> list[np.ndarray | Sparse]:
+        """Return `carried` as arrays to stand side by side, those of smooth effects sparse."""
+        below = self._torques(motion, values).below if self.coupled else {}
+        some, slower = at_some(motion), factor_at_some(along, motion)
+        return _joined(
+            [
+                Sparse(effect.carried(self.robot, some, slower))
+                if effect.smooth and effect.acts_in(motion)
+                else self._carried(effect, motion, along, below.get(effect.stage))
+                for effect in self._real
+            ]
+        )
+
+    @property
+    def _real(self) -> list[Effect]:
+        return [effect for effect in self._torque if effect.channel == "torque"]
 
     def undecided(self, motion: Motion) -> np.ndarray:
         """Return (N, n) where some effect cannot say the joint's torque."""
@@ -199,11 +266,11 @@ class Stack:
             undecided |= False if part is None else part
         return undecided
 
-    def real_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
-        """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients."""
+    def real_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients; `sparse` as in `torque_of`."""
         if self.coupled:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
-        return self.torque_of([effect for effect in self._torque if effect.channel == "torque"], motion, values)
+        return self.torque_of(self._real, motion, values, sparse=sparse)
 
     def told_by_log(self, motion: Motion) -> np.ndarray:
         """Return where a log alone tells a joint's torque, (N, n): at rest dry friction holds what it has to."""
@@ -217,14 +284,20 @@ class Stack:
         sensors = [effect for effect in self._torque if effect.channel == "measurement"]
         return np.where(told, motion.torque - self.torque_of(sensors, motion, values), torque)
 
-    def torque_of(self, effects: Sequence[Effect], motion: Motion, values: np.ndarray) -> np.ndarray:
-        """Return what some of the effects add to torque, (N, n) N m, by the (K,) torque coefficients of all."""
+    def torque_of(
+        self, effects: Sequence[Effect], motion: Motion, values: np.ndarray, *, sparse: bool = False
+    ) -> np.ndarray:
+        """Return what some of the effects add to torque, (N, n) N m, by the (K,) torque coefficients of all.
+
+        That of smooth ones is worked out at some samples where it may be `sparse`.
+        """
         total = values + self.shift(motion)
         below = self._torques(motion, values).below if self.coupled else {}
         torque = np.zeros(motion.dq.shape)
         for effect, own in self._torque_places:
             if effect in effects:
-                torque += self._contribution(effect, motion, total[own], below.get(effect.stage))
+                add = partial(self._contribution, effect, below=below.get(effect.stage), values=total[own])
+                torque += at_all(add, motion) if sparse and effect.smooth else add(motion)
         return torque
 
     def shown_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
@@ -391,6 +464,27 @@ def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, s
         stop = start + len(effect.terms(robot))
         yield effect, slice(start, stop)
         start = stop
+
+
+def _span(columns: np.ndarray, used: np.ndarray) -> Span:
+    """Return which of columns (M, k) span those `used` (k,), by a pivoted QR, and the (r, used) matrix that makes these."""
+    places = np.flatnonzero(used)
+    size = np.linalg.norm(columns[:, places], axis=0)
+    size[size == 0] = 1.0
+    factor, order = scipy.linalg.qr(columns[:, places] / size, mode="r", pivoting=True)
+    own = np.abs(np.diag(factor)) > _INDEPENDENT
+    rank = int(own.sum())
+    mixed = np.empty((rank, len(places)))
+    mixed[:, order] = scipy.linalg.solve_triangular(factor[:rank, :rank], factor[:rank]) / size[order[:rank], None]
+    return places[order[:rank]], mixed * size
+
+
+def _joined(parts: Sequence[np.ndarray | Sparse]) -> list[np.ndarray | Sparse]:
+    """Return columns with those arrays joined that follow on each other: single ones take ten times as long to filter."""
+    joined: list[np.ndarray | Sparse] = []
+    for dense, own in groupby(parts, key=lambda part: isinstance(part, np.ndarray)):
+        joined += [side_by_side([part for part in own if isinstance(part, np.ndarray)])] if dense else own
+    return joined
 
 
 def side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:

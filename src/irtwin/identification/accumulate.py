@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -17,10 +17,12 @@ import scipy
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell_step
 from irtwin.identification.two_processes import can_copy, shared
-from irtwin.signals.filter import decimate, decimation, kernel
+from irtwin.signals.filter import decimate, kernel
 from irtwin.signals.motion import Motion
+from irtwin.signals.sparse import Sparse, decimate_sparse, thinning
 
-Given = Sequence[np.ndarray] | Callable[[], Sequence[np.ndarray]]  # an equation's columns
+Columns = Sequence[np.ndarray | Sparse]
+Given = Columns | Callable[[], Columns]  # an equation's columns
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Rows:
     """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
 
     `columns` may also be, for each equation, the arrays (N, some) that side by side are the columns which it has by the
-    `pattern`: they are joined when few samples are left. A function that returns them is called beside the work on the
+    `pattern`, those that are smooth sparse: they are joined when few samples are left. A function that returns them is called beside the work on the
     next part. Where `undecided` (N, g) the equation does not hold, and is left out. Rows where it is `slow` (N, g) stay
     apart from the others.
     """
@@ -39,7 +41,7 @@ class Rows:
     undecided: np.ndarray | None = None
     slow: np.ndarray | None = None
 
-    def own(self, equation: int, used: np.ndarray) -> Sequence[np.ndarray]:
+    def own(self, equation: int, used: np.ndarray) -> Columns:
         """Return the columns of an equation, `used` (K,) by the pattern, as arrays (N, some) to stand side by side."""
         if isinstance(self.columns, np.ndarray):
             return [self.columns[:, equation, used]]
@@ -107,9 +109,9 @@ class Block:
 
 
 def accumulate(
-    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False, every: int = 1
 ) -> list[Block]:
-    """Reduce the motions to blocks.
+    """Reduce the motions to blocks; of these make every `every`-th alone.
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
@@ -117,20 +119,20 @@ def accumulate(
     products of columns, in a quarter of the time where these are many; they are no triangles, and what is below 1e-8 of
     a column is lost in rounding. Raises InputError where nothing is left.
     """
-    found = accumulate_any(motions, equations, pattern, by_products=by_products)
+    found = accumulate_any(motions, equations, pattern, by_products=by_products, every=every)
     if not found:
         raise _nothing_left(motions)
     return found
 
 
 def accumulate_any(
-    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False
+    motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False, every: int = 1
 ) -> list[Block]:
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
-    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total)]
-    samples = sum(len(motion.time) for motion in motions)
+    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total)][::every]
+    samples = sum(stop - start for _, start, stop in found)
     place = {motion.run: number for number, motion in enumerate(motions, start=1)}
 
     def asked(motion: Motion) -> Rows:
@@ -152,8 +154,8 @@ def _grown(
     made: list[Future[list[Block]]] = []
     with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
-        for _, of_motion in groupby(stretches, key=lambda one: id(one[0])):
-            blocks = tuple(begun(*stretch) for stretch in of_motion)
+        for together in _joined(stretches):
+            blocks = tuple(begun(*stretch) for stretch in together)
             for first, last, sample in _parts(blocks, equations):
                 if adding:
                     adding.result()
@@ -164,13 +166,23 @@ def _grown(
     return [block for one in made for block in one.result()]
 
 
+def _joined(stretches: Sequence[tuple[Motion, int, int]]) -> Iterator[Sequence[tuple[Motion, int, int]]]:
+    """Yield what of a motion follows on each other, without a gap."""
+    cuts = [
+        k
+        for k, ((before, _, stop), (motion, start, _)) in enumerate(pairwise(stretches), start=1)
+        if motion is not before or start != stop
+    ]
+    return (stretches[first:last] for first, last in pairwise([0, *cuts, len(stretches)]) if first < last)
+
+
 def _made(growing: Sequence[_Growing]) -> list[Block]:
     return [one.block() for one in growing]
 
 
 def _parts(growing: Sequence[_Growing], equations: Equations) -> Iterator[tuple[int, int, Rows]]:
     """Yield the equations of a motion's blocks from sample `first` to `last`, half a kernel more at either end."""
-    motion, (taps, step) = growing[0].motion, _thinning(growing[0].motion)
+    motion, (taps, step) = growing[0].motion, thinning(growing[0].motion)
     half = len(taps) // 2
     size = step * max(1, min(_CHUNK // step, _ROWS))
     begin = half + step * max(0, -(-(growing[0].start - half) // step))  # the same samples stay, wherever one begins
@@ -182,35 +194,31 @@ def _parts(growing: Sequence[_Growing], equations: Equations) -> Iterator[tuple[
 
 def _add(growing: Sequence[_Growing], first: int, last: int, sample: Rows) -> None:
     """Filter and decimate a part of a motion, and give each block its own rows."""
-    taps, step = _thinning(growing[0].motion)
-    thin = _Thin.of(sample, growing[0].pattern, taps, step)
-    at = np.arange(first, last, step)
+    motion = growing[0].motion
+    thin = _Thin.of(sample, motion, growing[0].pattern)
+    at = np.arange(first, last, thinning(motion)[1])
     for one in growing:
         begin, end = np.searchsorted(at, (one.start, one.stop))
         if begin < end:
             one.add(thin, slice(begin, end))
 
 
-def _thinning(motion: Motion) -> tuple[np.ndarray, int]:
-    """Return the kernel of the filter that a motion's measurement went through, and the step of decimation."""
-    if not motion.cutoff:
-        return np.ones(1), 1
-    return kernel(motion.rate, motion.cutoff), decimation(motion.rate, motion.cutoff)
-
-
 @dataclass(frozen=True)
 class _Thin:
-    """Each equation's rows (N, k_e + 1) of [columns | measurement], filtered and decimated.
+    """Each equation's rows (N, r_e + 1) of [columns | measurement], filtered and decimated.
 
+    `mixed`: the matrices that make of them the k_e + 1 of [all columns | measurement]; None where they are these.
     `keep`, `slow`: (N, g), which hold, and which are slow; `slow` is None where none are told apart.
     """
 
     rows: list[np.ndarray]
+    mixed: list[np.ndarray | None]
     keep: np.ndarray
     slow: np.ndarray | None
 
     @classmethod
-    def of(cls, sample: Rows, pattern: np.ndarray, taps: np.ndarray, step: int) -> _Thin:
+    def of(cls, sample: Rows, motion: Motion, pattern: np.ndarray) -> _Thin:
+        taps, step = thinning(motion)
         half = len(taps) // 2
         measured = sample.measured[half : len(sample.measured) - half : step] - decimate(sample.known, taps, step)
         keep, slow = np.ones(measured.shape, dtype=bool), None
@@ -218,11 +226,28 @@ class _Thin:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
         if sample.slow is not None:
             slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
-        rows = []
+        rows, mixed = [], []
         for equation, used in enumerate(pattern):
-            columns = [decimate(part, taps, step) for part in sample.own(equation, used)]
+            parts = sample.own(equation, used)
+            columns = [
+                decimate_sparse(part.values, motion, len(measured))
+                if isinstance(part, Sparse)
+                else decimate(part, taps, step)
+                for part in parts
+            ]
             rows.append(np.column_stack([*columns, measured[:, equation]]))
-        return cls(rows, keep, slow)
+            mixed.append(_mixed(parts))
+        return cls(rows, mixed, keep, slow)
+
+
+def _mixed(parts: Columns) -> np.ndarray | None:
+    """Return what makes columns and measurement of the columns (N, r) of parts, and it."""
+    if not any(isinstance(part, Sparse) and part.mixed is not None for part in parts):
+        return None
+    own = [
+        part.mixed if isinstance(part, Sparse) and part.mixed is not None else np.eye(part.shape[1]) for part in parts
+    ]
+    return np.asarray(scipy.linalg.block_diag(*own, 1.0))
 
 
 def _nothing_left(motions: Sequence[Motion]) -> InputError:
@@ -259,7 +284,7 @@ class _Triangle:
         self._factor = np.zeros((0, columns))
 
     def add(self, rows: np.ndarray) -> None:
-        self._factor = triangle(np.concatenate([self._factor, rows]))
+        self._factor = triangle(np.concatenate([self._factor, rows]) if len(self._factor) else rows)
 
     def factor(self) -> np.ndarray:
         return self._factor
@@ -276,12 +301,19 @@ class _Products:
         if self._few is None:
             self._products += rows.T @ rows
             return
-        self._few = np.concatenate([self._few, rows])
+        self._few = np.concatenate([self._few, rows]) if len(self._few) else rows
         if len(self._few) > self._few.shape[1]:
             self._products, self._few = self._few.T @ self._few, None
 
     def factor(self) -> np.ndarray:
         return root(self._products) if self._few is None else self._few
+
+
+def _of_all_columns(reduced: _Triangle | _Products, mixed: np.ndarray | None) -> np.ndarray:
+    factor = reduced.factor()
+    if mixed is None:
+        return factor
+    return np.asarray(factor @ mixed) if len(factor) else np.zeros((0, mixed.shape[1]))
 
 
 def root(products: np.ndarray) -> np.ndarray:
@@ -309,14 +341,14 @@ class _Growing:
 
     def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray, kind: type[_Triangle | _Products]):
         self.motion, self.start, self.stop, self.pattern = motion, start, stop, pattern
-        self._reduced = [kind(int(row.sum()) + 1) for row in pattern]
-        self._slow = [kind(int(row.sum()) + 1) for row in pattern]
+        self._reduced, self._slow = ([kind(int(row.sum()) + 1) for row in pattern] for _ in range(2))
+        self._mixed: list[np.ndarray | None] = [None] * len(pattern)
         self._rows, self._slow_rows = np.zeros((2, len(pattern)), dtype=int)
         self._told_apart = False
 
     def add(self, thin: _Thin, part: slice) -> None:
         """Take in the rows of a part that are the block's."""
-        self._told_apart = thin.slow is not None
+        self._told_apart, self._mixed = thin.slow is not None, thin.mixed
         for equation, (reduced, apart) in enumerate(zip(self._reduced, self._slow, strict=True)):
             keep = thin.keep[part, equation]
             slow = np.zeros_like(keep) if thin.slow is None else thin.slow[part, equation] & keep
@@ -330,9 +362,10 @@ class _Growing:
         """Return what the block has become."""
         time = self.motion.time
         ends = float(time[self.start]), float(time[self.stop - 1])
-        fast = tuple(reduced.factor() for reduced in self._reduced)
+        fast = tuple(map(_of_all_columns, self._reduced, self._mixed))
         if not self._told_apart:
             return Block(self.motion.run, *ends, self._rows, fast)
-        both = tuple(np.concatenate([own, slow.factor()]) for own, slow in zip(fast, self._slow, strict=True))
+        slow = map(_of_all_columns, self._slow, self._mixed)
+        both = tuple(np.concatenate(pair) for pair in zip(fast, slow, strict=True))
         begin = np.array([len(own) for own in fast])
         return Block(self.motion.run, *ends, self._rows, both, Slow(begin, self._slow_rows))

@@ -22,6 +22,8 @@ Terms = Sequence[tuple[Effect, Term]]
 _STEPS = 20  # of Gauss-Newton, at most
 _CONVERGED = 1e-3  # of the prior spread
 _SETTLED = 0.1  # of a standard deviation: closer to it, a further step says nothing that the data know
+_LONG = 100_000  # samples, from which on
+_SAMPLED = 8  # every which block is read first
 _REPEATS = 8  # of fit and prediction, at most
 _SCALE = Term("scale", "1", spread=0.05)  # of real over logged torque, less one: drives' constants are nominal
 
@@ -49,18 +51,24 @@ def fit_torque(
     return blocks, found
 
 
-def fit_power(stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> tuple[list[Block], Estimate]:
-    """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them."""
+def fit_power(
+    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, every: int = 1
+) -> tuple[list[Block], Estimate]:
+    """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them.
+
+    `every`: every which block is read.
+    """
     free = free_terms(stack)
 
     def fit(values: np.ndarray) -> tuple[list[Block], Estimate]:
         def equations(motion: Motion) -> Rows:
             assert motion.power is not None
-            columns = stack.predicted_power_columns(motion, torque_values, values)
+            torque = stack.real_torque(motion, torque_values, sparse=True)
+            columns = stack.predicted_power_columns(motion, torque_values, values, torque)
             known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
             return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
 
-        return _of_one(motions, equations, free, stack.prior_rows(free))
+        return _of_one(motions, equations, free, stack.prior_rows(free), every)
 
     values = _expected(stack.power_terms)
     blocks, found = fit(values)
@@ -84,10 +92,14 @@ def fit_both(
     the twin lacks of power does not look like friction, heat of windings and how real work stands to that of logged
     torque are found beside, and samples in which the joints give power back are left out of power: it may be burnt.
     `of_torque`: the equations of torque of all these motions, if they were reduced before.
+
+    Of a long log every few blocks alone are read until that settles, and then all, from values so near that the next
+    step is known to be none: steps shrink as they did before.
     """
     if CopperLoss.id not in stack.ids:
         stack = stack.with_effects([*stack.effects, CopperLoss()])
-    power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values)[1]
+    every = _SAMPLED if sum(len(motion.time) for motion in motions) >= _LONG else 1
+    power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values, every)[1]
     free, count = free_terms(stack), len(stack.torque_terms)
     terms = [*_of(stack.torque_terms), *_of(free), _SCALE]
     known = stack.prior_rows([*stack.torque_terms, *free])
@@ -99,17 +111,21 @@ def fit_both(
     pattern[:joints] = np.pad(stack.pattern, ((0, 0), (0, len(free) + 1)))
     pattern[joints, :count] = stack.real
     values = np.concatenate([torque_values, power.values, [0.0]])
+    step, shrinks = np.inf, 1.0
     for _ in range(_STEPS):
-        before = values
         if of_torque is None or stack.coupled:
-            blocks = of_torque = accumulate(motions, _both_equations(stack, values), pattern)
+            blocks = accumulate(motions, _both_equations(stack, values), pattern, every=every)
+            of_torque = blocks if every == 1 else of_torque
         else:  # that of power alone follows the values
             line = _line_equations(stack, values)
-            blocks = _beside(of_torque, accumulate_any(motions, line, pattern[joints:]), pattern)
+            blocks = _beside(of_torque, accumulate_any(motions, line, pattern[joints:], every=every), pattern)
         found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
-        values, sure = found.values, np.sqrt(np.diag(found.covariance))
-        if np.all(np.abs(values - before)[:count] < _SETTLED * sure[:count]):
+        before, values, last = values, found.values, step
+        step = float(np.max((np.abs(values - before) / np.sqrt(np.diag(found.covariance)))[:count], initial=0.0))
+        if every == 1 and shrinks * step < _SETTLED:
             break
+        if every > 1 and step < min(last, _SETTLED):
+            every, shrinks = 1, step / last if np.isfinite(last) else 1.0
     return found.of(range(count), found.noise[:joints])
 
 
@@ -118,9 +134,10 @@ def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
     line_of = _line_about(stack, values)
 
     def equations(motion: Motion) -> Rows:
-        own, (line, work) = stack.columns_by_joint(motion, values[: len(stack.torque_terms)]), line_of(motion)
-        rows = [*([columns] for columns in own), [line.carried, line.free, work[:, None]]]
-        return rows_of_both(stack, motion, rows, (stack.shift_torque(motion, own), line.known), work < 0)
+        own, (line, work) = stack.sparse_by_joint(motion, values[: len(stack.torque_terms)]), line_of(motion)
+        rows = [*own, [*line.carried, line.free, work[:, None]]]
+        known = stack.shift_torque(motion, sparse=True), line.known
+        return rows_of_both(stack, motion, rows, known, work < 0)
 
     return equations
 
@@ -131,7 +148,7 @@ def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
 
     def equations(motion: Motion) -> Rows:
         line, work = line_of(motion)
-        return power_rows(motion, [line.carried, line.free, work[:, None]], line.known, work < 0)
+        return power_rows(motion, [*line.carried, line.free, work[:, None]], line.known, work < 0)
 
     return equations
 
@@ -144,9 +161,9 @@ def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[Po
     power_values[~stack.fixed] = free
 
     def line_of(motion: Motion) -> tuple[PowerLine, np.ndarray]:
-        torque = stack.real_torque(motion, torque_values)
+        torque = stack.real_torque(motion, torque_values, sparse=True)
         now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
-        carrying = partial(stack.carried, motion, values=torque_values)
+        carrying = partial(stack.sparse_carried, motion, values=torque_values)
         line = power_line(stack, motion, carrying, torque, now, power_values)
         return line, now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
 
@@ -210,12 +227,11 @@ def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.n
 
     def equations(motion: Motion) -> Rows:
         assert motion.power is not None
-        torque = stack.real_torque(motion, torque_values)
+        torque = stack.real_torque(motion, torque_values, sparse=True)
         power = stack.predicted_power_columns(motion, torque_values, power_values, torque)
-        carrying = partial(stack.carried, motion, values=torque_values)
+        carrying = partial(stack.sparse_carried, motion, values=torque_values)
         line = power_line(stack, motion, carrying, torque, power, power_values)
-        joined = np.concatenate([line.carried, line.free], axis=1)
-        return Rows(joined[:, None], line.known[:, None], motion.power[:, None])
+        return Rows([[*line.carried, line.free]], line.known[:, None], motion.power[:, None])
 
     return equations
 
@@ -223,9 +239,8 @@ def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.n
 def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
-        columns = stack.columns_by_joint(motion, values)
-        shifted = stack.shift_torque(motion, columns)
-        return Rows([[own] for own in columns], shifted, motion.torque, stack.undecided(motion))
+        shifted = stack.shift_torque(motion, sparse=True)
+        return Rows(stack.sparse_by_joint(motion, values), shifted, motion.torque, stack.undecided(motion))
 
     return equations
 
@@ -247,11 +262,11 @@ def _converged(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) ->
 
 
 def _of_one(
-    motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None
+    motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None, every: int = 1
 ) -> tuple[list[Block], Estimate]:
     """Estimate the terms of one equation a sample; return them with the equations, reduced."""
     pattern = np.ones((1, len(terms)), dtype=bool)
-    blocks = accumulate(motions, equations, pattern)
+    blocks = accumulate(motions, equations, pattern, every=every)
     return blocks, estimate(blocks, pattern, _of(terms), prior_rows)
 
 

@@ -111,14 +111,14 @@ def _reduced(
 
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
-        own = stack.columns_by_joint(motion)
+        own = stack.sparse_by_joint(motion)
         shapes = [sample for shape in open_shapes for sample in shape.samples(robot, motion, None)]
         columns = [  # single columns take ten times as long to filter
-            [some, side_by_side([*(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])])]
+            [*some, side_by_side([*(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])])]
             for k, some in enumerate(own)
         ]
         undecided = stack.undecided(motion) | sticking.undecided(motion)
-        return Rows(columns, stack.shift_torque(motion, own), motion.torque, undecided)
+        return Rows(columns, stack.shift_torque(motion, sparse=True), motion.torque, undecided)
 
     return accumulate(motions, equations, pattern), pattern
 

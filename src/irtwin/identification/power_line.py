@@ -9,10 +9,10 @@ import numpy as np
 
 from irtwin.effects.effect import JointEffect
 from irtwin.effects.stack import Stack
-from irtwin.identification.accumulate import Given, Rows
+from irtwin.identification.accumulate import Columns, Given, Rows
 from irtwin.signals.motion import Motion
 
-Carrying = Callable[[np.ndarray], np.ndarray]
+Carrying = Callable[[np.ndarray], Columns]
 
 _STEP = 1e-2  # N m, exact for what is quadratic in torque
 
@@ -21,12 +21,12 @@ _STEP = 1e-2  # N m, exact for what is quadratic in torque
 class PowerLine:
     """The equation of power of N samples: carried @ x + free @ p + known = power, of r coefficients x of real torque.
 
-    slope: (N, n) W/(N m), of power over each joint's torque; carried: (N, r); free: (N, F), of the coefficients p of
-    power that are not fixed; known: (N,) W.
+    slope: (N, n) W/(N m), of power over each joint's torque; carried: arrays (N, some) that side by side have r columns;
+    free: (N, F), of the coefficients p of power that are not fixed; known: (N,) W.
     """
 
     slope: np.ndarray
-    carried: np.ndarray
+    carried: Columns
     free: np.ndarray
     known: np.ndarray
 
@@ -42,13 +42,14 @@ def power_line(
 ) -> PowerLine:
     """Return the equation of power, linear in the coefficients of torque about the real `torque` (N, n).
 
-    carrying: gives (N, R) what real columns carry by a slope; power: (N, L) columns of power on that torque; values:
+    carrying: gives what real columns carry by a slope, arrays (N, some) that side by side are (N, R); power: (N, L) columns of power on that torque; values:
     (L,) its coefficients; told: (N, n) where a log tells that torque, so that no coefficient does.
     """
     slope = np.where(told, 0.0, power_slope(stack, motion, torque, values))
     real = carrying(slope)
     fixed = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
-    known = power[:, stack.fixed] @ fixed + real @ stack.shift(motion)[stack.real] - (slope * torque).sum(axis=1)
+    shifted = stack.shift_torque(motion, sparse=True)
+    known = power[:, stack.fixed] @ fixed + (slope * (shifted - torque)).sum(axis=1)
     return PowerLine(slope, real, power[:, ~stack.fixed], known)
 
 

@@ -63,13 +63,17 @@ def decimate(signal: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     count = max(0, -(-(len(flat) - len(taps) + 1) // step))
     if len(taps) == 1:
         return flat[::step].reshape((count, *signal.shape[1:]))
-    kept = np.empty((count, flat.shape[1]))
-    band = _band(taps, step, min(_AT_ONCE, count))
-    for first in range(0, count, _AT_ONCE):
-        rows = min(_AT_ONCE, count - first)
-        length = (rows - 1) * step + len(taps)
-        kept[first : first + rows] = band[:rows, :length] @ flat[first * step : first * step + length]
+    kept = banded(_band(taps, step, min(_AT_ONCE, count)), flat, count, _AT_ONCE * step)
     return kept.reshape((count, *signal.shape[1:]))
+
+
+def banded(band: np.ndarray, signal: np.ndarray, count: int, advance: int) -> np.ndarray:
+    """Return `count` rows: those of band (R, L) by the signal (N, k), which moves on by `advance` after each R."""
+    made = np.empty((count, signal.shape[1]))
+    for number, first in enumerate(range(0, count, len(band) or 1)):
+        part = signal[number * advance : number * advance + band.shape[1]]
+        made[first : first + len(band)] = band[: count - first, : len(part)] @ part
+    return made
 
 
 def _band(taps: np.ndarray, step: int, rows: int) -> np.ndarray:

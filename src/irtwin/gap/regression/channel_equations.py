@@ -50,7 +50,7 @@ def torque_system(
             own = stack.columns_by_joint(motion)
             columns = list(zip(own, candidates.part(motion), strict=True))
             slow = turning(robot, motion.dq) if effects else None
-            return Rows(columns, stack.shift_torque(motion, own), motion.torque, stack.undecided(motion), slow)
+            return Rows(columns, stack.shift_torque(motion), motion.torque, stack.undecided(motion), slow)
 
         return of_part
 
