@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 import scipy
@@ -53,6 +53,7 @@ Equations = Callable[[Motion], Rows]
 
 _CHUNK = 8192  # samples whose columns are held at once,
 _ROWS = 2048  # of which no more than this are left by decimation: they stay in the processor's cache
+_NARROW = 32  # columns: fewer are filtered together with others, as products of small matrices take long
 _PANEL = 64  # columns that LAPACK takes together
 _ROUNDING = 1e-15  # of a column's square: less of what others leave of it is rounding
 _SHARED = 2e7  # samples times columns: some 1 s, and a copy of the process takes 0.1 s
@@ -60,6 +61,7 @@ _BESIDE = 100  # columns take as long as what a sample takes beside its columns
 _BLOCKS = 40  # at least, over all motions: enough for intervals
 _UNDECIDED = 0.1  # of the filter's kernel: where more of it is undecided, so is what it gives
 _SLOW = 0.02  # of the kernel: a row with more of it is slow, as one reversal outweighs many quiet rows
+_ENOUGH = 60_000  # samples that tell where to begin, or which shape to take, as well as all do
 _SHORTEST = 4.0  # periods of the cutoff in a block: residuals are then nearly independent between blocks
 
 
@@ -111,11 +113,12 @@ class Block:
 def accumulate(
     motions: Sequence[Motion], equations: Equations, pattern: np.ndarray, *, by_products: bool = False, every: int = 1
 ) -> list[Block]:
-    """Reduce the motions to blocks; of these make every `every`-th alone.
+    """Reduce the motions to blocks.
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
-    either end of a run is left out, where a filter knows only one side. `by_products`: factors are worked out of the
+    either end of a run is left out, where a filter knows only one side. `every`: of blocks so many times as short, where
+    these are long enough, every which is made; one is all. `by_products`: factors are worked out of the
     products of columns, in a quarter of the time where these are many; they are no triangles, and what is below 1e-8 of
     a column is lost in rounding. Raises InputError where nothing is left.
     """
@@ -131,7 +134,7 @@ def accumulate_any(
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
-    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total)][::every]
+    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total, every)][::every]
     samples = sum(stop - start for _, start, stop in found)
     place = {motion.run: number for number, motion in enumerate(motions, start=1)}
 
@@ -207,12 +210,12 @@ def _add(growing: Sequence[_Growing], first: int, last: int, sample: Rows) -> No
 class _Thin:
     """Each equation's rows (N, r_e + 1) of [columns | measurement], filtered and decimated.
 
-    `mixed`: the matrices that make of them the k_e + 1 of [all columns | measurement]; None where they are these.
+    `mixed`: what makes the k_e columns of the r_e, part by part, by `Sparse.mixed`; ones (r,) where they are these.
     `keep`, `slow`: (N, g), which hold, and which are slow; `slow` is None where none are told apart.
     """
 
     rows: list[np.ndarray]
-    mixed: list[np.ndarray | None]
+    mixed: list[list[np.ndarray]]
     keep: np.ndarray
     slow: np.ndarray | None
 
@@ -226,28 +229,34 @@ class _Thin:
             keep = decimate(sample.undecided.astype(float), np.abs(taps), step) < _UNDECIDED
         if sample.slow is not None:
             slow = decimate(sample.slow.astype(float), np.abs(taps), step) >= _SLOW
-        rows, mixed = [], []
-        for equation, used in enumerate(pattern):
-            parts = sample.own(equation, used)
-            columns = [
-                decimate_sparse(part.values, motion, len(measured))
-                if isinstance(part, Sparse)
-                else decimate(part, taps, step)
-                for part in parts
-            ]
-            rows.append(np.column_stack([*columns, measured[:, equation]]))
-            mixed.append(_mixed(parts))
-        return cls(rows, mixed, keep, slow)
+        given = [sample.own(equation, used) for equation, used in enumerate(pattern)]
+        thin = iter(_decimated([part for parts in given for part in parts], motion, len(measured)))
+        rows = [np.column_stack([*islice(thin, len(parts)), own]) for parts, own in zip(given, measured.T, strict=True)]
+        return cls(rows, [[_mixed(part) for part in parts] for parts in given], keep, slow)
 
 
-def _mixed(parts: Columns) -> np.ndarray | None:
-    """Return what makes columns and measurement of the columns (N, r) of parts, and it."""
-    if not any(isinstance(part, Sparse) and part.mixed is not None for part in parts):
-        return None
-    own = [
-        part.mixed if isinstance(part, Sparse) and part.mixed is not None else np.eye(part.shape[1]) for part in parts
-    ]
-    return np.asarray(scipy.linalg.block_diag(*own, 1.0))
+def _decimated(parts: Columns, motion: Motion, count: int) -> list[np.ndarray]:
+    """Return the `count` rows of each part's columns that filter and decimation leave, of narrow parts together."""
+    taps, step = thinning(motion)
+    bunches: dict[tuple[bool, int], list[int]] = {}
+    for place, part in enumerate(parts):
+        wide = not isinstance(part, Sparse) and part.shape[1] > _NARROW
+        bunches.setdefault((isinstance(part, Sparse), place if wide else -1), []).append(place)
+    found = [np.zeros((count, 0))] * len(parts)
+    for (sparse, _), places in bunches.items():
+        own = [part.values if isinstance(part, Sparse) else part for part in map(parts.__getitem__, places)]
+        together = np.concatenate([some.T for some in own]).T if len(own) > 1 else own[0]
+        thin = decimate_sparse(together, motion, count) if sparse else decimate(together, taps, step)
+        for place, some in zip(places, np.split(thin, np.cumsum([some.shape[1] for some in own])[:-1], axis=1), strict=True):
+            found[place] = some
+    return found
+
+
+def _mixed(part: np.ndarray | Sparse) -> np.ndarray:
+    """Return what makes a part's columns of those that are read: a matrix, or a line of ones where they are these."""
+    if isinstance(part, Sparse):
+        return np.ones(part.values.shape[1]) if part.mixed is None else part.mixed
+    return np.ones(part.shape[1])
 
 
 def _nothing_left(motions: Sequence[Motion]) -> InputError:
@@ -309,11 +318,12 @@ class _Products:
         return root(self._products) if self._few is None else self._few
 
 
-def _of_all_columns(reduced: _Triangle | _Products, mixed: np.ndarray | None) -> np.ndarray:
+def _of_all_columns(reduced: _Triangle | _Products, mixed: Sequence[np.ndarray]) -> np.ndarray:
     factor = reduced.factor()
-    if mixed is None:
+    if all(part.ndim == 1 for part in mixed):
         return factor
-    return np.asarray(factor @ mixed) if len(factor) else np.zeros((0, mixed.shape[1]))
+    whole = scipy.linalg.block_diag(*(np.diag(part) if part.ndim == 1 else part for part in mixed), 1.0)
+    return np.asarray(factor @ whole) if len(factor) else np.zeros((0, whole.shape[1]))
 
 
 def root(products: np.ndarray) -> np.ndarray:
@@ -327,11 +337,16 @@ def root(products: np.ndarray) -> np.ndarray:
     return found
 
 
-def _stretches(motion: Motion, total: float) -> list[tuple[int, int]]:
-    """Cut a motion into the sample ranges of its blocks, of equal length."""
+def part_read(motions: Sequence[Motion]) -> int:
+    """Return every which block tells about what all of them do: of a long log a few tell that."""
+    return max(1, sum(len(motion.time) for motion in motions) // _ENOUGH)
+
+
+def _stretches(motion: Motion, total: float, every: int) -> list[tuple[int, int]]:
+    """Cut a motion into the sample ranges of its blocks, of equal length, `every` times as many."""
     seconds = _seconds(motion)
     shortest = _SHORTEST / motion.cutoff if motion.cutoff else 0.0
-    count = max(1, int(min(np.ceil(_BLOCKS * seconds / total), seconds / shortest if shortest else np.inf)))
+    count = max(1, int(min(np.ceil(_BLOCKS * every * seconds / total), seconds / shortest if shortest else np.inf)))
     edges = np.linspace(0, len(motion.time), count + 1).astype(int)
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
@@ -342,7 +357,7 @@ class _Growing:
     def __init__(self, motion: Motion, start: int, stop: int, pattern: np.ndarray, kind: type[_Triangle | _Products]):
         self.motion, self.start, self.stop, self.pattern = motion, start, stop, pattern
         self._reduced, self._slow = ([kind(int(row.sum()) + 1) for row in pattern] for _ in range(2))
-        self._mixed: list[np.ndarray | None] = [None] * len(pattern)
+        self._mixed: list[list[np.ndarray]] = [[] for _ in pattern]
         self._rows, self._slow_rows = np.zeros((2, len(pattern)), dtype=int)
         self._told_apart = False
 

@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.effects.drive import CopperLoss
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack
-from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any
+from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any, part_read
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
 from irtwin.identification.reduced_torque import ReducedTorque
@@ -22,8 +22,6 @@ Terms = Sequence[tuple[Effect, Term]]
 _STEPS = 20  # of Gauss-Newton, at most
 _CONVERGED = 1e-3  # of the prior spread
 _SETTLED = 0.1  # of a standard deviation: closer to it, a further step says nothing that the data know
-_LONG = 100_000  # samples, from which on
-_SAMPLED = 8  # every which block is read first
 _REPEATS = 8  # of fit and prediction, at most
 _SCALE = Term("scale", "1", spread=0.05)  # of real over logged torque, less one: drives' constants are nominal
 
@@ -56,7 +54,7 @@ def fit_power(
 ) -> tuple[list[Block], Estimate]:
     """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them.
 
-    `every`: every which block is read.
+    `every` as in `accumulate`.
     """
     free = free_terms(stack)
 
@@ -93,12 +91,12 @@ def fit_both(
     torque are found beside, and samples in which the joints give power back are left out of power: it may be burnt.
     `of_torque`: the equations of torque of all these motions, if they were reduced before.
 
-    Of a long log every few blocks alone are read until that settles, and then all, from values so near that the next
-    step is known to be none: steps shrink as they did before.
+    Of a long log a part is read until that settles, and then all, from values so near that the next step is known to be
+    none: steps shrink as they did before.
     """
     if CopperLoss.id not in stack.ids:
         stack = stack.with_effects([*stack.effects, CopperLoss()])
-    every = _SAMPLED if sum(len(motion.time) for motion in motions) >= _LONG else 1
+    every = part_read(motions)
     power = fit_power(stack, [motion for motion in motions if motion.power is not None], torque_values, every)[1]
     free, count = free_terms(stack), len(stack.torque_terms)
     terms = [*_of(stack.torque_terms), *_of(free), _SCALE]

@@ -14,7 +14,7 @@ import numpy as np
 from irtwin.effects.effect import Effect, JointEffect
 from irtwin.effects.friction import SLOW, CoulombFriction, sharp_sign, turn
 from irtwin.effects.stack import Stack, side_by_side
-from irtwin.identification.accumulate import Block, Rows, accumulate, triangle
+from irtwin.identification.accumulate import Block, Rows, accumulate, part_read, triangle
 from irtwin.identification.progress import track
 from irtwin.identification.reduced_torque import Column, ReducedTorque, column
 from irtwin.identification.robust_weights import SETTLED, robust_weights
@@ -60,9 +60,13 @@ def with_friction_near_zero(
         if isinstance(shape, JointEffect) and shape != effect
     ]
     tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
-    found, blocks = _found(stack, open_shapes, measured, tried)
+    every = part_read(measured)
+    found, blocks = _found(stack, open_shapes, measured, tried, every)
     if any(turn for turn, _ in found):
         tried = [[] if turn is None else _around(turn) for turn, _ in found]
+        found, blocks = _found(stack, open_shapes, measured, tried, every)
+    if every > 1:  # a part of the log chose, all of it says whether that is so
+        tried = [[] if turn is None else [turn] for turn, _ in found]
         found, blocks = _found(stack, open_shapes, measured, tried)
     turned = replace(plain, joints=tuple(_with(*both) for both in zip(plain.joints, found, strict=True)))
     return turned, ReducedTorque(blocks, _places(stack, open_shapes, tried, turned))
@@ -75,13 +79,17 @@ def _with(joint: Joint, found: Dry) -> Joint:
 
 
 def _found(
-    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+    stack: Stack,
+    open_shapes: Sequence[JointEffect],
+    motions: Sequence[Motion],
+    tried: Sequence[Sequence[Turn]],
+    every: int = 1,
 ) -> tuple[list[Dry], list[Block]]:
     """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none.
 
-    Beside it stand the equations, reduced.
+    Beside it stand the equations, reduced; `every` as in `accumulate`.
     """
-    blocks, pattern = _reduced(stack, open_shapes, motions, tried)
+    blocks, pattern = _reduced(stack, open_shapes, motions, tried, every)
     every = track(enumerate(tried), "friction near zero speed of each joint")
     return [_best(blocks, pattern, joint, turns) for joint, turns in every], blocks
 
@@ -93,7 +101,11 @@ def _around(found: Turn) -> list[Turn]:
 
 
 def _reduced(
-    stack: Stack, open_shapes: Sequence[JointEffect], motions: Sequence[Motion], tried: Sequence[Sequence[Turn]]
+    stack: Stack,
+    open_shapes: Sequence[JointEffect],
+    motions: Sequence[Motion],
+    tried: Sequence[Sequence[Turn]],
+    every: int,
 ) -> tuple[list[Block], np.ndarray]:
     """Reduce the equations of torque.
 
@@ -120,7 +132,7 @@ def _reduced(
         undecided = stack.undecided(motion) | sticking.undecided(motion)
         return Rows(columns, stack.shift_torque(motion, sparse=True), motion.torque, undecided)
 
-    return accumulate(motions, equations, pattern), pattern
+    return accumulate(motions, equations, pattern, every=every), pattern
 
 
 def _places(

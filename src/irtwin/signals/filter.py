@@ -63,16 +63,20 @@ def decimate(signal: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
     count = max(0, -(-(len(flat) - len(taps) + 1) // step))
     if len(taps) == 1:
         return flat[::step].reshape((count, *signal.shape[1:]))
-    kept = banded(_band(taps, step, min(_AT_ONCE, count)), flat, count, _AT_ONCE * step)
+    kept = banded(_band(taps, step, _AT_ONCE), flat, count, _AT_ONCE * step)
     return kept.reshape((count, *signal.shape[1:]))
 
 
 def banded(band: np.ndarray, signal: np.ndarray, count: int, advance: int) -> np.ndarray:
     """Return `count` rows: those of band (R, L) by the signal (N, k), which moves on by `advance` after each R."""
     made = np.empty((count, signal.shape[1]))
-    for number, first in enumerate(range(0, count, len(band) or 1)):
-        part = signal[number * advance : number * advance + band.shape[1]]
-        made[first : first + len(band)] = band[: count - first, : len(part)] @ part
+    rows, length = band.shape
+    for number in range(count // rows):
+        start = number * advance
+        np.matmul(band, signal[start : start + length], out=made[number * rows : (number + 1) * rows])
+    if left := count % rows:
+        last = signal[count // rows * advance :][:length]
+        made[count - left :] = band[:left, : len(last)] @ last
     return made
 
 

@@ -23,7 +23,8 @@ _SMOOTH = 2.2  # times the cutoff, within which a factor of what is smooth matte
 _REACH = 10  # sparse samples on either side of one between, which is then told to 5e-7
 _FACTORS_REACH = 6  # sparse samples on either side, in a factor's filter
 _GRID = 400  # frequencies at which gains are fitted
-_AT_ONCE = 16
+_AT_ONCE = 16  # rows that are made by one product of matrices
+_SPARSE_AT_ONCE = 32  # sparse samples between which others are found so
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,10 @@ def at_all(of: Callable[[Motion], np.ndarray], motion: Motion) -> np.ndarray:
         return of(motion)
     assert motion.cutoff
     band = _between((motion.whole or motion).rate, motion.cutoff, every)
-    some = of(at_some(motion))
-    inner = banded(band, some.reshape(len(some), -1), last - first, _AT_ONCE).reshape(last - first, *some.shape[1:])
-    return np.concatenate([of(motion.part(0, first)), inner, of(motion.part(last, count))])
+    found = of(motion.rows(np.r_[0:first, 0:count:every, last:count]))
+    some = found[first : len(found) - (count - last)]
+    inner = banded(band, some.reshape(len(some), -1), last - first, _SPARSE_AT_ONCE).reshape(last - first, *some.shape[1:])
+    return np.concatenate([found[:first], inner, found[len(found) - (count - last) :]])
 
 
 def factor_at_some(values: np.ndarray, motion: Motion) -> np.ndarray:
@@ -112,7 +114,7 @@ def _decimating(rate: float, cutoff: float, every: int) -> tuple[np.ndarray, int
 def _between(rate: float, cutoff: float, every: int) -> np.ndarray:
     """Return a matrix that gives all samples from those `_REACH - 1` sparse ones before on."""
     weights = np.where(_frequencies(every) < 2 * cutoff / rate, 1.0, _LOOSE**2)
-    band = np.zeros((_AT_ONCE * every, _AT_ONCE + 2 * _REACH - 1))
+    band = np.zeros((_SPARSE_AT_ONCE * every, _SPARSE_AT_ONCE + 2 * _REACH - 1))
     for row in range(len(band)):
         places = np.arange(row // every, row // every + 2 * _REACH)
         offsets = (places - _REACH + 1) * every - row
