@@ -19,6 +19,7 @@ from irtwin.knowledge.owl_rl.closure import Closure
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.resources import folder
 from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.sparse import Sparse
 
 CONTRACT = Path(__file__).parents[3] / "shared/contract/effects.toml"
 
@@ -265,3 +266,24 @@ def test_what_columns_carry_is_their_sum_over_joints():
     for motion in (told, told.part(10, 30)):
         expected = np.einsum("njk,nj->nk", stack.torque_columns(motion), motion.dq)[:, stack.real]
         np.testing.assert_allclose(stack.carried(motion, motion.dq), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_sparse_columns_are_those_of_torque_however_few_are_worked_out():
+    robot = arm(3)
+    told = replace(swing(robot, 1, seconds=20), payload_mass=2.0, cutoff=4.0)
+    stack = Stack(robot, [*BASELINE, "payload"])
+    part = told.part(100, 1500)
+    dense = stack.torque_columns(part)
+    for joint, (columns, used) in enumerate(zip(stack.sparse_by_joint(part), stack.pattern, strict=True)):
+        found = [each.values @ each.mixed for each in columns if isinstance(each, Sparse)]
+        expected = dense[::3, joint, used]
+        bodies, payload = (int(used[k].sum()) for k in (slice(0, 30), slice(-10, None)))
+        np.testing.assert_allclose(found[0], expected[:, :bodies], atol=1e-9)
+        np.testing.assert_allclose(found[1], expected[:, expected.shape[1] - payload :], atol=1e-9)
+        read = sum((each.values if isinstance(each, Sparse) else each).shape[1] for each in columns)
+        assert read < used.sum()
+    values = np.random.default_rng(0).uniform(0.5, 1.5, len(stack.torque_terms))
+    torque = stack.real_torque(part, values)
+    np.testing.assert_allclose(stack.real_torque(part, values, sparse=True), torque, atol=1e-5 * np.abs(torque).max())
+    known = stack.shift_torque(part)
+    np.testing.assert_allclose(stack.shift_torque(part, sparse=True), known, atol=1e-5 * np.abs(known).max())

@@ -11,7 +11,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification import accumulate as room
-from irtwin.identification.accumulate import Rows, accumulate, accumulate_any
+from irtwin.identification.accumulate import Rows, accumulate, accumulate_any, part_read
 from irtwin.identification.estimators import combine
 from irtwin.signals.filter import decimate, decimation, kernel
 
@@ -162,3 +162,15 @@ def test_a_copy_of_the_process_makes_the_same_blocks(monkeypatch, by_products):
         np.testing.assert_array_equal(one.rows, same.rows)
         for factor, other in zip(one.factors, same.factors, strict=True):
             np.testing.assert_array_equal(factor, other)
+
+
+def test_of_a_long_log_a_part_is_read_all_over_it(monkeypatch):
+    motions = [measure(ROBOT, swing(ROBOT, k, seconds=30)) for k in range(2)]
+    assert part_read(motions) == 1
+    monkeypatch.setattr(room, "_ENOUGH", 1500)
+    assert part_read(motions) == 4
+    whole, some = (accumulate(motions, equations, STACK.pattern, every=every) for every in (1, 4))
+    rows = [sum(block.rows[0] for block in blocks) for blocks in (whole, some)]
+    assert rows[1] == pytest.approx(rows[0] / 4, rel=0.05)
+    assert {block.run for block in some} == {motion.run for motion in motions}
+    assert len(some) == len(whole)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -58,18 +59,14 @@ def test_a_line_meets_power_where_it_is_taken_and_touches_it_beside():
 
     torque = stack.real_torque(loaded, coefficients)
     now = stack.power_columns(loaded, torque)
-
-    def carrying(slope):
-        return [stack.carried(loaded, slope)]
-
-    line = power_line(stack, loaded, carrying, torque, now, values)
+    line = power_line(stack, loaded, partial(stack.carried, loaded), torque, now, values)
 
     def said(of):
-        return line.carried[0] @ of[stack.real] + line.free @ free + line.known
+        return line.carried @ of[stack.real] + line.free @ free + line.known
 
     np.testing.assert_allclose(said(coefficients), power(coefficients), rtol=1e-9)
-    told = power_line(stack, loaded, carrying, torque, now, values, np.ones((1, 3), dtype=bool))
-    assert not told.carried[0].any()
+    told = power_line(stack, loaded, partial(stack.carried, loaded), torque, now, values, np.ones((1, 3), dtype=bool))
+    assert not told.carried.any()
     np.testing.assert_allclose(told.free @ free + told.known, power(coefficients), rtol=1e-9)
     step = 1e-5 * rng.uniform(-1, 1, len(coefficients))
     change = power(coefficients + step) - power(coefficients - step)

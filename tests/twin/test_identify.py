@@ -246,3 +246,14 @@ def test_nothing_to_fit():
         identify(robot, [swing(robot, 1)])
     with pytest.raises(InputError, match='no effect "stiction"'):
         identify(robot, [measure(robot, swing(robot, 1))], ["stiction"])
+
+
+def test_a_long_log_says_the_same_read_in_part_first(monkeypatch):
+    robot = with_constants(arm(3))
+    motions = [replace(measure(robot, swing(robot, seed), noise=0.3, seed=seed), cutoff=20.0) for seed in range(3)]
+    whole = identify(robot, motions, ALL)
+    monkeypatch.setattr("irtwin.identification.accumulate._ENOUGH", 1500)
+    twin = identify(robot, motions, ALL)
+    assert twin.effects == whole.effects
+    for one, other in zip(twin.base_parameters, whole.base_parameters, strict=True):
+        assert one.value == pytest.approx(other.value, abs=0.02 * (other.upper - other.lower))

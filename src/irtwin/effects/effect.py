@@ -143,8 +143,8 @@ class Effect(ABC):
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect;
-    one that is `never_changed` has such a shape for its changes. Columns of one that is `smooth` depend on the states of
-    their sample alone, and vary no faster than these.
+    one that is `never_changed` has such a shape for its changes. Columns of one that is `smooth` depend on their
+    sample's states alone, and vary no faster than these.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:

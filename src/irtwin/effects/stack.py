@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import groupby
 from typing import TypeVar
 
 import numpy as np
@@ -177,7 +176,7 @@ class Stack:
             dense = effect.columns(self.robot, some)
             return [Sparse(dense[:, joint, own], mixed) for joint, (own, mixed) in enumerate(self._spans[effect])]
 
-        return [_joined(columns) for columns in self._by_joint(motion, values, columns)]
+        return self._by_joint(motion, values, columns)
 
     def _by_joint(
         self,
@@ -212,7 +211,8 @@ class Stack:
         probe = Motion(np.arange(float(_STATES)), *states, run="probe")
         return {
             effect: [
-                _span(effect.columns(self.robot, probe)[:, joint], used) for joint, used in enumerate(self.pattern[:, own])
+                _span(effect.columns(self.robot, probe)[:, joint], used)
+                for joint, used in enumerate(self.pattern[:, own])
             ]
             for effect, own in self._torque_places
             if effect.smooth
@@ -245,14 +245,12 @@ class Stack:
         """Return `carried` as arrays to stand side by side, those of smooth effects sparse."""
         below = self._torques(motion, values).below if self.coupled else {}
         some, slower = at_some(motion), factor_at_some(along, motion)
-        return _joined(
-            [
-                Sparse(effect.carried(self.robot, some, slower))
-                if effect.smooth and effect.acts_in(motion)
-                else self._carried(effect, motion, along, below.get(effect.stage))
-                for effect in self._real
-            ]
-        )
+        return [
+            Sparse(effect.carried(self.robot, some, slower))
+            if effect.smooth and effect.acts_in(motion)
+            else self._carried(effect, motion, along, below.get(effect.stage))
+            for effect in self._real
+        ]
 
     @property
     def _real(self) -> list[Effect]:
@@ -467,7 +465,7 @@ def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, s
 
 
 def _span(columns: np.ndarray, used: np.ndarray) -> Span:
-    """Return which of columns (M, k) span those `used` (k,), by a pivoted QR, and the (r, used) matrix that makes these."""
+    """Return which of columns (M, k) span those `used` (k,), by a pivoted QR, and the (r, used) matrix that does so."""
     places = np.flatnonzero(used)
     size = np.linalg.norm(columns[:, places], axis=0)
     size[size == 0] = 1.0
@@ -477,14 +475,6 @@ def _span(columns: np.ndarray, used: np.ndarray) -> Span:
     mixed = np.empty((rank, len(places)))
     mixed[:, order] = scipy.linalg.solve_triangular(factor[:rank, :rank], factor[:rank]) / size[order[:rank], None]
     return places[order[:rank]], mixed * size
-
-
-def _joined(parts: Sequence[np.ndarray | Sparse]) -> list[np.ndarray | Sparse]:
-    """Return columns with those arrays joined that follow on each other: single ones take ten times as long to filter."""
-    joined: list[np.ndarray | Sparse] = []
-    for dense, own in groupby(parts, key=lambda part: isinstance(part, np.ndarray)):
-        joined += [side_by_side([part for part in own if isinstance(part, np.ndarray)])] if dense else own
-    return joined
 
 
 def side_by_side(parts: Sequence[np.ndarray]) -> np.ndarray:

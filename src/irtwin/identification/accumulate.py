@@ -30,9 +30,9 @@ class Rows:
     """g equations a sample: columns (N, g, K) @ coefficients + known (N, g) = measured (N, g).
 
     `columns` may also be, for each equation, the arrays (N, some) that side by side are the columns which it has by the
-    `pattern`, those that are smooth sparse: they are joined when few samples are left. A function that returns them is called beside the work on the
-    next part. Where `undecided` (N, g) the equation does not hold, and is left out. Rows where it is `slow` (N, g) stay
-    apart from the others.
+    `pattern`, or what tells them sparsely: they are joined when few samples are left. A function that returns them is
+    called beside the work on the next part. Where `undecided` (N, g) the equation does not hold, and is left out. Rows
+    where it is `slow` (N, g) stay apart from the others.
     """
 
     columns: np.ndarray | Sequence[Given]
@@ -47,6 +47,10 @@ class Rows:
             return [self.columns[:, equation, used]]
         given = self.columns[equation]
         return given() if callable(given) else given
+
+    def dense(self, equation: int, used: np.ndarray) -> list[np.ndarray]:
+        """Return `own` where none are sparse."""
+        return [part for part in self.own(equation, used) if isinstance(part, np.ndarray)]
 
 
 Equations = Callable[[Motion], Rows]
@@ -117,10 +121,10 @@ def accumulate(
 
     `pattern`: (g, K) which columns each equation has. What is computed from the motion passes the filter that its
     measurement went through (its `cutoff`), and both are then decimated to what lies below it. Half a kernel at
-    either end of a run is left out, where a filter knows only one side. `every`: of blocks so many times as short, where
-    these are long enough, every which is made; one is all. `by_products`: factors are worked out of the
-    products of columns, in a quarter of the time where these are many; they are no triangles, and what is below 1e-8 of
-    a column is lost in rounding. Raises InputError where nothing is left.
+    either end of a run is left out, where a filter knows only one side. `every`: every which block is made, of blocks
+    so many times as short; one is all. `by_products`: factors are worked out of the products of columns, in a quarter
+    of the time where these are many; they are no triangles, and what is below 1e-8 of a column is lost in rounding.
+    Raises InputError where nothing is left.
     """
     found = accumulate_any(motions, equations, pattern, by_products=by_products, every=every)
     if not found:
@@ -247,7 +251,9 @@ def _decimated(parts: Columns, motion: Motion, count: int) -> list[np.ndarray]:
         own = [part.values if isinstance(part, Sparse) else part for part in map(parts.__getitem__, places)]
         together = np.concatenate([some.T for some in own]).T if len(own) > 1 else own[0]
         thin = decimate_sparse(together, motion, count) if sparse else decimate(together, taps, step)
-        for place, some in zip(places, np.split(thin, np.cumsum([some.shape[1] for some in own])[:-1], axis=1), strict=True):
+        for place, some in zip(
+            places, np.split(thin, np.cumsum([some.shape[1] for some in own])[:-1], axis=1), strict=True
+        ):
             found[place] = some
     return found
 

@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.effects.drive import CopperLoss
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack
-from irtwin.identification.accumulate import Block, Equations, Rows, accumulate, accumulate_any, part_read
+from irtwin.identification.accumulate import Block, Columns, Equations, Rows, accumulate, accumulate_any, part_read
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
 from irtwin.identification.reduced_torque import ReducedTorque
@@ -151,14 +151,14 @@ def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
     return equations
 
 
-def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine, np.ndarray]]:
+def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine[Columns], np.ndarray]]:
     """Return what gives power's line about the coefficients, and the joints' work (N,), W."""
     torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
     power_values = _expected(stack.power_terms)
     power_values[stack.fixed] *= 1 + scale
     power_values[~stack.fixed] = free
 
-    def line_of(motion: Motion) -> tuple[PowerLine, np.ndarray]:
+    def line_of(motion: Motion) -> tuple[PowerLine[Columns], np.ndarray]:
         torque = stack.real_torque(motion, torque_values, sparse=True)
         now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
         carrying = partial(stack.sparse_carried, motion, values=torque_values)

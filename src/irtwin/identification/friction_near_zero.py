@@ -90,8 +90,8 @@ def _found(
     Beside it stand the equations, reduced; `every` as in `accumulate`.
     """
     blocks, pattern = _reduced(stack, open_shapes, motions, tried, every)
-    every = track(enumerate(tried), "friction near zero speed of each joint")
-    return [_best(blocks, pattern, joint, turns) for joint, turns in every], blocks
+    told = track(enumerate(tried), "friction near zero speed of each joint")
+    return [_best(blocks, pattern, joint, turns) for joint, turns in told], blocks
 
 
 def _around(found: Turn) -> list[Turn]:

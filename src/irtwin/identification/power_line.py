@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -12,21 +13,21 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Columns, Given, Rows
 from irtwin.signals.motion import Motion
 
-Carrying = Callable[[np.ndarray], Columns]
+Carried = TypeVar("Carried", np.ndarray, Columns)  # columns (N, r), or arrays of them to stand side by side
 
 _STEP = 1e-2  # N m, exact for what is quadratic in torque
 
 
 @dataclass(frozen=True)
-class PowerLine:
+class PowerLine(Generic[Carried]):
     """The equation of power of N samples: carried @ x + free @ p + known = power, of r coefficients x of real torque.
 
-    slope: (N, n) W/(N m), of power over each joint's torque; carried: arrays (N, some) that side by side have r columns;
-    free: (N, F), of the coefficients p of power that are not fixed; known: (N,) W.
+    slope: (N, n) W/(N m), of power over each joint's torque; carried: (N, r); free: (N, F), of the coefficients p of
+    power that are not fixed; known: (N,) W.
     """
 
     slope: np.ndarray
-    carried: Columns
+    carried: Carried
     free: np.ndarray
     known: np.ndarray
 
@@ -34,15 +35,15 @@ class PowerLine:
 def power_line(
     stack: Stack,
     motion: Motion,
-    carrying: Carrying,
+    carrying: Callable[[np.ndarray], Carried],
     torque: np.ndarray,
     power: np.ndarray,
     values: np.ndarray,
     told: np.ndarray | bool = False,
-) -> PowerLine:
+) -> PowerLine[Carried]:
     """Return the equation of power, linear in the coefficients of torque about the real `torque` (N, n).
 
-    carrying: gives what real columns carry by a slope, arrays (N, some) that side by side are (N, R); power: (N, L) columns of power on that torque; values:
+    carrying: gives (N, R) what real columns carry by a slope; power: (N, L) columns of power on that torque; values:
     (L,) its coefficients; told: (N, n) where a log tells that torque, so that no coefficient does.
     """
     slope = np.where(told, 0.0, power_slope(stack, motion, torque, values))

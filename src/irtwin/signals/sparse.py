@@ -1,8 +1,8 @@
 """What is as smooth as a motion, worked out at some of its samples: logs have many more than the motion needs.
 
 States pass a filter before they are differentiated, so that bodies' torque has nothing far above its cutoff. It is
-worked out at every few samples. From these a kernel that is fitted to the filter's gain (least squares, F. Hlawatsch and
-T. P. Krauss) makes what filter and decimation make of all samples, or gives the samples between.
+worked out at every few samples. From these a kernel that is fitted to the filter's gain, by least squares, makes what
+filter and decimation make of all samples, or gives the samples between.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from irtwin.signals.filter import banded, decimate, decimation, kernel
 from irtwin.signals.motion import Motion
 
-_RATE = 8.0  # times the cutoff: states pass up to six times (`conditioning`), so that nothing folds into what is kept
+_RATE = 6.5  # times the cutoff: what folds into what is kept lies above 4.8, where states' own filter passes 2 %
 _PASSED = 1.7  # times the cutoff: beyond, the kernel passes less than 1 % ...
 _LOOSE = 1e-3  # ... and may be off by this times more, for 3e-7 below
 _SMOOTH = 2.2  # times the cutoff, within which a factor of what is smooth matters
@@ -69,7 +69,9 @@ def at_all(of: Callable[[Motion], np.ndarray], motion: Motion) -> np.ndarray:
     band = _between((motion.whole or motion).rate, motion.cutoff, every)
     found = of(motion.rows(np.r_[0:first, 0:count:every, last:count]))
     some = found[first : len(found) - (count - last)]
-    inner = banded(band, some.reshape(len(some), -1), last - first, _SPARSE_AT_ONCE).reshape(last - first, *some.shape[1:])
+    inner = banded(band, some.reshape(len(some), -1), last - first, _SPARSE_AT_ONCE).reshape(
+        last - first, *some.shape[1:]
+    )
     return np.concatenate([found[:first], inner, found[len(found) - (count - last) :]])
 
 

@@ -139,7 +139,8 @@ def shaken_products(
         whole = partner[id(motion.whole or motion)]
         one, other = equations(motion), again(whole.part(motion.start, motion.start + len(motion.time)))
         columns = [
-            [b - a for a, b in zip(one.own(k, used), other.own(k, used), strict=True)] for k, used in enumerate(pattern)
+            [b - a for a, b in zip(one.dense(k, used), other.dense(k, used), strict=True)]
+            for k, used in enumerate(pattern)
         ]
         undecided = None
         if one.undecided is not None and other.undecided is not None:

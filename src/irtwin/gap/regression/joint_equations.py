@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -78,16 +79,13 @@ def joint_equations(
 
         def of_part(motion: Motion) -> Rows:
             own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
-
-            def carrying(slope: np.ndarray) -> list[np.ndarray]:
-                return [carried(own, slope, stack.pattern, stack.real)]
-
+            carrying = partial(carried, own, pattern=stack.pattern, real=stack.real)
             about = torque, stack.power_columns(motion, torque), power.values, stack.told_by_log(motion)
             line = power_line(stack, motion, carrying, *about)
             electrical = added.part(motion)
 
             def of_power() -> list[np.ndarray]:
-                return [*line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
+                return [line.carried, line.free, carried(parts, line.slope, tried, real), *electrical]
 
             rows: list[Given] = [*zip(own, parts, strict=True), of_power]
             of_both = rows_of_both(stack, motion, rows, (stack.shift_torque(motion), line.known))
