@@ -1,7 +1,8 @@
 """How dry friction turns at zero speed, in each joint: at once, or over some speed. Nobody states it, so it is fitted.
 
 A twin whose friction turns at once leaves, of a joint whose friction does not, what looks like friction that sticks
-less, thins or has changed. The turn is a nuisance: it is found before anything is asked of the data, from all of them.
+less, thins or has changed. The turn is a nuisance: it is found before anything is asked of the data, from all of them;
+of a long log a part proposes it.
 """
 
 from __future__ import annotations
