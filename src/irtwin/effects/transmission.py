@@ -110,3 +110,27 @@ class JointCoupling(Effect):
             for joint, other in (places, places[::-1]):
                 columns[:, joint] = np.column_stack([motion.ddq[:, other], motion.dq[:, other], rubs])
         return columns
+
+    def changes(self) -> tuple[Effect, ...]:
+        """Return the change of what turns with both joints: no friction of a joint beside it has to bring its part."""
+        return (ChangedJointCoupling(joints=self.joints, runs=self.runs),)
+
+
+@dataclass(frozen=True)
+class ChangedJointCoupling(JointCoupling):
+    """Ia (ddq_j + ddq_k) + Fv (dq_j + dq_k) + Fc sign(dq_j + dq_k) on both joints: with each joint's own part."""
+
+    of_change: ClassVar[bool] = True
+
+    def standing(self) -> Effect:
+        """Return it in a twin, whose rotors and friction have each joint's own part."""
+        return JointCoupling(joints=self.joints, runs=self.runs)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, 3)."""
+        places = [robot.index(joint.name) for joint in self.pair(robot)]
+        columns = np.zeros((*motion.dq.shape, 3 if places else 0))
+        if places:
+            speed, acceleration = (each[:, places].sum(axis=1) for each in (motion.dq, motion.ddq))
+            columns[:, places] = np.column_stack([acceleration, speed, sharp_sign(speed)])[:, None, :]
+        return columns
