@@ -39,7 +39,7 @@ _GAPS = tuple(3e-4 * 2.0 ** (2 * k / 3) for k in range(10))  # rad: 0.3 to 19 mr
 _SMALL = (3e-4, 6e-4)  # rad: tried with a part of the rotor before the gap, too
 _WITHIN = 2.0 ** (np.arange(-1, 2) * 2 / 3)  # of a gap: those before and after it among the gaps
 _SWINGS = (5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 20.0, 40.0)  # Hz: antiresonances of elastic joints
-_SLOWEST = 1.0  # Hz, of that swing: no controller would hold an arm that swings slower
+_SLOWEST = 3.0  # Hz, of that swing: arms of industry swing at 5 and more, the lightest at 3
 
 
 def load_torque(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
@@ -337,7 +337,7 @@ class JointElasticity(_Compliance):
         for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
             rotor = given.known.get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
             top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
-            if top and value > 0:
+            if top is not None and value > 0:  # without a rotor nothing swings before the spring: K is nothing
                 sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
