@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
 from irtwin.effects.compliance import Backlash, JointElasticity, load_inertia, load_torque, transmitted
-from irtwin.effects.effect import Predicted
+from irtwin.effects.effect import Coefficients, Predicted, Quantity, Stated
 from irtwin.signals.motion import Motion
 
 RATE = 250.0
@@ -119,3 +119,17 @@ def test_gaps_that_are_tried_together_are_as_each_alone():
         (alone,) = one.samples(robot, motion, Predicted(said.torque, load=said.load, inertia=said.inertia))
         np.testing.assert_allclose(one.samples(robot, motion, said)[0], alone, rtol=1e-12)
         assert alone.any()
+
+
+def test_a_spring_behind_which_no_rotor_swings_is_as_soft_as_can_be():
+    robot = arm(2)
+    effect = JointElasticity(joints=("joint_1",))
+
+    def stiffness(rotor: float) -> Quantity:
+        given = Coefficients(np.array([1e-4]), np.array([[1e-12]]), {("rotor_inertia", "joint_1", "Ia"): rotor})
+        return effect.parameters(robot, given)[0]
+
+    least = effect.possible(robot, Stated())["K"].low
+    assert stiffness(0.0).upper == 0.0
+    assert stiffness(2e-4 * least).value == pytest.approx(2 * least)
+    assert least == pytest.approx((2 * np.pi * 3) ** 2 * robot.mean_inertia[0])
