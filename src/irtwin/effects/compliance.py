@@ -337,7 +337,7 @@ class JointElasticity(_Compliance):
         for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
             rotor = given.known.get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
             top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
-            if top is not None and value > 0:  # without a rotor nothing swings before the spring: K is nothing
+            if top is not None and value > 0:  # where no rotor swings K is 0, which is refused
                 sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
