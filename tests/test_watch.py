@@ -9,21 +9,19 @@ import signal
 import socket
 import threading
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live import watch
-from irtwin.live.rtde import Rtde
+from irtwin.live.opcua import OpcUa
 from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from tests import rows
 from tests.data_sets import irtwin
 from tests.forks import Command
-from tests.live.controller import Controller, serving
 from tests.live.opcua_robot import ServedRobot
 from tests.synthetic import arm
 from tests.trusting import trust_all
@@ -117,30 +115,6 @@ def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_an_arm_is_followed_by_rtde_and_its_run_is_kept(tmp_path: Path) -> None:
-    place = tmp_path / "w"
-    made = arm(6)
-    described = replace(made, joints=tuple(replace(joint, torque_constant=9.0) for joint in made.joints))
-    with Workspace(place) as there:
-        ingest(there, DataSet(tmp_path, described, (), None, None, "dc_bus", False, {}))
-        KnowledgeGraph(there.graph_folder).close()
-    controller = Controller()
-    with serving(controller) as port:
-        process = Command("live", "--rtde", f"127.0.0.1:{port}", "--robot", made.name, "--workspace", place)
-        assert f"Following 127.0.0.1:{port}: positions, speeds, torques" in process.stderr.readline()
-        while controller.sent < 200 and process.poll() is None:
-            time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=120)
-    assert process.returncode == 0, said
-    stored = int(said.partition(" samples stored")[0].rpartition("\n")[2])
-    assert 190 <= stored <= controller.sent
-    question = "SELECT (series:mean(?run, 'power', 0, 1) AS ?watts) { ?run irt:State_Time ?at }"
-    asked = irtwin("query", question, "--format", "json", "--workspace", place)
-    (answer,) = json.loads(asked.out)
-    assert 96.0 < answer["watts"] < 144.0, asked.err
-
-
 @pytest.mark.nightly
 def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
     with Workspace(tmp_path / "w") as there:
@@ -158,43 +132,30 @@ def test_a_robot_is_followed_by_opc_ua(tmp_path: Path) -> None:
     assert int(said.partition(" samples stored")[0].rpartition("\n")[2]) > 20
 
 
-def test_a_full_disk_ends_what_follows_an_arm_and_is_no_lost_connection() -> None:
-    with serving(Controller()) as port:
-        followed = Rtde(f"127.0.0.1:{port}", arm(6), "arm")
-        said: list[str] = []
+def test_a_full_disk_ends_what_follows_a_server_and_is_no_lost_connection() -> None:
+    def full(_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-        def full(_: object) -> None:
-            raise OSError(errno.ENOSPC, "No space left on device")
-
+    served, said = ServedRobot(), list[str]()
+    served.start()
+    try:
+        followed = OpcUa(served.address, arm(6), "arm")
         with pytest.raises(OSError, match="No space left"):
             watch._receive(followed.states(threading.Event(), said.append), full, print, lambda: None)
+    finally:
+        served.stop()
     assert not any("lost" in line for line in said)
-
-
-def test_what_is_wrong_with_an_arm_is_told(workspace: Path) -> None:
-    for given, message in (
-        (("--rtde", "127.0.0.1:9"), "--robot goes with --replay, --rtde or --opcua"),
-        (
-            ("--rtde", "127.0.0.1:9", "--robot", "KUKA KR6 R700", "--port", "0"),
-            "Give one of --port, --replay, --rtde and --opcua.",
-        ),
-    ):
-        told = irtwin("live", *given, "--workspace", workspace)
-        assert (told.status, message in told.err) == (2, True), told.err
-    told = irtwin("live", "--rtde", "127.0.0.1:9", "--robot", "UR5", "--workspace", workspace)
-    assert told.status == 2
-    assert 'no robot "UR5" here; the nearest is "KUKA KR6 R700"' in told.err
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--robot", "arm"], "--robot goes with --replay, --rtde or --opcua"),
+        (["--robot", "arm"], "--robot goes with --replay or --opcua"),
         (["--speed", "2"], "--speed is for --replay"),
         (["--nodes", "n.toml"], "--nodes is for --opcua"),
         (["--performs", "reach"], "--performs goes with --robot; lines of a stream say it by themselves"),
-        (["--replay", "log.csv"], "--robot goes with --replay, --rtde or --opcua"),
-        (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay, --rtde and --opcua"),
+        (["--replay", "log.csv"], "--robot goes with --replay or --opcua"),
+        (["--replay", "log.csv", "--robot", "arm", "--port", "0"], "Give one of --port, --replay and --opcua"),
         (["--replay", "log.csv", "--robot", "arm", "--speed", "0"], "0.01<=x<=1000.0"),
     ],
 )

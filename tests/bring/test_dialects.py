@@ -14,7 +14,6 @@ import pyarrow as pa
 import pytest
 from tests.bring.dialects import NAME, assert_same, good, per_joint, robot, signals, write_text
 from tests.data_sets import irtwin
-from tests.live.controller import Controller
 
 from irtwin.bring.bring import Options, bring
 from irtwin.check.check import check
@@ -231,17 +230,18 @@ def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None
 
 
 def test_a_recording_that_ur_rtde_made(tmp_path: Path) -> None:
-    """Made by RTDEReceiveInterface.startFileRecording of ur_rtde 1.6.5, connected to tests/live/controller.py."""
-    log, controller = Path(__file__).parent / "data" / "ur_rtde.csv", Controller()
+    """Made by RTDEReceiveInterface.startFileRecording of ur_rtde 1.6.5, of a controller that samples each 8 ms."""
+    log = Path(__file__).parent / "data" / "ur_rtde.csv"
     said = bring([log], tmp_path / "set", NAME, Options(maps=("actual_qd_*=dq:rad/s",))).said  # they are no derivatives
     assert said == (f"{log}: 3 rows left out, the first line 7: they repeat the row before, time and all",)
     data_set = read_data_set(tmp_path / "set")
     (run,) = data_set.runs
-    rows = np.round((run.signals.time - 1000.0) / controller.step).astype(int).tolist()
-    for field, variable in (("q", "actual_q"), ("dq", "actual_qd"), ("current", "actual_current")):
-        true = [controller.value(variable, row) for row in rows]
+    rows, joints = np.round((run.signals.time - 1000.0) / 0.008), np.arange(6)
+    angles = rows[:, None] / 30.0 + joints
+    currents = np.broadcast_to(0.5 * joints - 0.2, angles.shape)
+    for field, true in (("q", np.sin(angles)), ("dq", np.cos(angles)), ("current", currents)):
         np.testing.assert_allclose(getattr(run.signals, field), true, atol=1e-6, err_msg=field)
-    assert run.signals.power == pytest.approx([48 * controller.value("actual_robot_current", row)[0] for row in rows])
+    assert run.signals.power == pytest.approx(48 * (2.0 + np.sin(rows / 50.0)))
     assert (run.payload_mass, data_set.power_at) == (1.5, "dc_bus")
 
 

@@ -23,7 +23,6 @@ OTHER_MEANINGS = {
     "providers/records.py": {"rotor_inertia"},  # a joint's field
     "report/gap/experiment.py": {"payload"},
     "live/joint_stream.py": {"payload"},  # a field of a message
-    "live/rtde.py": {"payload"},
     "signals/log.py": {"rotor_inertia"},  # a key of the data sheet
     "simulator/fit.py": {"payload"},  # a number of a model, told as the effect of that name
     "simulator/servos.py": {"payload", "base_tilt"},

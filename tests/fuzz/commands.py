@@ -207,7 +207,10 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "optimise": (["optimise", _robot(folder), run.stem, "--cycle", "20", *here], []),
         "plan into workspace": (["plan", _robot(folder), *_ends(case), "--search", "2", *here], []),
         "alarms follow": (["alarms", "--follow", *here], []),
-        "live controller": (["live", "--rtde", f"127.0.0.1:{port or 1}", "--robot", _robot(folder), *here], []),
+        "live controller": (
+            ["live", "--opcua", f"opc.tcp://127.0.0.1:{port or 1}", "--robot", _robot(folder), *here],
+            [],
+        ),
         "serve": (["serve", "--port", "0", *here], []),
         "init": (["import", "--robot", data / "robot.urdf", "--out", folder / "begun"], [folder / "begun"]),
         "run of what was imported": (["run", folder / "brought", *here], []),

@@ -1,4 +1,4 @@
-"""What answers on a port of this machine as no web server and no controller should: in a process of its own."""
+"""What answers on a port of this machine as no web server and no robot's server should: in a process of its own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 import numpy as np
 from tests.dripping import dripping, talking
 from tests.fuzz.values import some
-from tests.live.controller import Controller, package, serving
 
 Peer = Callable[[np.random.Generator], AbstractContextManager[int]]
 
@@ -86,30 +85,6 @@ def _drips(rng: np.random.Generator) -> AbstractContextManager[int]:
     return dripping(some(rng, [b"x", b"a: b\r\n", b"\0", b"\r\n"]), float(some(rng, [0.01, 0.1, 0.4])), first)
 
 
-def _controller(rng: np.random.Generator) -> AbstractContextManager[int]:
-    """A controller that goes wrong after some samples."""
-    controller = Controller(step=0.004)
-    where = int(rng.integers(1, 60))
-    how = rng.integers(6)
-    if how == 0:
-        controller.breaks = where
-    elif how == 1:
-        controller.quiet = where
-    elif how == 2:
-        kinds = some(rng, ["U", "M", "V", "P", "z"])
-        sizes = [b"", b"\x07", b"\x07" + b"\xff" * 208, rng.bytes(209), rng.bytes(40)]
-        controller.spoilt = {where: package(kinds, some(rng, sizes))}
-    elif how == 3:
-        controller.spoilt = {where: some(rng, [rng.bytes(300), b"\x00\x00U", b"\xff\xffU", b"\x00\x01", b"\0" * 99])}
-    elif how == 4:
-        times = [0.0, -1.0, float("nan"), float("inf"), 1e300, 999.0, 1000.0, 1e9]
-        controller.times = {where + step: float(some(rng, times)) for step in range(rng.integers(1, 5))}
-    else:
-        controller.lacking = tuple(some(rng, ["timestamp", "payload", "actual_q", "actual_current"]) for _ in range(2))
-        controller.version = int(some(rng, [1, 2, 2, 3]))
-    return serving(controller)
-
-
 OF_WEB: dict[str, Peer] = {"status": _status, "informs": _informs, "body": _body, "junk": _junk, "drips": _drips}
-OF_ROBOT: dict[str, Peer] = {"controller": _controller, "junk": _junk, "drips": _drips}
+OF_ROBOT: dict[str, Peer] = {"junk": _junk, "drips": _drips}
 PEERS = OF_WEB | OF_ROBOT

@@ -84,10 +84,9 @@ def _announce(address: str) -> None:
 @located
 @click.option("--port", type=click.IntRange(0, 65535), help="Read from clients on this port of 127.0.0.1 instead.")
 @click.option("--replay", type=PLACE, help="Play this log of a robot instead.")
-@click.option("--rtde", metavar="HOST[:PORT]", help="Follow the controller of a Universal Robots arm instead.")
 @click.option("--opcua", metavar="URL", help="Follow a robot by its OPC UA server instead, opc.tcp://HOST:PORT.")
 @click.option("--nodes", type=PLACE, help="TOML file that names its nodes where that is no OPC 40010 server.")
-@click.option("--robot", metavar="NAME", help="Whose log or controller it is.")
+@click.option("--robot", metavar="NAME", help="Whose log or server it is.")
 @click.option("--speed", type=Number(0.01, 1000.0), default=1.0, show_default=True, help="Of the log, times its own.")
 @click.option("--performs", metavar="PLAN", help="Name of the planned run that the robot carries out.")
 def live(
@@ -108,7 +107,6 @@ def live(
 
     \b
     Example: irtwin live < states.jsonl
-    Example: irtwin live --rtde 192.168.0.20 --robot UR10
     Example: irtwin live --opcua opc.tcp://192.168.0.30:4840 --robot KR6
     """
     from irtwin.live.watch import watch
@@ -116,9 +114,9 @@ def live(
 
     given = [source for source in (port, *of_one.values()) if source is not None]
     if len(given) > 1:
-        raise click.UsageError("Give one of --port, --replay, --rtde and --opcua.")
+        raise click.UsageError("Give one of --port, --replay and --opcua.")
     if (robot is None) != all(source is None for source in of_one.values()):
-        raise click.UsageError("--robot goes with --replay, --rtde or --opcua: it says whose log or controller it is.")
+        raise click.UsageError("--robot goes with --replay or --opcua: it says whose log or server it is.")
     if speed != 1.0 and of_one["replay"] is None:
         raise click.UsageError("--speed is for --replay.")
     if nodes is not None and of_one["opcua"] is None:

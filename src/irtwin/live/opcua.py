@@ -22,7 +22,7 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -30,7 +30,6 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.errors import InputError
-from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import STREAMED, State, state_of
 from irtwin.robot.description import Robot
 from irtwin.signals.toml_file import TomlTable, shown
@@ -51,6 +50,7 @@ _UNECE |= {"MTS": "m/s", "C16": "mm/s", "WTT": "W", "KWT": "kW", "CEL": "degC"}
 _FIELDS = {str(channel.streamed): field for field, channel in STREAMED.items()}
 _TEXTS = ("device", "user", "certificate", "key", "server_certificate")
 _PATIENCE = 5.0  # s for an answer
+_AGAIN = 1.0  # s until the next try to connect
 _RATE = 100.0  # samples a second that are read
 _STANDS = 0.5  # s after which a state comes though no position has a new time: the robot stands
 _HUNG = 2.0  # s, or five times its usual pause, after which a node that says a new time at rest, too, hangs
@@ -98,10 +98,10 @@ class _NodeTimes:
         return self._at_rest[node] >= _AT_REST and now - at > max(_HUNG, 5.0 * usual)
 
 
-class OpcUa(Controller):
+class OpcUa:
     """A server of a robot; `what` says which values come."""
 
-    lost = (*_LOST, InputError)
+    what: str
 
     def __init__(self, address: str, robot: Robot, robot_id: str, file: Path | None = None) -> None:
         """Connect to opc.tcp://HOST:PORT, and find what is to be read.
@@ -115,18 +115,42 @@ class OpcUa(Controller):
         self._stamp = self._newest = self._told = -math.inf
         self._times = _NodeTimes()
         try:
-            self.connect()
+            self._connect()
         except (*_LOST, ValueError) as error:
             raise InputError(
-                f"{address}: cannot be read by OPC UA ({self.reason(error)}); check address, user and certificates"
+                f"{address}: cannot be read by OPC UA ({_reason(error)}); check address, user and certificates"
             ) from error
 
-    def connect(self) -> None:
-        """Connect for a moment."""
+    def states(self, done: threading.Event, announce: Callable[[str], None]) -> Iterator[State | InputError]:
+        """Yield each state until `done`, and the error of one that is none.
+
+        A connection that is lost is made again, and announced.
+        """
+        while not done.is_set():
+            try:
+                yield from self._read(done)
+            except (*_LOST, InputError) as error:
+                if done.is_set():
+                    return
+                announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
+                if self._connected_again(done):
+                    announce(f"{self.address}: connected again")
+
+    def _connected_again(self, done: threading.Event) -> bool:
+        while not done.wait(_AGAIN):
+            try:
+                self._connect()
+                return True
+            except (*_LOST, InputError):
+                continue
+        return False
+
+    def _connect(self) -> None:
+        """Connect for a moment. Raises InputError, or one of `_LOST`."""
         self.what = asyncio.run(self._described())
 
-    def read(self, done: threading.Event) -> Iterator[State | InputError]:
-        """Yield what the nodes say, `rate` times a second."""
+    def _read(self, done: threading.Event) -> Iterator[State | InputError]:
+        """Yield what the nodes say, `_RATE` times a second. Raises one of `_LOST` where the connection breaks."""
         with asyncio.Runner() as runner:
             readings = self._readings(done)
             while (reading := runner.run(_next(readings))) is not None:
@@ -244,12 +268,17 @@ class OpcUa(Controller):
             (await node.read_data_value()).StatusCode.check()
             text = self._said.get("units", {}).get(key) or await _unit_text(node)
         except ua.UaStatusCodeError as error:
-            raise InputError(f"{self.address}: {key} {node}: {self.reason(error)}") from None
+            raise InputError(f"{self.address}: {key} {node}: {_reason(error)}") from None
         unit = unit_of(text, (channel.unit_of(kind),))
         if unit is None:
             why = f'"{text}" is no unit of it' if text else "the server says no unit"
             raise InputError(f"{self.address}: {key} {node}: {why}; write units.{key} in --nodes FILE")
         return _Place(key, node, unit)
+
+
+def _reason(error: BaseException) -> str:
+    """Say in words why a connection broke."""
+    return str(error) or type(error).__name__
 
 
 async def _next(readings: AsyncIterator[State | InputError]) -> State | InputError | None:

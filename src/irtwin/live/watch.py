@@ -13,16 +13,13 @@ from pathlib import Path
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
-from irtwin.live.controller import Controller
 from irtwin.live.joint_stream import State, StateReader, feed, lines_of, listening
 from irtwin.live.live_twin import AHEAD, LiveTwin
 from irtwin.live.replay import Replay
-from irtwin.live.rtde import Rtde
 from irtwin.live.stream_clock import WrongTime
 from irtwin.location import Location
 from irtwin.providers.names import find_robot, find_run
 from irtwin.providers.records import load_robot
-from irtwin.robot.description import Robot
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import told_when_full
 from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, REPLAYED_RUN
@@ -59,7 +56,6 @@ def watch(
     *,
     port: int | None = None,
     replay: Path | None = None,
-    rtde: str | None = None,
     opcua: str | None = None,
     nodes: Path | None = None,
     robot: str | None = None,
@@ -71,8 +67,8 @@ def watch(
 
     With `port`: the streams of clients on that port of this machine, 0 for a free one, until a signal comes.
     With `replay`: a log of the robot of this name, `speed` times as fast as it was, until it ends.
-    With `rtde`: what the controller there says of the robot of this name, until a signal comes; with `opcua`, what the
-    OPC UA server there says, by a file of `nodes` where one is given.
+    With `opcua`: what the OPC UA server there says of the robot of this name, by a file of `nodes` where one is given,
+    until a signal comes.
     With `performs`: the first run of that robot carries out the plan of this name.
     """
     sys.setswitchinterval(SWITCH)
@@ -106,7 +102,9 @@ def watch(
                 announce(f"Playing {replay}: {log.seconds:.1f} s at {speed:g} times its speed")
                 states = log.play(done, start)
             else:
-                source = _controller(rtde, opcua, nodes, described, robot_id)
+                from irtwin.live.opcua import OpcUa  # an extra
+
+                source = OpcUa(str(opcua), described, robot_id, nodes)
                 announce(f"Following {source.address}: {source.what}")
                 states = source.states(done, announce)
             _receive(states, take, refusals.refuse, twin.check)
@@ -163,11 +161,3 @@ def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], N
         told = True
 
     return take_with_plan
-
-
-def _controller(rtde: str | None, opcua: str | None, nodes: Path | None, robot: Robot, robot_id: str) -> Controller:
-    if opcua is None:
-        return Rtde(str(rtde), robot, robot_id)
-    from irtwin.live.opcua import OpcUa  # an extra
-
-    return OpcUa(opcua, robot, robot_id, nodes)
