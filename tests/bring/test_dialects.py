@@ -14,11 +14,11 @@ import pyarrow as pa
 import pytest
 from tests.bring.dialects import NAME, assert_same, good, per_joint, robot, signals, write_text
 from tests.data_sets import irtwin
+from tests.signals.bags import of_run, write
 
 from irtwin.bring.bring import Options, bring
 from irtwin.check.check import check
 from irtwin.errors import InputError
-from irtwin.ros.bags import write_bag
 from irtwin.signals.channels import columns_of
 from irtwin.signals.log import (
     DataSet,
@@ -141,7 +141,7 @@ def test_a_log_in_a_dialect_comes_back_in_si_units(
 
 @pytest.mark.parametrize("form", ["run.bag", "run.mcap", "run"])
 def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
-    write_bag(tmp_path / form, robot(), signals(good()), STARTED)
+    write(tmp_path / form, *of_run(robot(), signals(good())))
     said = irtwin("import", tmp_path / form, "--robot", NAME, "--power-at", "mains", "--out", tmp_path / "set")
     assert said.status == 0
     assert_same(read_data_set(tmp_path / "set"), "q dq torque power temperature", tolerance=0)

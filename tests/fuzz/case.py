@@ -61,8 +61,6 @@ _ASKING = ("status", "query", "query json", "questions", "alarms", "alarms of th
 _ASKING += (
     "backup",
     "export for ROS",
-    "export MCAP",
-    "export bag",
     "predict into workspace",
     "live replay",
     "fleet run",
@@ -76,7 +74,7 @@ KINDS = (
     Kind(("run", "query", "export", "live", "diagnose into workspace", "query")),
     Kind(("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")),
     Kind(("run", "diagnose into workspace", "adopt", "query")),
-    Kind(("run", "export for ROS", "export MCAP", "export bag", "live replay")),
+    Kind(("run", "export for ROS", "live replay")),
     Kind(("import", "check of what was imported")),
     Kind(("run", "live", "alarms", "alarms of the robot")),
     Kind(("fleet diagnose", "fleet status", "fleet run", "fleet status of runs")),

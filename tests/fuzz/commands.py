@@ -25,7 +25,7 @@ _STOPPED = 130  # exit status after Ctrl-C, of what had nothing to keep yet
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
 WRITTEN = (
     *("gap.json", "gap.html", "predicted.parquet", "motion.csv", "plan.csv", "docs.html", "asked.html"),
-    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf", "kept.mcap", "kept.bag", "taken.parquet"),
+    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf", "taken.parquet"),
 )
 
 
@@ -119,7 +119,6 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
     diagnose = ["diagnose", data, "--json", out["gap.json"]]
     run = min((data / "runs").iterdir(), default=data / "runs")
     here = ["--workspace", workspace]
-    kept = ["--robot", _robot(folder), "--run", run.stem, *here]
     words, writes = {
         "check": (["check", data], []),
         "diagnose": (diagnose, [out["gap.json"]]),
@@ -142,9 +141,7 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "robot equations": (["robot", "equations", data], []),
         "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
         "robot ros": (["robot", "ros", data, "--out", folder / "package"], []),
-        "export for ROS": (["export", "--ros", folder / "ros", *kept[:2], *kept[4:]], []),
-        "export MCAP": (["export", "--mcap", out["kept.mcap"], *kept], [out["kept.mcap"]]),
-        "export bag": (["export", "--bag", out["kept.bag"], *kept], [out["kept.bag"]]),
+        "export for ROS": (["export", "--ros", folder / "ros", "--robot", _robot(folder), *here], []),
         "live replay": (
             ["live", "--replay", run, "--robot", _robot(folder), "--speed", "1000", *here],
             [],

@@ -6,13 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 from tests import mesh_robots
 from tests.data_sets import irtwin
 from tests.endpoint import make_graph
 from tests.mesh_robots import HAND, SLIDE
-from tests.synthetic import arm, as_run, measure, swing
 from tests.virtual.scene_data import kr6
 
 from irtwin import resources
@@ -22,13 +20,12 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.location import Location
 from irtwin.planning.plan import nominal_twin
-from irtwin.providers.records import ingest, load_robot, load_run
+from irtwin.providers.records import ingest
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import read_urdf
 from irtwin.ros import export
 from irtwin.ros.ros_package import write_package
 from irtwin.signals.log import DataSet
-from irtwin.signals.samples import read_signals
 from irtwin.storage.database import Workspace
 from irtwin.twin.twin import Parameter
 
@@ -130,56 +127,10 @@ def test_of_several_robots_one_has_to_be_named(tmp_path: Path) -> None:
 def test_one_form_is_asked_for(workspace: Path, tmp_path: Path) -> None:
     said = irtwin("export", "--workspace", workspace)
     assert said.status == 2
-    assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas, --mcap, --bag." in said.err
+    assert "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--twin", tmp_path / "twin.json")
     assert said.status == 2
     assert "--twin goes with --urdf, --mjcf, --sdf or --usd." in said.err
     said = irtwin("export", "--owl", tmp_path / "a.owl", "--robot", "KUKA_KR6_R700", "--workspace", workspace)
     assert said.status == 2
     assert "--owl writes the whole graph; leave --robot out." in said.err
-
-
-@pytest.fixture(scope="module")
-def with_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace of two robots that have a run of the same name."""
-    folder = tmp_path_factory.mktemp("runs")
-    with Workspace(folder) as place:
-        for name, runs in (("one", ["work", "again"]), ("two", ["work"])):
-            made = replace(arm(2), name=name)
-            rows = [replace(as_run(measure(made, swing(made, 1, 1.0))), name=run) for run in runs]
-            ingest(place, DataSet(folder, made, tuple(rows), None, None, "mains", True, {}))
-    return folder
-
-
-@pytest.mark.parametrize(("option", "name"), [("--mcap", "run.mcap"), ("--bag", "run.bag"), ("--bag", "run")])
-def test_a_stored_run_is_written_as_a_bag(option: str, name: str, with_runs: Path, tmp_path: Path) -> None:
-    said = irtwin("export", option, tmp_path / name, "--run", "again", "--workspace", with_runs)
-    assert (said.status, said.out, said.err) == (0, f"{tmp_path / name}\n", "")
-    with Workspace.existing(with_runs) as place:
-        stored = load_run(place, load_robot(place, "one"), "one.again").signals
-    signals, _ = read_signals(tmp_path / name, arm(2))
-    for field, values in stored.logged().items():
-        exact = {"rtol": 0, "atol": 1e-9 if field == "time" else 0}
-        assert np.allclose(getattr(signals, field), values, **exact), field
-
-
-def test_what_is_wrong_with_a_run_is_told(with_runs: Path, tmp_path: Path) -> None:
-    out = tmp_path / "run.mcap"
-    for given, message in (
-        (("--mcap", out, "--run", "worl"), f'irtwin: {with_runs}: no run "worl" here; the nearest is "work"'),
-        (("--mcap", out, "--run", "work"), 'several robots have a run "work": one, two; say which by --robot'),
-        (("--mcap", out, "--run", "again", "--robot", "two"), 'no run "again" here; the nearest is "work"'),
-        (("--mcap", out), "--run goes with --mcap or --bag, and these with it."),
-        (("--owl", tmp_path / "a.owl", "--run", "work"), "--run goes with --mcap or --bag, and these with it."),
-        (("--mcap", tmp_path / "run", "--run", "again"), "--mcap writes a file whose name ends in .mcap."),
-        (
-            ("--mcap", out, "--bag", tmp_path / "b", "--run", "again"),
-            "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas, --mcap, --bag.",
-        ),
-    ):
-        said = irtwin("export", *given, "--workspace", with_runs)
-        assert said.status == 2
-        assert message in said.err
-    assert list(tmp_path.iterdir()) == []
-    said = irtwin("export", "--mcap", out, "--run", "work", "--robot", "two", "--workspace", with_runs)
-    assert said.status == 0

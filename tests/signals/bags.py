@@ -12,6 +12,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
+from irtwin.robot.description import Robot
+from irtwin.robot.ros_names import ros_joints
+from irtwin.signals.channels import Signals, columns_of
+from irtwin.signals.sources.bag_source import FIELDS, number_topics
+
 FORMS = ("run.bag", "run.mcap", "run")
 START = 1_767_225_600 * 1_000_000_000  # ns: 2026 begins
 Message = tuple[str, str, int, Mapping[str, Any]]  # topic, type, ns of recording, fields
@@ -48,6 +53,16 @@ def numbers(
     """Values of a topic, the first `first` ns after the bag begins."""
     kind = f"std_msgs/msg/Float{bits}"
     return [(topic, kind, START + first + row * step, {"data": float(one)}) for row, one in enumerate(values)]
+
+
+def of_run(robot: Robot, signals: Signals) -> list[list[Message]]:
+    """Positions, speeds and torques of a run as joint states, each other column as a topic of numbers."""
+    step = round(1e9 * (signals.time[1] - signals.time[0]))
+    joint_states = {key: values for field, key in FIELDS.items() if (values := getattr(signals, field)) is not None}
+    columns = columns_of(signals, robot.joint_names)
+    topics = {name: columns[column] for column, name in number_topics(robot).items() if column in columns}
+    moved = states(joint_states.pop("position"), list(ros_joints(robot).values()), step=step, **joint_states)
+    return [moved, *(numbers(f"/{name}", values, step) for name, values in topics.items())]
 
 
 def write(path: Path, *messages: Sequence[Message], compression: str | None = None) -> Path:

@@ -8,13 +8,13 @@ import subprocess
 import time
 import warnings
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy import ndimage
+from tests.signals.bags import of_run, write
 from tests.system.ros_facts import facts
 from tests.system.ros_screen import HEIGHT, WIDTH, screen, started
 
@@ -23,7 +23,6 @@ from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements, placements
 from irtwin.robot.structure import Solid, structure_of
 from irtwin.robot.urdf import read_urdf
-from irtwin.ros.bags import write_bag
 from irtwin.ros.ros_package import write_package
 from irtwin.signals.channels import Signals
 from irtwin.signals.samples import read_signals
@@ -174,7 +173,7 @@ def test_rviz_shows_the_robot_in_the_runs_last_pose(robot: Robot, run: Signals, 
     package = tmp_path / "packages" / "kr6"
     write_package(robot, package)
     bag = tmp_path / "run.bag"
-    write_bag(bag, robot, run, datetime(2026, 3, 2, tzinfo=UTC))
+    write(bag, *of_run(robot, run))
     last = run.q[-1]
     view = view_of(package / "rviz" / "KUKA_KR6_R700.rviz")
     awaited = expected(robot, last, view)

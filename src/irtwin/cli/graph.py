@@ -14,7 +14,7 @@ from irtwin.cli.upkeep import workspace
 from irtwin.location import Location
 
 _MODELS = ("urdf", "mjcf", "sdf", "usd")
-_FORMS = ("owl", "ros", *_MODELS, "aas", "mcap", "bag")
+_FORMS = ("owl", "ros", *_MODELS, "aas")
 
 
 def _known_questions(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -165,19 +165,14 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
 @click.option("--sdf", type=FILE, help="The same for Gazebo and Drake.")
 @click.option("--usd", metavar="FILE.usda", type=FILE, help="The same for Isaac Sim and Newton.")
 @click.option("--aas", type=FILE, help="FILE.aasx or FILE.json to write: a robot as an Asset Administration Shell.")
-@click.option("--mcap", type=FILE, help="MCAP file to write: a run, for ROS 2.")
-@click.option("--bag", type=PLACE, help="FILE.bag of ROS 1, or folder of a ROS 2 bag: a run.")
 @click.option("--robot", metavar="NAME", help="The robot; not needed where there is one alone.")
-@click.option("--run", "run_name", metavar="NAME", help="The run.")
 @click.option(
     "--twin",
     type=FILE,
     help="Twin that `irtwin diagnose --save-twin` wrote, instead of the workspace's.",
 )
-def export(
-    location: Location, robot: str | None, run_name: str | None, twin: Path | None, **places: Path | None
-) -> None:
-    """Write the graph for Protégé, a robot for ROS or simulators, or a run for ROS.
+def export(location: Location, robot: str | None, twin: Path | None, **places: Path | None) -> None:
+    """Write the graph for Protégé, or a robot for ROS or simulators.
 
     --owl writes ontology, individuals and inferences as one RDF/XML file.
 
@@ -190,21 +185,14 @@ def export(
 
     --aas writes an Asset Administration Shell with nameplate, carbon footprint and energy a day. Needs irtwin[aas].
 
-    --mcap and --bag write a run: positions, speeds and torques as /joint_states, each other column as a topic of
-    numbers, such as /power. Needs irtwin[ros].
-
     \b
     Example: irtwin export --mjcf kr6.xml --robot KUKA_KR6_R700
     """
     form, out = _asked(places)
-    if (run_name is not None) != (form in ("mcap", "bag")):
-        raise click.UsageError("--run goes with --mcap or --bag, and these with it.")
     if twin is not None and form not in _MODELS:
         raise click.UsageError("--twin goes with --urdf, --mjcf, --sdf or --usd.")
     if form in _MODELS:
         _export_model(form, out, location, robot, twin)
-    elif run_name is not None:
-        _export_run(form, out, location, run_name, robot)
     elif form == "owl":
         from irtwin import asking
 
@@ -242,14 +230,6 @@ def _export_model(form: str, out: Path, location: Location, robot: str | None, t
         known = modelling.read_twin(twin)
     for line in modelling.write_model(known, form, out):
         say(f"irtwin: {line}")
-
-
-def _export_run(form: str, out: Path, location: Location, run: str, robot: str | None) -> None:
-    from irtwin.ros.export import export_bag
-
-    if form == "mcap" and out.suffix.lower() != ".mcap":
-        raise click.UsageError("--mcap writes a file whose name ends in .mcap.")
-    export_bag(out, location, run, robot)
 
 
 @workspace.command("map")

@@ -1,1 +1,1 @@
-"""What ROS takes of a robot and its runs: a package, and bags."""
+"""What ROS takes of a robot: a package."""
