@@ -80,9 +80,8 @@ def test_a_module_of_the_ontology_is_said_by_its_parser(put: Callable[[str, byte
 
 
 def test_a_command_ends_in_one_line(put: Callable[[str, bytes], Path]) -> None:
-    file = put("positions.csv", LATIN)
-    robot = put("robot.urdf", arm(1).urdf.encode())
-    done = irtwin("robot", "fk", robot, "--file", file)
+    file = put("listed.txt", LATIN)
+    done = irtwin("run", file, "--out", file.parent / "out")
     assert done.status == 2
     assert f"{file}, line 2: not UTF-8 text" in done.err
 

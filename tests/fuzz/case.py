@@ -70,7 +70,7 @@ _CHANGING += ("diagnose into workspace", "alarms follow", "serve", "live control
 _HERE = ("workspace", "data")
 KINDS = (
     *(Kind(first) for first in (("diagnose",), ("check",), ("diagnose with page and twin", "predict"), ("excite",))),
-    *(Kind((word,)) for word in ("plan", "robot dh", "robot urdf", "robot ik", "robot ros", "robot equations", "init")),
+    *(Kind((word,)) for word in ("plan", "robot dh", "robot urdf", "robot ros", "robot equations", "init")),
     Kind(("run", "query", "export", "live", "diagnose into workspace", "query")),
     Kind(("run", "map", "explain", "export", "reason", "backup", "restore", "repair", "drop")),
     Kind(("run", "diagnose into workspace", "adopt", "query")),

@@ -137,7 +137,6 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
             [out["plan.csv"]],
         ),
         "robot dh": (["robot", "dh", data, "--convention", "modified"], []),
-        "robot ik": (["robot", "ik", data, "--pose", "0.3", "0", "0.4", "0", "1", "0"], []),
         "robot equations": (["robot", "equations", data], []),
         "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
         "robot ros": (["robot", "ros", data, "--out", folder / "package"], []),

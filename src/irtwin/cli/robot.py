@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterator
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
     from irtwin.robot.denavit_hartenberg import ChainTable
     from irtwin.robot.description import Robot
 
-_LARGEST = 100_000_000  # bytes of a file of joint positions
-_SHOWN = 16  # solutions: a pose within reach of a six-axis arm has no more, unless they are without end
-
 _source = click.argument("source", type=PLACE)
 _link = click.option("--link", metavar="NAME", help="Take this link, not the flange (the last link).")
 _json = click.option("--json", "as_json", is_flag=True, help="Write JSON.")
@@ -31,10 +27,10 @@ _json = click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 
 @click.group()
 def robot() -> None:
-    """Take a robot's description alone: its kinematics, its equations, other forms, a motion that excites it.
+    """Take a robot's description alone: its table of joints, its equations, other forms, a motion that excites it.
 
-    SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lengths are in m, angles in rad, joint positions in
-    rad (m where a joint slides). Poses are in the frame of the first link; roll, pitch and yaw turn about its x, y, z.
+    SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lengths are in m, angles in rad; roll, pitch and
+    yaw turn about the x, y, z of the first link's frame.
     """
 
 
@@ -150,173 +146,6 @@ def ros(source: Path, out: Path) -> None:
     click.echo(out)
 
 
-@robot.command(context_settings={"ignore_unknown_options": True})
-@_source
-@click.argument("q", nargs=-1, type=float)
-@click.option("--file", type=PLACE, help="CSV file of joint positions: a column q_JOINT for each.")
-@_link
-@_json
-def fk(source: Path, q: tuple[float, ...], file: Path | None, link: str | None, as_json: bool) -> None:
-    """Print the flange's pose at joint positions Q.
-
-    This is forward kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Q is a number for each
-    joint, base to flange, in rad (m where it slides). The poses of a file are printed as CSV.
-
-    \b
-    Example: irtwin robot fk my.urdf 0 -1.57 1.57 0 0 0
-    """
-    import numpy as np
-
-    from irtwin.robot.kinematics import placements
-    from irtwin.signals.log import read_robot
-
-    described = read_robot(source)
-    if (file is None) == (not q):
-        raise InputError("give joint positions, or --file, not both" if q else "give joint positions, or --file")
-    positions = np.array([_checked(described, q)]) if file is None else _read_positions(file, described)
-    for joint, column in zip(described.joints, positions.T, strict=True):
-        outside = (column < joint.lower) | (column > joint.upper)
-        if outside.any():
-            click.echo(
-                f"irtwin: {printable(joint.name)} is at {column[outside][0]:g} {joint.unit}, "
-                f"outside its limits {joint.lower:g} to {joint.upper:g}",
-                err=True,
-            )
-    poses = placements(described, positions, link)
-    documents = [_pose_document(pose) for pose in poses]
-    if as_json:
-        click.echo(json.dumps(documents[0] if file is None else documents, indent=1))
-    elif file is None:
-        click.echo("\n".join(_pose_lines(documents[0])))
-    else:
-        click.echo("x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,qx,qy,qz,qw")
-        for each in documents:
-            click.echo(",".join(map(repr, [*each["position_m"], *each["rpy_rad"], *each["quaternion_xyzw"]])))
-
-
-def _checked(described: Robot, values: tuple[float, ...] | list[float]) -> list[float]:
-    """Return joint positions, one for each joint. Raises InputError where there are others."""
-    names = described.joint_names
-    if len(values) != len(names):
-        raise InputError(
-            f"{described.name} has {len(names)} moving joints ({', '.join(names)}), "
-            f"and {len(values)} position{'s' if len(values) != 1 else ''} were given"
-        )
-    for name, value in zip(names, values, strict=True):
-        if not math.isfinite(value):
-            raise InputError(f"{described.name}: the position of {name} is {value}; give a finite number")
-    return list(values)
-
-
-def _read_positions(file: Path, described: Robot) -> np.ndarray:
-    """Return the (N, n) joint positions of a CSV file's columns q_JOINT."""
-    import numpy as np
-
-    from irtwin.input_file import read_text
-    from irtwin.signals.channels import CHANNELS
-
-    lines = csv.reader(read_text(file, _LARGEST).splitlines())
-    head = [name.strip() for name in next(lines, [])]
-    wanted = list(CHANNELS["q"].columns(described.joint_names))
-    missing = [name for name in wanted if name not in head]
-    if missing:
-        raise InputError(f"{file}, line 1: there is no column {missing[0]}; give one for each joint of the robot")
-    places = [head.index(name) for name in wanted]
-    rows = []
-    for number, line in enumerate(lines, start=2):
-        try:
-            rows.append([float(line[place]) for place in places])
-        except (ValueError, IndexError) as error:
-            raise InputError(f"{file}, line {number}: a joint position is no number; correct it") from error
-        if not all(map(math.isfinite, rows[-1])):
-            raise InputError(f"{file}, line {number}: a joint position is not finite; correct it")
-    if not rows:
-        raise InputError(f"{file}: has no joint positions below its first line")
-    return np.array(rows)
-
-
-def _pose_document(pose: np.ndarray) -> dict[str, Any]:
-    import pinocchio as pin
-
-    turn = pose[:3, :3]
-    return {
-        "position_m": pose[:3, 3].tolist(),
-        "rpy_rad": pin.rpy.matrixToRpy(turn).tolist(),
-        "quaternion_xyzw": pin.Quaternion(turn).coeffs().tolist(),
-        "rotation": turn.tolist(),
-    }
-
-
-def _pose_lines(document: dict[str, Any]) -> Iterator[str]:
-    def words(values: list[float]) -> str:
-        return "  ".join(f"{_number(value):>13}" for value in values)
-
-    yield f"x, y, z, m                {words(document['position_m'])}"
-    yield f"roll, pitch, yaw, rad     {words(document['rpy_rad'])}"
-    yield f"quaternion x, y, z, w     {words(document['quaternion_xyzw'])}"
-    for number, row in enumerate(document["rotation"]):
-        yield f"{'rotation matrix' if not number else '':25} {words(row)}"
-
-
-@robot.command()
-@_source
-@click.option(
-    "--pose", type=float, nargs=6, required=True, metavar="X Y Z R P Y", help="Position, m; roll, pitch, yaw, rad."
-)
-@click.option("--from", "start", metavar="Q,Q,...", help="Joint positions to stay near, rad (m). Default: zero.")
-@_link
-@_json
-def ik(source: Path, pose: tuple[float, ...], start: str | None, link: str | None, as_json: bool) -> None:
-    """Print joint positions that bring the flange to a pose.
-
-    This is inverse kinematics. SOURCE is a URDF file, a data set's folder, or its dataset.toml. Lists all that a
-    search within the joint limits finds, the nearest first; those that differ by whole turns of a joint count as one.
-    Where the pose is out of reach, says by how much.
-
-    \b
-    Example: irtwin robot ik my.urdf --pose 0.4 0 0.6 0 1.57 0
-    """
-    import numpy as np
-    import pinocchio as pin
-
-    from irtwin.robot.inverse_kinematics import solve
-    from irtwin.signals.log import read_robot
-
-    described = read_robot(source)
-    if not all(map(math.isfinite, pose)):
-        raise InputError("--pose: give six finite numbers")
-    place = pin.SE3(pin.rpy.rpyToMatrix(np.array(pose[3:])), np.array(pose[:3])).homogeneous
-    near = None if start is None else np.array(_checked(described, _split(start)))
-    solved = solve(described, place, start=near, link=link)
-    if not len(solved.solutions):
-        raise InputError(f"{described.name}: {_missed(solved.distance, solved.angle)}")
-    if as_json:
-        rows = [dict(zip(described.joint_names, row, strict=True)) for row in solved.solutions.tolist()]
-        click.echo(json.dumps(rows, indent=1, ensure_ascii=False))
-        return
-    head = [f"{printable(joint.name)}, {joint.unit}" for joint in described.joints]
-    body = [[_number(value) for value in row] for row in solved.solutions[:_SHOWN]]
-    click.echo("\n".join(_columns([head, *body])))
-    if solved.redundant or len(solved.solutions) > _SHOWN:
-        click.echo(f"There are more without end; these are the {len(body)} nearest of {len(solved.solutions)} found.")
-
-
-def _split(text: str) -> list[float]:
-    try:
-        return [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise InputError(f'--from: "{text[:60]}" should be numbers with commas between them') from error
-
-
-def _missed(distance: float, angle: float) -> str:
-    if math.isnan(angle):
-        return f"the pose is out of reach: within its joint limits the flange comes no nearer than {distance:.4g} m"
-    return (
-        "the position can be reached, but not in this orientation: "
-        f"the nearest found is {angle:.4g} rad ({math.degrees(angle):.3g} deg) away"
-    )
-
-
 @robot.command()
 @_source
 @click.option("--joint", metavar="NAME", help="Of this joint alone.")
@@ -362,6 +191,7 @@ def _number(value: float) -> str:
 
 
 def _place_words(place: np.ndarray) -> str:
-    document = _pose_document(place)
-    xyz, rpy = (", ".join(map(_number, document[key])) for key in ("position_m", "rpy_rad"))
+    import pinocchio as pin
+
+    xyz, rpy = (", ".join(map(_number, part)) for part in (place[:3, 3], pin.rpy.matrixToRpy(place[:3, :3])))
     return f"x, y, z = {xyz} m; roll, pitch, yaw = {rpy} rad"
