@@ -1,4 +1,4 @@
-"""Robots a minute through `irtwin run`, by 1, 2 and 4 processes and by Dask: `python fleet_speed.py [ROBOTS]`.
+"""Robots a minute through `irtwin run`, by 1, 2 and 4 processes: `python fleet_speed.py [ROBOTS]`.
 
 A robot is an arm of two joints with three runs of 8 s; its time is that of reading, fitting, mapping, reasoning and its
 page, not of its samples. Every way begins with an empty folder.
@@ -11,8 +11,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from distributed import LocalCluster
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests import small_robots
 
@@ -21,11 +19,11 @@ from irtwin.fleet.fleet import work
 WAYS = (1, 2, 4)
 
 
-def robots_a_minute(source: Path, count: int, workers: int, scheduler: str | None = None) -> float:
+def robots_a_minute(source: Path, count: int, workers: int) -> float:
     """Take a fleet through `run`, and return how many robots a minute were done."""
     with tempfile.TemporaryDirectory() as out:
         began = time.monotonic()
-        found = work(str(source), Path(out), "run", batch=100, workers=workers, scheduler=scheduler)
+        found = work(source, Path(out), "run", batch=100, workers=workers)
         assert found.counts == {"done": count}, found
         return 60 * count / (time.monotonic() - began)
 
@@ -38,9 +36,6 @@ def main(count: int) -> None:
         print("| workers | robots a minute |\n| --- | --- |")
         for workers in WAYS:
             print(f"| {workers}, processes | {robots_a_minute(source, count, workers):.1f} |", flush=True)
-        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-            speed = robots_a_minute(source, count, 2, cluster.scheduler_address)
-        print(f"| 2, Dask | {speed:.1f} |")
 
 
 if __name__ == "__main__":

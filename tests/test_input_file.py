@@ -42,7 +42,7 @@ READERS: dict[str, Reader] = {
     "workspace/plant.toml": base_iri.said,
     "robot.urdf": read_urdf,
     "twin.json": load,
-    "sets.txt": lambda file: find_data_sets(str(file)),
+    "sets.txt": lambda file: find_data_sets(file),
     "token": read_token,
     "told.json": ToldAlarms,
     "package.xml": lambda file: write_package(arm(1), file.parent),

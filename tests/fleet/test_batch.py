@@ -1,5 +1,6 @@
 """What becomes of a batch's data sets: each by itself, once, and on record."""
 
+import errno
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 from irtwin import diagnosing
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.batch import Batch, Record, key
+from irtwin.fleet.data_sets import checksum
 
 
 def _raise(error: Exception) -> Any:
@@ -105,10 +107,17 @@ def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str], text: str
     assert _states(batch) == ["done"] and asked == ["good", "good"]
 
 
-def test_a_storage_that_does_not_answer_fails_one_data_set(tmp_path: Path, asked: list[str]) -> None:
-    batch = Batch.create(
-        tmp_path / "b", "diagnose", ["memory://nothing/here", *_batch(tmp_path, "good").sets.data_sets]
-    )
+def test_a_disk_that_does_not_answer_fails_one_data_set(
+    tmp_path: Path, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    batch = _batch(tmp_path, "lost", "good")
+
+    def answering(data_set: Path) -> str:
+        if data_set.name == "lost":
+            raise OSError(errno.EIO, "Input/output error")
+        return checksum(data_set)
+
+    monkeypatch.setattr("irtwin.fleet.batch.checksum", answering)
     batch.work()
     assert _states(batch) == ["failed", "done"]
 

@@ -1,12 +1,11 @@
-"""Where a fleet's data sets are found, and how they come to hand."""
+"""Where a fleet's data sets are found."""
 
 from pathlib import Path
 
-import fsspec
 import pytest
 
 from irtwin.errors import InputError
-from irtwin.fleet.data_sets import at_hand, checksum, find_data_sets
+from irtwin.fleet.data_sets import checksum, find_data_sets
 
 
 def _write(folder: Path, text: str = "") -> Path:
@@ -18,24 +17,14 @@ def _write(folder: Path, text: str = "") -> Path:
 def test_every_folder_below_that_has_a_data_set_is_found(tmp_path: Path) -> None:
     found = [_write(tmp_path / name) for name in ("hall_2/b", "hall_1/a", "c")]
     (tmp_path / "hall_1" / "notes").mkdir()
-    assert find_data_sets(str(tmp_path)) == sorted(map(str, found))
+    assert find_data_sets(tmp_path) == sorted(map(str, found))
 
 
 def test_a_list_names_one_a_line_beside_itself(tmp_path: Path) -> None:
     one = _write(tmp_path / "one")
     listed = tmp_path / "fleet.txt"
-    listed.write_text("# the press shop\none\n\ns3://bucket/two\none\n")
-    assert find_data_sets(str(listed)) == [str(one), "s3://bucket/two"]
-
-
-def test_object_storage_is_searched_and_a_data_set_is_fetched() -> None:
-    files = fsspec.filesystem("memory")
-    files.pipe({"/plant/r1/dataset.toml": b"robot", "/plant/r1/runs/one.csv": b"time", "/plant/notes.txt": b""})
-    (place,) = find_data_sets("memory://plant")
-    with at_hand(place) as folder:
-        assert (folder / "dataset.toml").read_bytes() == b"robot"
-        assert (folder / "runs" / "one.csv").read_bytes() == b"time"
-    assert not folder.exists()
+    listed.write_text("# the press shop\none\n\none\n")
+    assert find_data_sets(listed) == [str(one)]
 
 
 def test_a_checksum_is_of_names_and_bytes(tmp_path: Path) -> None:
@@ -59,10 +48,5 @@ def test_where_there_is_none_one_line_says_so(source: str, said: str, tmp_path: 
     (tmp_path / "bad.txt").write_text("# all\nmissing\n")
     (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError) as raised:
-        find_data_sets(str(tmp_path / source))
+        find_data_sets(tmp_path / source)
     assert said in str(raised.value)
-
-
-def test_a_kind_of_storage_that_fsspec_lacks_is_refused() -> None:
-    with pytest.raises(InputError, match="no such kind of storage; fsspec knows"):
-        find_data_sets("tape://robots")

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from irtwin.cli.options import FOLDER, announce, refuse, say
+from irtwin.cli.options import FOLDER, PLACE, announce, refuse, say
 
 if TYPE_CHECKING:
     from irtwin.fleet.fleet import FleetStatus
 
 _SHOWN = 20  # data sets that were set aside
 _BATCH = {"run": 100, "diagnose": 20}  # data sets
-_OF_MANY = ("out", "batch", "workers", "scheduler")
+_OF_MANY = ("out", "batch", "workers")
 
 
 def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -29,16 +29,15 @@ def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
-        def either(dataset: str, **asked: Any) -> Any:
+        def either(dataset: Path, **asked: Any) -> Any:
             many = {name: asked.pop(name) for name in _OF_MANY}
             if many["out"] is None:
                 refuse(_OF_MANY, "goes with --out")
-                return command(dataset=Path(dataset), **asked)
+                return command(dataset=dataset, **asked)
             refuse(asked.keys() - set(shared), "is for one data set, and does not go with --out")
             return _work(kind, dataset, **many, **{name: asked[name] for name in shared})
 
         for option in (
-            click.option("--scheduler", metavar="ADDRESS", help="With --out: of Dask, as tcp://host:8786."),
             click.option("--workers", type=click.IntRange(1, 1024), help="With --out: processes. Default: one a core."),
             click.option(
                 "--batch",
@@ -50,7 +49,7 @@ def of_many(kind: str, *shared: str) -> Callable[[Callable[..., Any]], Callable[
             click.option(
                 "--out", type=FOLDER, help="Take every data set below DATASET; the results go to this folder."
             ),
-            click.argument("dataset", type=click.Path()),
+            click.argument("dataset", type=PLACE),
         ):
             either = option(either)
         return either
@@ -68,7 +67,7 @@ def show(status: FleetStatus) -> None:
         say(f"... and {len(status.set_aside) - _SHOWN} more; their records say why")
 
 
-def _work(kind: str, source: str, out: Path, workers: int | None, **asked: Any) -> None:
+def _work(kind: str, source: Path, out: Path, workers: int | None, **asked: Any) -> None:
     from irtwin.fleet.fleet import work
 
     status = work(source, out, kind, workers=workers or os.cpu_count() or 1, announce=announce, **asked)

@@ -48,10 +48,10 @@ def run(dataset: Path, location: Location, **asked: Any) -> None:
     Where statements in the graph contradict each other, nothing is concluded from these alone; they are said, and the
     exit status is 3.
 
-    With --out, DATASET is a folder with data sets below it, a text file with one folder a line, or object storage such
-    as s3://bucket/robots. Each is taken by itself, a batch of them shares a workspace below --out, and one that is
-    refused costs no other. What is done is not done again: after a crash the same command goes on, and `irtwin
-    workspace status --workspace RESULTS` counts. The exit status is 3 where some were set aside.
+    With --out, DATASET is a folder with data sets below it, or a text file with one folder a line. Each is taken by
+    itself, a batch of them shares a workspace below --out, and one that is refused costs no other. What is done is not
+    done again: after a crash the same command goes on, and `irtwin workspace status --workspace RESULTS` counts. The
+    exit status is 3 where some were set aside.
 
     \b
     Example: irtwin run my_robot --workspace plant

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from irtwin import __version__
 from irtwin.errors import InputError, WorkspaceFault
-from irtwin.fleet.data_sets import at_hand, checksum
+from irtwin.fleet.data_sets import checksum
 from irtwin.input_file import read_input
 from irtwin.json_text import parse_json
 from irtwin.storage.files import InsidePath, inside, write
@@ -130,29 +130,28 @@ class Batch:
         except OSError as error:
             raise InputError(f"{self.folder / 'lock'}: cannot be written ({error.strerror}); remove it") from error
         with lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # a scheduler may take a worker for lost that is still at work
+            fcntl.flock(lock, fcntl.LOCK_EX)  # the same command may be given twice
             yield
 
     def _take(self, place: str) -> None:
         before, began = self.record(place), time.monotonic()
         attempts = 1
         try:
-            with at_hand(place) as data_set:
-                now = checksum(data_set)
-                if before is not None and before.checksum == now and before.irtwin == __version__:
-                    if before.state in (DONE, REFUSED):
-                        return
-                    attempts = before.attempts + 1 if before.state == BEGUN else 1
-                if attempts > _ATTEMPTS:
-                    why = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
-                    return self._write(Record(place, FAILED, why, attempts=attempts, checksum=now))
-                self._write(Record(place, BEGUN, attempts=attempts, checksum=now))
-                state, why = self._done(place, data_set)
-        except OSError as error:  # a storage that does not answer
+            now = checksum(Path(place))
+            if before is not None and before.checksum == now and before.irtwin == __version__:
+                if before.state in (DONE, REFUSED):
+                    return
+                attempts = before.attempts + 1 if before.state == BEGUN else 1
+            if attempts > _ATTEMPTS:
+                why = f"the process ended {_ATTEMPTS} times while it worked on this; memory may be short"
+                return self._write(Record(place, FAILED, why, attempts=attempts, checksum=now))
+            self._write(Record(place, BEGUN, attempts=attempts, checksum=now))
+            state, why = self._done(place)
+        except OSError as error:  # a disk that does not answer
             now, state, why = "", FAILED, str(error)
         self._write(Record(place, state, why, time.monotonic() - began, attempts, now))
 
-    def _done(self, place: str, data_set: Path) -> tuple[str, str]:
+    def _done(self, place: str) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
         trace = self._inside(f"records/{key(place)}.traceback.txt")
         trace.unlink(missing_ok=True)
@@ -160,12 +159,12 @@ class Batch:
             if self.sets.kind == RUN:
                 from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
 
-                workflow.run(data_set, self._inside("workspace"), base=self.sets.base)
+                workflow.run(Path(place), self._inside("workspace"), base=self.sets.base)
             else:
                 from irtwin import diagnosing
 
                 results = self._inside(f"diagnoses/{key(place)}")
-                diagnosing.diagnose(data_set, json_file=results / "gap.json", twin_file=results / "twin.json")
+                diagnosing.diagnose(Path(place), json_file=results / "gap.json", twin_file=results / "twin.json")
         except WorkspaceFault as error:  # no fault of the data set: the next call tries again
             return FAILED, str(error)
         except InputError as error:

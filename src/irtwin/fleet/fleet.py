@@ -14,7 +14,7 @@ from pathlib import Path
 from irtwin.errors import InputError
 from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
-from irtwin.fleet.schedule import work_here, work_on_cluster
+from irtwin.fleet.schedule import work_through
 from irtwin.storage import base_iri
 from irtwin.storage.files import inside
 
@@ -31,13 +31,12 @@ class FleetStatus:
 
 
 def work(
-    source: str,
+    source: Path,
     folder: Path,
     kind: str,
     *,
     batch: int,
     workers: int,
-    scheduler: str | None = None,
     base: str | None = None,
     announce: Callable[[str], None] = lambda line: None,
 ) -> FleetStatus:
@@ -56,10 +55,7 @@ def work(
         announce(f"{one.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([one]).counts)}")
 
     with told_meanwhile(lambda: announce(f"  {_line(status_of(batches).counts)}")):
-        if scheduler is None:
-            work_here(batches, workers, tell)
-        else:
-            work_on_cluster(batches, scheduler, tell)
+        work_through(batches, workers, tell)
     return status_of(batches)
 
 

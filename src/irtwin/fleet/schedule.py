@@ -1,4 +1,4 @@
-"""Who works on batches: processes of this machine, or the workers of a Dask cluster."""
+"""Who works on batches: processes of this machine."""
 
 from __future__ import annotations
 
@@ -13,36 +13,13 @@ from irtwin.fleet.batch import STOPPED, Batch
 
 Tell = Callable[[Batch], None]
 WORKER = (sys.executable, "-m", "irtwin.fleet")
-_CONNECT = 10.0  # s until a scheduler has answered
 
 
-def work_here(batches: Sequence[Batch], workers: int, tell: Tell, command: Sequence[str] = WORKER) -> None:
+def work_through(batches: Sequence[Batch], workers: int, tell: Tell, command: Sequence[str] = WORKER) -> None:
     """Work on batches on this machine, `workers` at once; `tell` is called as each ends. `command`: as `in_process`."""
     with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
         own = {pool.submit(in_process, str(batch.folder), command): batch for batch in batches}
         for future in as_completed(own):
-            future.result()
-            tell(own[future])
-
-
-def work_on_cluster(batches: Sequence[Batch], scheduler: str, tell: Tell, command: Sequence[str] = WORKER) -> None:
-    """Work on batches by a Dask cluster, whose workers see the batches' folders; `scheduler` is its address.
-
-    Nothing but a batch's path goes to a worker, and nothing comes back. Dask gives a lost worker's batch to another.
-    """
-    try:
-        import distributed
-    except ModuleNotFoundError:
-        raise InputError('a Dask cluster needs distributed; pip install "irtwin[fleet]"') from None
-    try:
-        client = distributed.Client(scheduler, timeout=_CONNECT)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{scheduler}: no Dask scheduler answers ({error}); give one such as tcp://host:8786"
-        ) from None
-    with client:
-        own = {client.submit(in_process, str(batch.folder), command, pure=False): batch for batch in batches}
-        for future in distributed.as_completed(list(own)):
             future.result()
             tell(own[future])
 
