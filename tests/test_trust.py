@@ -58,11 +58,11 @@ def test_a_command_lists_what_is_left_aside_until_it_is_allowed(workspace: Path)
     said = irtwin("query", "ASK {}", "--workspace", workspace)
     assert f"left aside, as nobody trusts it: questions/mine.rq; `irtwin workspace trust {workspace}` lists" in said.err
     assert [file.asked for file in resources_of(workspace).left_aside] == ["questions/mine.rq"]
-    (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "https://a.example/secret/path"\n')
+    (workspace / "alarms.toml").write_text('[[mqtt]]\nhost = "a.example"\ntopic = "t"\n')
     allowed = irtwin("workspace", "trust", workspace)
     assert allowed.out.splitlines() == [
         "questions/mine.rq",
-        "alarms.toml: webhook at a.example",
+        "alarms.toml: mqtt at a.example:1883, topic t",
         f"{workspace}: allowed",
     ]
     assert "left aside" not in irtwin("query", "ASK {}", "--workspace", workspace).err
@@ -85,7 +85,7 @@ def test_a_copy_of_a_workspace_is_asked_for_anew(workspace: Path, tmp_path: Path
 
 
 def test_the_list_names_places_and_holds_no_secret(workspace: Path, config: Path) -> None:
-    (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "https://a.example/secret/path"\n')
+    (workspace / "alarms.toml").write_text('[[mqtt]]\nhost = "a.example"\ntopic = "t"\n')
     irtwin("workspace", "trust", workspace)
     given = json.loads(config.read_text())
     assert list(given) == [str(workspace.resolve())]

@@ -18,9 +18,9 @@ needed = pytest.mark.skipif(_PROGRAM is None, reason="needs mosquitto (Debian: a
 
 
 @contextmanager
-def running(folder: Path, who: str) -> Iterator[int]:
+def running(folder: Path, who: str, port: int | None = None) -> Iterator[int]:
     """Run a broker until the block ends, and give its port; `who` may connect, as its settings say it."""
-    port, settings = free_port(), folder / "mosquitto.conf"
+    port, settings = port or free_port(), folder / "mosquitto.conf"
     settings.write_text(f"listener {port} 127.0.0.1\n{who}\nuser root\n")
     assert _PROGRAM is not None
     broker = subprocess.Popen([_PROGRAM, "-c", settings], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -88,7 +88,7 @@ def test_a_line_says_what_why_and_by_which_query(file: Path, monkeypatch: pytest
 
     looks: list[int] = []
     sparql = sparql_of_rules(shipped())
-    follow(look, ToldAlarms(file), lambda line: lines.append(json.loads(line)), [], done, said.append, sparql)
+    follow(look, ToldAlarms(file), lambda line: lines.append(json.loads(line)), done, said.append, sparql)
     raised, cleared = lines
     assert (raised["event"], raised["robot"], raised["joint"], raised["reason"]) == (
         "raised",

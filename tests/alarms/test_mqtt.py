@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import queue
-import socket
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ import paho.mqtt.client as paho
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 from tests.alarms import mosquitto
+from tests.sparql_servers import free_port
 
-from irtwin.alarms.delivery import Undelivered
-from irtwin.alarms.mqtt import Broker
+from irtwin.alarms import mqtt
+from irtwin.alarms.mqtt import AlarmTopic, Broker
 
 
 @pytest.fixture
@@ -46,20 +47,52 @@ def test_a_message_reaches_who_listens_and_a_wrong_password_is_said(port: int) -
     client.loop_start()
     try:
         listening.get(timeout=30)
+        said: list[str] = []
+        topic = AlarmTopic(Broker("127.0.0.1", port, "plant/alarms", "me", "right"), said.append)
         for line in (b'{"event": "raised"}', b'{"event": "cleared"}'):
-            Broker("127.0.0.1", port, "plant/alarms", "me", "right").send(line)
+            topic.put(line)
             assert got.get(timeout=30) == line
-        with pytest.raises(Undelivered, match="it refuses the connection: Not authorized"):
-            Broker("127.0.0.1", port, "plant/alarms", "me", "wrong").send(b"{}")
+        topic.close()
+        assert said == []
+        refused = AlarmTopic(Broker("127.0.0.1", port, "plant/alarms", "me", "wrong"), said.append)
+        refused.put(b"{}")
+        refused.close()
+        name = f"MQTT broker at 127.0.0.1:{port}"
+        refusal = f"{name}: it refuses the connection: Not authorized"
+        assert said == [refusal, f"{name}: 1 message not delivered: no time was left"]
     finally:
         client.disconnect()
         client.loop_stop()
 
 
-def test_a_broker_that_is_not_there_and_one_that_is_silent() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        port = silent.getsockname()[1]
-        with pytest.raises(Undelivered, match=r"no answer within 0\.1 s"):
-            Broker("127.0.0.1", port, "a", timeout=0.1).send(b"{}")
-    with pytest.raises(Undelivered, match="refused"):
-        Broker("127.0.0.1", port, "a").send(b"{}")
+@mosquitto.needed
+@pytest.mark.system
+def test_what_came_while_a_broker_was_down_is_told_when_it_is_back(tmp_path: Path) -> None:
+    said: list[str] = []
+    port = free_port()
+    topic = AlarmTopic(Broker("127.0.0.1", port, "plant/alarms"), said.append)
+    for number in range(3):
+        topic.put(b"%d" % number)
+    while not said:
+        time.sleep(0.01)
+    with mosquitto.running(tmp_path, "allow_anonymous true", port):
+        topic.put(b"3")
+        deadline = time.monotonic() + 30.0
+        while not topic._client.is_connected() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        topic.close()
+    assert said == [f"MQTT broker at 127.0.0.1:{port}: it cannot be reached; trying again"]
+
+
+def test_a_broker_that_is_not_there_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt, "MOST_WAITING", 2)
+    monkeypatch.setattr(mqtt, "_LAST_TRY", 0.1)
+    said: list[str] = []
+    topic = AlarmTopic(Broker("127.0.0.1", 9, "a", timeout=0.1), said.append)
+    for _ in range(3):
+        topic.put(b"{}")
+    topic.close()
+    name = "MQTT broker at 127.0.0.1:9"
+    assert {f"{name}: a message is lost: 2 wait already", f"{name}: 2 messages not delivered: no time was left"} <= {
+        *said
+    }

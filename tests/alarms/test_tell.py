@@ -47,7 +47,7 @@ def start() -> Iterator[Start]:
 
 
 def test_a_robot_that_stands_too_long_is_told_once_and_when_it_is_over(workspace: Path, start: Start) -> None:
-    (workspace / "alarms.toml").write_text('[[webhook]]\nurl = "http://127.0.0.1:9/down"\n')
+    (workspace / "alarms.toml").write_text('[[mqtt]]\nhost = "127.0.0.1"\nport = 9\ntopic = "down"\n')
     trust_all(workspace)
     live = start("live", "--workspace", workspace)
     telling = start("alarms", "--follow", "--workspace", workspace)
@@ -68,8 +68,11 @@ def test_a_robot_that_stands_too_long_is_told_once_and_when_it_is_over(workspace
     rest, said = telling.communicate(timeout=120)
     assert (rest, telling.returncode) == ("", 0)
     first, *others = said.splitlines()
-    assert first == "Telling alarms to standard output, webhook at 127.0.0.1:9; 0 active now"
-    assert others[-1] == "2 messages could not be delivered"
+    assert first == "Telling alarms to standard output, MQTT broker at 127.0.0.1:9; 0 active now"
+    assert others == [
+        "MQTT broker at 127.0.0.1:9: it cannot be reached; trying again",
+        "MQTT broker at 127.0.0.1:9: 2 messages not delivered: no time was left",
+    ]
 
 
 def test_what_is_wrong_is_said_before_anything_is_made(tmp_path: Path, workspace: Path) -> None:

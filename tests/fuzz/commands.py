@@ -97,7 +97,7 @@ def _make(case: Case, folder: Path) -> None:
 def _tell(workspace: Path, port: int) -> None:
     """Have alarms told to who answers at a port."""
     (workspace / "alarms.toml").write_text(
-        f'[[webhook]]\nurl = "http://127.0.0.1:{port}/x"\ntimeout_s = 0.3\n'
+        f'[[mqtt]]\nhost = "127.0.0.1"\nport = {port}\ntopic = "x"\ntimeout_s = 0.3\n'
         f'[[mqtt]]\nhost = "127.0.0.1"\nport = {port}\ntopic = "x"\ntimeout_s = 0.3\n'
     )
 

@@ -8,7 +8,7 @@ from tests.fuzz.values import odd, some
 FILES = ("plant.toml", "alarms.toml")
 _KEYS = {
     "plant.toml": ("price_per_kwh", "currency", "co2_kg_per_kwh", "base_iri", "x", "price"),
-    "alarms.toml": ("webhook", "mqtt", "url", "url_env", "token_env", "timeout_s", "host", "port", "topic", "tls"),
+    "alarms.toml": ("mqtt", "sparkplug", "password_env", "timeout_s", "host", "port", "topic", "node", "tls"),
 }
 _VALUES = (
     *('"https://plant.example/x/"', '"http://[::1"', '"s3://bucket/../x"', '"file:///etc/passwd"', '"memory://x"'),
@@ -36,7 +36,7 @@ def toml(name: str, rng: np.random.Generator) -> bytes:
         return bytes(some(rng, [b"", b"\xff\xfe", b"[[[", b"\0", b"a.b.c" * 3000, b"x" * 200_000, b"[a]\n" * 9999]))
     lines = [f"{some(rng, _KEYS[name])} = {some(rng, _VALUES)}" for _ in range(rng.integers(1, 4))]
     if name == "alarms.toml":
-        lines = [f"[[{some(rng, ['webhook', 'mqtt', 'x'])}]]", *lines] if rng.integers(4) else lines
+        lines = [f"[[{some(rng, ['sparkplug', 'mqtt', 'x'])}]]", *lines] if rng.integers(4) else lines
     if rng.integers(10) == 0:
         lines.append(f"[{str(odd(rng))[:50]!r}]")
     return "\n".join(lines).encode("utf-8", "surrogatepass")

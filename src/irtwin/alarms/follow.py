@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from irtwin.alarms.alarm import ACTIVE, Alarm, Event, message
-from irtwin.alarms.delivery import Delivery
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
@@ -61,22 +60,18 @@ def follow(
     look: Look,
     told: ToldAlarms,
     write: Callable[[bytes], None],
-    deliveries: Sequence[Delivery],
     done: threading.Event,
     announce: Announce,
     sparql: Mapping[str, str],
 ) -> None:
-    """Write each news as a line of JSON and hand it to the deliveries, until it is `done`; `sparql`: of rules, by name.
+    """Write each news as a line of JSON, until it is `done`; `sparql`: of rules, by name.
 
     A graph that cannot be read is announced, and asked again; the first look raises InputError.
     """
     alarms, fault = look(), ""
     while True:
         for event, alarm in told.news(alarms):
-            line = message(event, alarm, datetime.now(UTC), sparql.get(alarm.rule))
-            for delivery in deliveries:
-                delivery.put(line)
-            write(line + b"\n")
+            write(message(event, alarm, datetime.now(UTC), sparql.get(alarm.rule)))
         if done.wait(EVERY):
             return
         try:

@@ -3,11 +3,6 @@
 Each receiver is asked for by a name that says where messages go, and which variables with them. Only variables that
 are called IRTWIN_... are read, so that no file gets at others' secrets.
 
-[[webhook]]
-url = "https://example.com/robots"      # or url_env, where the URL itself is a secret
-token_env = "IRTWIN_WEBHOOK_TOKEN"      # optional: sent as a bearer token
-timeout_s = 5                           # optional
-
 [[mqtt]]
 host = "broker.plant"
 port = 1883                             # optional; 8883 with tls
@@ -30,9 +25,7 @@ from collections.abc import Container, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
-from irtwin.alarms.delivery import Receiver
 from irtwin.errors import InputError
 from irtwin.signals.toml_file import TomlTable, shown
 from irtwin.toml_text import read_toml
@@ -46,35 +39,27 @@ _OWN = ("IRTWIN_DATABASE", "IRTWIN_GRAPH", "IRTWIN_GRAPH_TOKEN", "IRTWIN_TOKEN")
 _TIMEOUT = 5.0  # s
 _SHORTEST = 0.1  # s
 _PLACES = {"mqtt": "topic", "sparkplug": "node"}  # the key that says what a broker is told, by kind
-_KEYS = {
-    "webhook": ("url", "url_env", "token_env", "timeout_s"),
-    **{kind: ("host", "port", place, "user", "password_env", "tls", "timeout_s") for kind, place in _PLACES.items()},
-}
+_KEYS = {kind: ("host", "port", place, "user", "password_env", "tls", "timeout_s") for kind, place in _PLACES.items()}
 
 
 def read_settings(
     file: Path, environment: Mapping[str, str] = os.environ, may: Container[str] | None = None
-) -> tuple[list[Receiver], list[Broker]]:
-    """Return who is told of alarms by a file, and the brokers that are told of robots by Sparkplug B.
+) -> tuple[list[Broker], list[Broker]]:
+    """Return the brokers that are told of alarms by a file, and those that are told of robots by Sparkplug B.
 
-    These have GROUP/NODE as their topic. `may`: whom the file may tell, by name; all if None. Raises InputError, naming
-    file, table and key, on all that is wrong.
+    The latter have GROUP/NODE as their topic. `may`: whom the file may tell, by name; all if None. Raises InputError,
+    naming file, table and key, on all that is wrong.
     """
-    receivers: list[Receiver] = []
-    edge_nodes: list[Broker] = []
+    brokers: dict[str, list[Broker]] = {kind: [] for kind in _PLACES}
     try:
         for kind, table in _tables(file):
-            if may is not None and _asked(kind, table) not in may:
-                continue
-            if kind == "webhook":
-                receivers.append(_webhook(table, environment))
-            else:
-                (edge_nodes if kind == "sparkplug" else receivers).append(_broker(kind, table, environment))
+            if may is None or _asked(kind, table) in may:
+                brokers[kind].append(_broker(kind, table, environment))
     except ModuleNotFoundError as error:
         raise InputError(
             f"alarms cannot be sent without the package {error.name}; pip install 'irtwin[alarms]'"
         ) from None
-    return receivers, edge_nodes
+    return brokers["mqtt"], brokers["sparkplug"]
 
 
 def asks(file: Path) -> list[str]:
@@ -97,44 +82,17 @@ def _tables(file: Path) -> list[tuple[str, TomlTable]]:
             asked.append((kind, table))
     if not asked:
         raise InputError(
-            f"{file}: names nobody; write [[webhook]] with url, [[mqtt]] with host and topic, or "
-            "[[sparkplug]] with host and node"
+            f"{file}: names nobody; write [[mqtt]] with host and topic, or [[sparkplug]] with host and node"
         )
     return asked
 
 
 def _asked(kind: str, table: TomlTable) -> str:
-    """Return the name by which a receiver is asked for: where its messages go, and which variables with them.
-
-    Of a webhook's URL it says the host alone: its path is often a secret.
-    """
-    place = _host(table, table.text("url")) if kind == "webhook" else _port(kind, table)
-    variables = [name for key in ("url_env", "token_env", "password_env") if (name := table.text(key)) is not None]
-    return f"{NAME}: {kind} at {place}" + (f", with {' and '.join(variables)}" if variables else "")
-
-
-def _port(kind: str, table: TomlTable) -> str:
+    """Return the name by which a receiver is asked for: where its messages go, and which variable with them."""
     port = table.values.get("port", 8883 if table.values.get("tls") is True else 1883)
-    return f"{table.text('host')}:{port}, {_PLACES[kind]} {table.text(_PLACES[kind])}"
-
-
-def _host(table: TomlTable, url: str | None) -> str:
-    if url is None:
-        return "the URL of a variable"
-    _check_url(table, url)
-    return urlsplit(url).netloc
-
-
-def _webhook(table: TomlTable, environment: Mapping[str, str]) -> Receiver:
-    given = table.text("url"), _secret(table, "url_env", environment)
-    if (given[0] is None) == (given[1] is None):
-        raise InputError(f"{table.file}: {table.name} needs url, or url_env, one of them")
-    url = given[0] or given[1] or ""
-    _check_url(table, url)
-    token, timeout = _secret(table, "token_env", environment), _timeout(table)
-    from irtwin.alarms.webhook import Webhook  # an extra
-
-    return Webhook(url, token, timeout)
+    variable, place = table.text("password_env"), _PLACES[kind]
+    beside = f", with {variable}" if variable else ""
+    return f"{NAME}: {kind} at {table.text('host')}:{port}, {place} {table.text(place)}{beside}"
 
 
 def _broker(kind: str, table: TomlTable, environment: Mapping[str, str]) -> Broker:
@@ -158,22 +116,6 @@ def _broker(kind: str, table: TomlTable, environment: Mapping[str, str]) -> Brok
     return Broker(host, port, topic, user, password, tls, timeout)
 
 
-def _check_url(table: TomlTable, url: str) -> None:
-    """Raise InputError, without the URL, unless it leads to a web server and holds no user or password."""
-    wrong = InputError(
-        f"{table.file}: {table.name} its URL should be http:// or https:// with a host and without user or password; "
-        "a token goes by token_env"
-    )
-    try:
-        parts = urlsplit(url)
-        _ = parts.port
-    except ValueError:
-        raise wrong from None
-    plain = url.isascii() and url.isprintable() and " " not in url
-    if parts.scheme not in ("http", "https") or not parts.hostname or "@" in parts.netloc or not plain:
-        raise wrong
-
-
 def _secret(table: TomlTable, key: str, environment: Mapping[str, str]) -> str | None:
     """Return the value of the variable that a key names. Raises InputError where it is not set."""
     name = table.text(key)
@@ -182,7 +124,7 @@ def _secret(table: TomlTable, key: str, environment: Mapping[str, str]) -> str |
     if not _VARIABLE.fullmatch(name) or name in _OWN:
         raise InputError(
             f"{table.file}: {table.name} {key}: {shown(name)[1:-1]} is not read; give the secret in a variable of its "
-            "own whose name begins with IRTWIN_, as IRTWIN_WEBHOOK_TOKEN"
+            "own whose name begins with IRTWIN_, as IRTWIN_MQTT_PASSWORD"
         )
     value = environment.get(name, "").strip()
     if not (value and value.isascii() and value.isprintable()):

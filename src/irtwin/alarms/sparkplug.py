@@ -14,9 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 from typing import Any
 
-import paho.mqtt.client as paho
-
-from irtwin.alarms.mqtt import Broker
+from irtwin.alarms.mqtt import Broker, Connection
 
 METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
@@ -28,24 +26,20 @@ Metric = tuple[str, int, Any]  # name, type, value; None: not known
 Row = Mapping[str, Any]
 
 
-class EdgeNode:
+class EdgeNode(Connection):
     """Tells a broker of robots. Who sends its commands is answered by new births: nothing else can be commanded."""
 
     def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
         """Connect in the background, again and again; `broker.topic` is GROUP/NODE."""
-        self._broker, self._announce = broker, announce
+        super().__init__(broker, announce)
         self._group, _, self._node = broker.topic.partition("/")
         self._lock = threading.RLock()
         self._robots: dict[str, tuple[Metric, ...]] = {}
         self._born = False
         self._deaths, self._sequence = count(), count()
-        self._fault = ""
-        self._client = broker.client()
         self._client.on_pre_connect = self._bequeath
-        self._client.on_connect, self._client.on_disconnect = self._connected, self._disconnected
         self._client.on_message = lambda *_: self._be_born()
-        self._client.connect_async(broker.host, broker.port)
-        self._client.loop_start()
+        self.begin()
 
     def tell(self, rows: Iterable[Row]) -> None:
         """Tell what is new of robots since the last time: births of new ones, data, deaths of those that are gone."""
@@ -67,8 +61,7 @@ class EdgeNode:
         with self._lock:
             if self._born:
                 self._client.publish(self._topic("NDEATH"), self._death, qos=1).wait_for_publish(_PATIENCE)
-        self._client.disconnect()
-        self._client.loop_stop()
+        self.end()
 
     def _bequeath(self, *_: Any) -> None:
         """Leave a death with the broker, of the same number as the birth that follows."""
@@ -76,24 +69,15 @@ class EdgeNode:
         self._death = payload([(_BD_SEQ, _UINT64, self._death_number)])
         self._client.will_set(self._topic("NDEATH"), self._death, qos=1)
 
-    def _connected(self, _client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        if reason.is_failure:
-            self._tell_fault(f"it refuses the connection: {reason}")
-            return
-        self._fault = ""
+    def made(self) -> None:
+        """Tell of the node and all robots."""
         self._client.subscribe(self._topic("NCMD"), qos=1)
         self._be_born()
 
-    def _disconnected(self, _client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+    def lost(self) -> None:
+        """Tell nothing until it is made again."""
         with self._lock:
             self._born = False
-        if reason.is_failure:
-            self._tell_fault(f"the connection is lost: {reason}; trying again")
-
-    def _tell_fault(self, fault: str) -> None:
-        if fault != self._fault:
-            self._announce(f"{self._broker.name}: {fault}")
-        self._fault = fault
 
     def _be_born(self) -> None:
         with self._lock:

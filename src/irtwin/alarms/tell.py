@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
-from irtwin.alarms.delivery import Delivery, Receiver
 from irtwin.alarms.follow import follow, told_in
 from irtwin.alarms.settings import NAME, asks, read_settings
 from irtwin.asking import checked, open_graph
@@ -22,7 +21,7 @@ from irtwin.storage.files import inside
 from irtwin.trust import how, trusted
 
 if TYPE_CHECKING:
-    from irtwin.alarms.mqtt import Broker
+    from irtwin.alarms.mqtt import AlarmTopic, Broker
     from irtwin.alarms.sparkplug import EdgeNode
 
 
@@ -47,24 +46,28 @@ def tell(
     workspace, done = location.folder, threading.Event()
     alarms = _alarms(location, robot)  # before anything is made: there may be no workspace
     sparql = sparql_of_rules(checked(workspace))
-    receivers, brokers = read_settings(config) if config is not None else _of_workspace(workspace, announce)
+    of_alarms, of_robots = read_settings(config) if config is not None else _of_workspace(workspace, announce)
     with told_in(workspace) as told:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: done.set())
-        deliveries = [Delivery(receiver, announce) for receiver in receivers]
-        nodes = _edge_nodes(brokers, announce)
-        names = ["standard output", *(receiver.name for receiver in [*receivers, *brokers])]
+        names = ["standard output", *(broker.name for broker in (*of_alarms, *of_robots))]
         announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in alarms)} active now")
+        topics, nodes = _topics(of_alarms, announce), _edge_nodes(of_robots, announce)
         try:
-            follow(partial(_alarms, location, robot, nodes), told, _write, deliveries, done, announce, sparql)
+            follow(partial(_alarms, location, robot, nodes), told, partial(_write, topics), done, announce, sparql)
         finally:
             for node in nodes:
                 node.close()
-            for delivery in deliveries:
-                delivery.close()
-    lost = sum(delivery.lost for delivery in deliveries)
-    if lost:
-        announce(f"{lost} message{'s' * (lost != 1)} could not be delivered")
+            for topic in topics:
+                topic.close()
+
+
+def _topics(brokers: Sequence[Broker], announce: Callable[[str], None]) -> list[AlarmTopic]:
+    if not brokers:
+        return []
+    from irtwin.alarms.mqtt import AlarmTopic  # an extra
+
+    return [AlarmTopic(broker, announce) for broker in brokers]
 
 
 def _edge_nodes(brokers: Sequence[Broker], announce: Callable[[str], None]) -> list[EdgeNode]:
@@ -75,7 +78,7 @@ def _edge_nodes(brokers: Sequence[Broker], announce: Callable[[str], None]) -> l
     return [EdgeNode(broker, announce) for broker in brokers]
 
 
-def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Receiver], list[Broker]]:
+def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Broker], list[Broker]]:
     """Return whom the workspace's own file may tell; say whom it would tell, too."""
     file = inside(workspace, NAME)
     if not file.exists():
@@ -94,6 +97,8 @@ def _alarms(location: Location, robot: str | None, nodes: Sequence[EdgeNode] = (
         return alarms(graph, robot)
 
 
-def _write(line: bytes) -> None:
-    sys.stdout.buffer.write(line)
+def _write(topics: Sequence[AlarmTopic], line: bytes) -> None:
+    for topic in topics:
+        topic.put(line)
+    sys.stdout.buffer.write(line + b"\n")
     sys.stdout.buffer.flush()

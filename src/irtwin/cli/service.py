@@ -140,7 +140,7 @@ def alarms(location: Location, robot: str | None, follow: bool, config: Path | N
     """List the alarms that are active: a gap out of its band, a robot idle for too long, a twin to identify again.
 
     With --follow, each is told once when it begins and once when it is over, as a line of JSON on standard output,
-    and to the webhooks and MQTT brokers of alarms.toml. It runs beside `irtwin live`, which it never slows. Ctrl-C
+    and to the MQTT brokers of alarms.toml. It runs beside `irtwin live`, which it never slows. Ctrl-C
     stops.
 
     \b
