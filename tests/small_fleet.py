@@ -16,8 +16,8 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, IRT, XSD
+from irtwin.storage import energy_schema, schema
 from irtwin.storage import gap_schema as gap
-from irtwin.storage import schema
 from irtwin.storage import structure_schema as structure
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
@@ -220,7 +220,7 @@ def _prices() -> Iterator[Base]:
         run_id, made = f"{robot}.{name}", f"energy.{robot}.{name}"
         yield _activity(made, robot, "energy", "2026-03-05 12:03")
         *_, saved, width = SLOWER.get(run_id, (None, None))
-        yield schema.RunPrice(
+        yield energy_schema.RunPrice(
             saving_j=saved, saving_lower_j=saved and saved - width, saving_upper_j=saved and saved + width,
             run_id=run_id, twin_id=f"{robot}.t1", energy_from="modelled", energy_j=joules, energy_lower_j=joules - half,
             energy_upper_j=joules + half, mean_power_w=joules / seconds, mean_power_lower_w=(joules - half) / seconds,
@@ -345,25 +345,27 @@ def _energies() -> Iterator[Base]:
         )  # fmt: skip
         entries = [entry.split() for entry in f"standby_power - {standby}, {LEDGER[run_id]}".split(", ")]
         for effect, joint, joules in entries:
-            yield schema.EnergyShare(
+            yield energy_schema.EnergyShare(
                 twin_id=f"{robot}.t1", run_id=run_id, effect=effect, robot_id=robot,
                 place=joint.replace("-", "robot"), joint=None if joint == "-" else joint,
                 energy_j=float(joules), lower_j=0.5 * float(joules), upper_j=1.5 * float(joules),
                 inseparable=1 if (run_id, effect) == FRICTION_TOGETHER else None, activity_id=made,
             )  # fmt: skip
         if run_id == FRICTION_TOGETHER[0]:
-            yield schema.InseparableEnergy(
+            yield energy_schema.InseparableEnergy(
                 run_id=run_id, number=1, robot_id=robot, energy_j=80.0, lower_j=77.0, upper_j=83.0, activity_id=made
             )
         for number, (state, lasts, logged, told) in enumerate(SUPPLY.get(run_id, ()), start=1):
-            yield schema.SupplyState(
+            yield energy_schema.SupplyState(
                 run_id=run_id, number=number, robot_id=robot, state=state, seconds=lasts, power_w=logged,
                 modelled_power_w=told, modelled_power_lower_w=told - 3, modelled_power_upper_w=told + 3,
                 differs=abs(logged - told) > 3, activity_id=made,
             )  # fmt: skip
         for joint in JOINTS[robot]:
             taken = sum(float(joules) for _, at, joules in entries if at == joint)
-            yield schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot, energy_j=taken, activity_id=made)
+            yield energy_schema.JointEnergy(
+                run_id=run_id, joint=joint, robot_id=robot, energy_j=taken, activity_id=made
+            )
 
 
 def _live_runs() -> Iterator[Base]:

@@ -15,11 +15,10 @@ from irtwin import resources
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.mapping.document import RR
 from irtwin.storage.database import Workspace
+from irtwin.storage.energy_schema import EnergyShare, JointEnergy
 from irtwin.storage.schema import (
     Base,
     BaseParameter,
-    EnergyShare,
-    JointEnergy,
     JointState,
     Parameter,
     Series,

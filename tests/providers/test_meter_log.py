@@ -19,7 +19,8 @@ from irtwin.report.questions import ask
 from irtwin.rewriting import map_rows, rewriting
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import MeteredLoad, RunEnergy, SupplyState, Twin
+from irtwin.storage.energy_schema import MeteredLoad, SupplyState
+from irtwin.storage.schema import RunEnergy, Twin
 from irtwin.workflow import take_in
 
 pytestmark = pytest.mark.slow

@@ -18,7 +18,7 @@ from irtwin.providers.records import inputs, load_run, load_twin
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill
-from irtwin.storage import schema
+from irtwin.storage import energy_schema, schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
 from irtwin.twin.account import Entry, Share, account
@@ -53,7 +53,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             *_account(robot_id, run_id, twin_id, entries),
             *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
-                schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
+                energy_schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
                 for joint, energy in _per_joint(shares).items()
             ),
         ],
@@ -67,7 +67,7 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
     for entry in entries:
         if len(entry.shares) > 1:
             number += 1
-            yield schema.InseparableEnergy(
+            yield energy_schema.InseparableEnergy(
                 run_id=run_id,
                 number=number,
                 robot_id=robot_id,
@@ -76,7 +76,7 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
                 upper_j=entry.upper,
             )
         for share in entry.shares:
-            yield schema.EnergyShare(
+            yield energy_schema.EnergyShare(
                 twin_id=twin_id,
                 run_id=run_id,
                 effect=share.effect,
@@ -90,9 +90,9 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
             )
 
 
-def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[schema.SupplyState]:
+def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[energy_schema.SupplyState]:
     for number, one in enumerate(states, start=1):
-        yield schema.SupplyState(
+        yield energy_schema.SupplyState(
             run_id=run_id,
             number=number,
             robot_id=robot_id,
@@ -110,7 +110,7 @@ def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twi
     with workspace.reading() as session:
         scaled = session.get_one(schema.Run, run_id).time_scaling_of
     saved = None if scaled is None else _saving(workspace, scaled, twin, motion)
-    row = schema.RunPrice(
+    row = energy_schema.RunPrice(
         run_id=run_id,
         twin_id=twin_id,
         energy_from="modelled" if twin.knows_power else "mechanical",
@@ -150,7 +150,7 @@ def stored_price(workspace: Workspace, run_id: str) -> Price | None:
     """Return what a planned run takes, as it was stored; None where its robot's twin knows nothing of power."""
     with workspace.reading() as session:
         seconds = session.get_one(schema.Run, run_id).run_time_s
-        row = session.get_one(schema.RunPrice, run_id)
+        row = session.get_one(energy_schema.RunPrice, run_id)
     if row.energy_from != "modelled":
         return None
 

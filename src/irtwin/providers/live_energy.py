@@ -22,7 +22,7 @@ from irtwin.providers.names import run_iri, twin_iri
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
-from irtwin.storage import schema
+from irtwin.storage import energy_schema, schema
 from irtwin.storage.database import Workspace
 from irtwin.twin.gap_watch import ROBOT, GapWatch, Windows, band
 from irtwin.twin.so_far import EnergySoFar, WatchedStretch
@@ -32,8 +32,8 @@ Values = dict[str, Any]
 Tables = dict[str, list[Values]]
 _KINDS: Mapping[str, type[schema.Base]] = {
     "run_energy": schema.RunEnergy,
-    "energy_share": schema.EnergyShare,
-    "joint_energy": schema.JointEnergy,
+    "energy_share": energy_schema.EnergyShare,
+    "joint_energy": energy_schema.JointEnergy,
     "gap_state": schema.GapState,
     "gap_excursion": schema.GapExcursion,
 }

@@ -6,7 +6,8 @@ from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
 from irtwin.signals.load_profile import Cycles, by_hour, load_profile
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import MEASURED, MeteredLoad, Run, RunEnergy, RunState, SupplyState
+from irtwin.storage.energy_schema import MeteredLoad, SupplyState
+from irtwin.storage.schema import MEASURED, Run, RunEnergy, RunState
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:

@@ -21,7 +21,8 @@ from irtwin.providers.names import run_iri
 from irtwin.providers.provider import Made
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Activity, Run, RunEnergy, SavingVerification, in_utc
+from irtwin.storage.energy_schema import SavingVerification
+from irtwin.storage.schema import Activity, Run, RunEnergy, in_utc
 
 FEWEST = 3  # runs of a product and payload on each side: with two, nothing tells scatter from change
 _SURE = 0.975  # of a distribution below the upper end of a 95 % interval

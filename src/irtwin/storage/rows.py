@@ -24,6 +24,7 @@ from sqlalchemy.orm import Session, aliased
 
 from irtwin.errors import InputError
 from irtwin.storage import base_iri
+from irtwin.storage.energy_schema import RunPrice
 from irtwin.storage.schema import (
     LIVE,
     WATCHED_RUNS,
@@ -33,7 +34,6 @@ from irtwin.storage.schema import (
     Robot,
     Run,
     RunEnergy,
-    RunPrice,
     Series,
     SourceFile,
     in_utc,
