@@ -109,7 +109,7 @@ def test_a_reversed_position_is_no_reversed_torque(joint):
 
 
 def test_no_arrangement_is_tried_of_a_robot_of_many_axes(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(arrangement, "_MOST_JOINTS", 3)
+    monkeypatch.setattr(arrangement, "MOST_JOINTS", 3)
     monkeypatch.setattr(RigidBodyRows, "unexplained", lambda *_: pytest.fail("a fit a joint and fault"))
     assert check(healthy()).findings == ()
 

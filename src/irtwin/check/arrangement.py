@@ -18,20 +18,18 @@ import scipy
 
 from irtwin.check.built_otherwise import turned_axes
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import RigidBodyRows, rows_of
+from irtwin.check.rigid_body import FEW_ROWS, MOST_JOINTS, RigidBodyRows, rows_of
 from irtwin.check.whole_body import Held, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 
-_ROWS = 900  # over all runs
 _GAIN = 2.0  # in the product of all residuals that undoing a fault has to bring
 _SURE = 4.0  # standard deviations between stretches of time, of 20: one in 50 faults tried in 2,500 healthy logs
 _ALIKE = 2.0  # standard deviations: a rival that is no further behind explains the torques as well
 _FACTORS = (2.0, 0.5)
 _FITTED = 0.8  # of a torque's deviation: an exchange must leave less at each joint
 _ALL_PAIRS = 8  # joints; of more, neighbours alone
-_MOST_JOINTS = 12  # of more, no fault is looked for: one takes a fit, and there are four faults a joint
 
 _SAID = {
     "sign": "has the wrong sign",
@@ -126,7 +124,7 @@ def says_position(robot: Robot, moving: Moving, joint: int) -> float:
 
 def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> RigidBodyRows | None:
     """Return the rows that show such a fault; None where there are too few."""
-    rows = rows_of(robot, moving, _ROWS) if len(robot.joint_names) <= _MOST_JOINTS else None
+    rows = rows_of(robot, moving, FEW_ROWS) if len(robot.joint_names) <= MOST_JOINTS else None
     if rows is None:
         return None
     names = CHANNELS["torque"].columns(robot.joint_names)

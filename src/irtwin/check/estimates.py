@@ -12,15 +12,13 @@ import numpy as np
 
 from irtwin.check.built_otherwise import tilted
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import RigidBodyRows, rows_of
+from irtwin.check.rigid_body import MANY_ROWS, MOST_JOINTS, RigidBodyRows, rows_of
 from irtwin.check.torque import scale_findings
 from irtwin.check.whole_body import Fitted, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 
-_ROWS = 1500  # over all runs
-_MOST_JOINTS = 12
 _SURE = 4.0  # standard deviations of a number from none
 _BEYOND = 2.0  # standard deviations by which a number exceeds what is tolerated
 _LATE, _LATEST = 0.008, 0.1  # s of a delay; drives filter their currents by a few ms
@@ -42,15 +40,15 @@ _TURN = 1e-3  # rad over which a torque's change with a position is taken
 
 def estimate_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques that are late or of another scale than the others', and positions whose zero is off."""
-    rows = rows_of(robot, moving, _ROWS)
-    if rows is None or len(robot.joint_names) > _MOST_JOINTS:
+    rows = rows_of(robot, moving, MANY_ROWS)
+    if rows is None or len(robot.joint_names) > MOST_JOINTS:
         return []
     fitted = _fit(rows)
     return _scales(robot, moving, fitted) or _delays(robot, moving, rows, fitted) or _zeros(robot, moving, rows, fitted)
 
 
 def _delays(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) -> list[LogFinding]:
-    after, before = (rows_of(robot, moving, _ROWS, later) for later in (_STEP, -_STEP))
+    after, before = (rows_of(robot, moving, MANY_ROWS, later) for later in (_STEP, -_STEP))
     if after is None or before is None:
         return []
     slopes = (after.columns() - before.columns()) / (2 * _STEP)
@@ -100,7 +98,7 @@ class Lateness:
 
 def _earlier(robot: Robot, moving: Moving, rows: RigidBodyRows, joint: int, by: float) -> np.ndarray:
     """Return the torques (N, n), that of the joint as it is logged so much later."""
-    later = rows_of(robot, moving, _ROWS, of_torque=by)
+    later = rows_of(robot, moving, MANY_ROWS, of_torque=by)
     return rows.torque if later is None else np.where(np.arange(len(robot.joints)) == joint, later.torque, rows.torque)
 
 

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import RigidBodyRows, friction, rows_of
+from irtwin.check.rigid_body import FEW_ROWS, RigidBodyRows, friction, rows_of
 from irtwin.check.robust_fit import fit
 from irtwin.robot.description import Robot
 from irtwin.signals.finding import LogFinding
 
-_ROWS = 900  # over all runs
 _LOADED = 0.2  # of the most loaded joint's gravity, by the URDF: what less turns is as much tool as robot
 _SEEN = 0.15  # of the variance that losses, inertia and springs leave of a torque: gravity must explain as much
 _SURE = 4.0  # standard deviations
@@ -42,7 +41,7 @@ class _Load:
 
 def gravity_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the clearest of the joints that gravity turns as no load of this robot would."""
-    rows = rows_of(robot, moving, _ROWS)
+    rows = rows_of(robot, moving, FEW_ROWS)
     if rows is None:
         return []
     loads = list(_loads(robot, rows, moving.joints))

@@ -12,6 +12,8 @@ from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
+FEW_ROWS, MANY_ROWS = 900, 1500  # over all runs, of which a fault is looked for
+MOST_JOINTS = 12  # of more no fault is looked for that takes fits of the whole body
 _FEWEST = 300  # samples; fewer, and regressors of chance explain everything
 _REVERSAL = 0.1  # of a joint's usual speed: friction has its full size there
 _INDEPENDENT = 1e-5  # of the largest singular value

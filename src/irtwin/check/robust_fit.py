@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_BLOCKS = 20  # stretches of time that count as independent
+BLOCKS = 20  # stretches of time that count as independent
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ def fit(columns: np.ndarray, values: np.ndarray) -> RobustFit:
     coefficients = bread @ (scaled.T @ values)
     residual = values - scaled @ coefficients
     scores = np.array(
-        [scaled[rows].T @ residual[rows] for rows in np.array_split(np.arange(len(values)), _BLOCKS) if len(rows)]
+        [scaled[rows].T @ residual[rows] for rows in np.array_split(np.arange(len(values)), BLOCKS) if len(rows)]
     )
-    covariance = bread @ (scores.T @ scores) @ bread * (_BLOCKS / (_BLOCKS - 1))
+    covariance = bread @ (scores.T @ scores) @ bread * (BLOCKS / (BLOCKS - 1))
     scale = np.where(norms > 0, 1 / np.where(norms > 0, norms, 1.0), 0.0)
     return RobustFit(coefficients * scale, covariance * np.outer(scale, scale))

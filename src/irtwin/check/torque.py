@@ -11,13 +11,12 @@ import numpy as np
 
 from irtwin.check.arrangement import says_position
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import RigidBodyRows, friction, rows_of
+from irtwin.check.rigid_body import MANY_ROWS, RigidBodyRows, friction, rows_of
 from irtwin.check.robust_fit import RobustFit, fit
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 
-_ROWS = 1500  # over all runs
 _SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
 _SURE = 4.0  # standard deviations
 _LIKELY = 2.0
@@ -29,7 +28,7 @@ _EXPLAINED = 0.4  # of a torque's variance by its own joint's motion, without wh
 
 def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the torque channels that are reversed, or no torque of their joint."""
-    rows = rows_of(robot, moving, _ROWS)
+    rows = rows_of(robot, moving, MANY_ROWS)
     if rows is None:
         return []
     nominal = rows.nominal()
@@ -58,7 +57,7 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
 
 def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
-    rows = rows_of(robot, moving, _ROWS)
+    rows = rows_of(robot, moving, MANY_ROWS)
     return [] if rows is None else _scales(robot, moving, rows, rows.nominal())
 
 

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.check.rigid_body import RigidBodyRows
+from irtwin.check.robust_fit import BLOCKS
 
-BLOCKS = 20  # stretches of time that count as independent
 _LEAST = 0.01  # of a torque's deviation: less is left in simulated logs alone, and means nothing
 _TURNS = 4  # of the weights: by then they change by less than 1 %
 _OWN = 1e-3  # of a column's squares that nothing else makes up: with less, it is rounding that is fitted

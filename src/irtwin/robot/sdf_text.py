@@ -8,10 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
-from irtwin.robot.structure import Connection, Origin, Solid, structure_of
+from irtwin.robot.structure import MOMENTS, Connection, Origin, Solid, six_numbers, structure_of
 from irtwin.robot.xml_elements import words
-
-_MOMENTS = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
 
 
 def sdf_text(robot: Robot) -> str:
@@ -58,8 +56,7 @@ def _joint(model: Element, connection: Connection, limits: Joint) -> None:
 def _inertial(link: Element, body: pin.Inertia) -> None:
     inertial = SubElement(link, "inertial")
     _say(inertial, pose=words(*body.lever, 0, 0, 0), mass=repr(float(body.mass)))
-    moments = {name: repr(float(body.inertia[row, column])) for name, row, column in _MOMENTS}
-    _say(SubElement(inertial, "inertia"), **moments)
+    _say(SubElement(inertial, "inertia"), **dict(zip(MOMENTS, map(repr, six_numbers(body.inertia)), strict=True)))
 
 
 def _shape(link: Element, solid: Solid, number: int) -> None:

@@ -22,6 +22,7 @@ _SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius
 PRIMITIVES = ("box", "cylinder", "sphere")
 PURPOSES = ("visual", "collision")
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of an inertia: xx, yy, zz, xy, xz, yz
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")  # what URDF and SDF call them
 
 
 def six_numbers(inertia: np.ndarray) -> tuple[float, float, float, float, float, float]:
@@ -185,7 +186,7 @@ def _body(name: str, link: Element) -> Body:
     moments = inertial.find("inertia")
     turned = None
     if moments is not None:
-        said = inertia_of([float(moments.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")])
+        said = inertia_of([float(moments.get(key, "0")) for key in MOMENTS])
         turn = origin.transform[:3, :3]
         turned = six_numbers(turn @ said @ turn.T)
     return Body(name, float(mass.get("value", "0")), origin.xyz, turned)

@@ -13,7 +13,7 @@ from defusedxml import ElementTree as SafeXml
 from irtwin.errors import InputError, first_line
 from irtwin.input_file import read_text
 from irtwin.robot.description import Joint, Link, Robot
-from irtwin.robot.structure import PRIMITIVES, colours_of, origin_of, solids_of
+from irtwin.robot.structure import MOMENTS, PRIMITIVES, colours_of, origin_of, solids_of
 from irtwin.robot.xml_elements import numbers
 
 _MOVING = ("revolute", "continuous", "prismatic")
@@ -93,8 +93,8 @@ def _check_inertia(link: Element, where: str) -> None:
     inertia = link.find("inertial/inertia")
     if inertia is None:
         return
-    values = {key: _number(inertia.get(key, "0"), where) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
-    negative = [key for key in ("ixx", "iyy", "izz") if values[key] < 0]
+    values = {key: _number(inertia.get(key, "0"), where) for key in MOMENTS}
+    negative = [key for key in MOMENTS[:3] if values[key] < 0]
     if negative:
         raise InputError(f"{where}: {negative[0]} is negative, {values[negative[0]]} kg m^2")
 

@@ -7,9 +7,8 @@ from xml.sax.saxutils import quoteattr
 
 import pinocchio as pin
 
+from irtwin.robot.structure import MOMENTS, six_numbers
 from irtwin.robot.xml_elements import outermost, with_child
-
-_MOMENTS = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
 
 
 def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping[str, Mapping[str, float]]) -> str:
@@ -29,5 +28,5 @@ def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping
 
 def _inertial(body: pin.Inertia) -> str:
     centre = " ".join(map(repr, body.lever.tolist()))
-    moments = " ".join(f'{name}="{float(body.inertia[row, column])!r}"' for name, row, column in _MOMENTS)
+    moments = " ".join(f'{name}="{value!r}"' for name, value in zip(MOMENTS, six_numbers(body.inertia), strict=True))
     return f'<inertial><origin xyz="{centre}"/><mass value="{float(body.mass)!r}"/><inertia {moments}/></inertial>'

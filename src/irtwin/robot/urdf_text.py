@@ -8,10 +8,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from irtwin.robot.description import Joint
-from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure
+from irtwin.robot.structure import MOMENTS, Body, Connection, Origin, Solid, Structure
 from irtwin.robot.xml_elements import words
-
-_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def urdf_text(name: str, structure: Structure, joints: Iterable[Joint]) -> str:
@@ -34,7 +32,7 @@ def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:
         if body.com is not None:
             SubElement(inertial, "origin", xyz=words(*body.com))
         if body.inertia is not None:
-            SubElement(inertial, "inertia", dict(zip(_MOMENTS, map(repr, body.inertia), strict=True)))
+            SubElement(inertial, "inertia", dict(zip(MOMENTS, map(repr, body.inertia), strict=True)))
     for solid in solids:
         shape = SubElement(link, solid.purpose)
         _origin(shape, solid.origin)
