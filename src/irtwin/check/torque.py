@@ -7,6 +7,8 @@ its gravity is right is no torque of the joint.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from irtwin.check.arrangement import says_position
@@ -32,8 +34,18 @@ def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     if rows is None:
         return []
     nominal = rows.nominal()
-    findings = [_direction(robot, moving, rows, nominal, joint) for joint in np.flatnonzero(moving.joints).tolist()]
-    return [finding for finding in findings if finding is not None]
+    joints = np.flatnonzero(moving.joints).tolist()
+    told = {joint: one for joint in joints if (one := _told(rows, nominal, joint)) is not None}
+    findings = [found for joint in told if (found := _direction(robot, moving, joint, told[joint])) is not None]
+    reversed_ = [one for one in findings if one.fault == "sign" and one.mended]
+    right = any(max(each.body, each.lost) > _LIKELY for each in told.values())
+    still = [CHANNELS["torque"].column(robot.joints[joint].name) for joint in joints if joint not in told]
+    if len(reversed_) < _SEVERAL or right or not still:
+        return findings
+    say = (
+        f"{reversed_[-1].say}; that of {', '.join(still)} this motion does not tell: change it too if all are reversed"
+    )
+    return [replace(one, say=say) if one is reversed_[-1] else one for one in findings]
 
 
 def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
@@ -61,8 +73,17 @@ def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     return [] if rows is None else _scales(robot, moving, rows, rows.nominal())
 
 
-def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray, joint: int) -> LogFinding | None:
-    """Return what is wrong with the direction of a joint's torque."""
+@dataclass(frozen=True)
+class _Direction:
+    """How many standard deviations gravity and inertia of the URDF, and what friction takes, are above zero."""
+
+    body: float
+    lost: float
+    drives: bool  # friction drives the joint by one of its parts
+
+
+def _told(rows: RigidBodyRows, nominal: np.ndarray, joint: int) -> _Direction | None:
+    """Return what a joint's torque says of its direction; None where its own motion explains too little of it."""
     torque, speed = rows.torque[:, joint], rows.dq[:, joint]
     if np.ptp(torque) == 0:
         return None
@@ -75,12 +96,17 @@ def _direction(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.nd
     body = friction_fit.t(np.eye(5)[0])
     dry, viscous = (losses[:, :2] * speed[:, None]).mean(axis=0)  # what they take from the motion
     lost = friction_fit.t(np.array([0.0, 0.0, dry, viscous, 0.0]))
+    return _Direction(body, lost, _drives(friction_fit, dry, viscous) or (lost < -_SURE and body > _SURE))
+
+
+def _direction(robot: Robot, moving: Moving, joint: int, told: _Direction) -> LogFinding | None:
+    """Return what is wrong with the direction of a joint's torque."""
+    body, lost = told.body, told.lost
     evidence = {"gravity_t": round(body, 1), "friction_t": round(lost, 1)}
     name = CHANNELS["torque"].column(robot.joints[joint].name)
-    drives = _drives(friction_fit, dry, viscous) or (lost < -_SURE and body > _SURE)
-    if not drives and ((lost < -_SURE and body < _LIKELY) or (body < -_SURE and lost < _LIKELY)):
+    if not told.drives and ((lost < -_SURE and body < _LIKELY) or (body < -_SURE and lost < _LIKELY)):
         return _wrong_sign(robot, moving, joint, evidence, _reversed(body, lost))
-    if drives:
+    if told.drives:
         return LogFinding(
             "not_joint_torque", name, moving.names, certain=False, mended=False, evidence=evidence,
             say=f"{name} is not the torque of its joint alone: gravity and inertia have the right direction in it, but "
