@@ -117,6 +117,17 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
     assert_same(read_data_set(tmp_path / "set"), "q torque")
 
 
+def test_a_motion_without_torque_asks_which_columns_are_it(tmp_path: Path) -> None:
+    log = write_text(
+        tmp_path / "run.csv", {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
+    )
+    said = irtwin("import", log, "--robot", NAME, "--out", tmp_path / "set")
+    assert (said.status, (tmp_path / "set").exists()) == (2, False)
+    assert "no column was taken for torque, motor current or power" in said.err
+    assert "--map 'xy*=tau' or --map 'xy*=i' (not used are xy1, xy2" in said.err
+    assert irtwin("import", log, "--robot", NAME, "--map", "xy*=tau", "--out", tmp_path / "set").status == 0
+
+
 @pytest.mark.parametrize(("number", "channels"), [(1, [f"dq_joint_a{k}" for k in range(1, 7)]), (2, [""] * 6)])
 def test_one_joint_that_is_given_tells_those_that_are_counted_on(
     tmp_path: Path, number: int, channels: list[str]

@@ -21,6 +21,7 @@ from irtwin.signals.channels import CHANNELS
 
 _TIMES = ("__time", "time", "timestamp")  # the first of these that is there
 _OF_POWER = ("power", "meter_voltage", "meter_current")
+_WORK = (*_OF_POWER, "torque", "current", "command")  # without one of these a motion says nothing of its robot
 _ARRAY = (frozenset(("joint", "states")), frozenset(("jointstates",)), frozenset(("field",)))  # of ROS' joint states
 
 
@@ -41,6 +42,7 @@ def meanings(recording: Recording, robot: Robot, told: UserSaid) -> list[Meaning
             f"{recording.path}: no column was taken for power or energy; say which it is: --map COLUMN=power:kW, or "
             f"give --robot if joints were logged (there are {', '.join(recording.names)[:400]})"
         )
+    _check_work(recording, chosen.values())
     texts = {name: Meaning(name, None, why="holds neither numbers nor times of ISO 8601") for name in recording.texts}
     chosen |= texts
     return [chosen[name] for name in recording.names]
@@ -238,6 +240,17 @@ def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], se
         raise InputError(
             f"{recording.path}: no column was taken for {what}; say which it is: --map COLUMN={column}{named}{held} "
             f"(there are {shown})"
+        )
+
+
+def _check_work(recording: Recording, chosen: Collection[Meaning]) -> None:
+    """Raise InputError where nothing was taken that moves the robot, or that it takes, and some columns may be that."""
+    unknown = [each.column for each in chosen if each.field is None]
+    if unknown and not any(each.field in _WORK for each in chosen):
+        shown = " or ".join(f"--map {shlex.quote(f'{_pattern(unknown[0])}={prefix}')}" for prefix in ("tau", "i"))
+        raise InputError(
+            f"{recording.path}: no column was taken for torque, motor current or power; say which they are, such as "
+            f"{shown} (not used are {', '.join(unknown)[:400]})"
         )
 
 

@@ -20,7 +20,7 @@ _WORDS = {
     "q": "q pos position positions ang angle angles winkel theta act position_actual istposition lage jointposition",
     "dq": "dq qd qdot vel velocity velocities speed speeds omega geschwindigkeit drehzahl",
     "ddq": "ddq qdd qddot acc accel acceleration accelerations beschleunigung",
-    "torque": "tau torque torques trq effort efforts moment moments drehmoment",
+    "torque": "tau torque torques trq effort efforts mom moment moments momente drehmoment drehmomente",
     "current": "i iq current currents curr cur strom motorstrom",
     "temperature": "temp temps temperature temperatures temperatur",
     "power": "power pwr leistung wirkleistung",

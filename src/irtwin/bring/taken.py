@@ -168,9 +168,8 @@ class _Taking:
                 self.units[each.column] = said[0].unit, f"as {said[0].column}"
             elif each.unit is None and seen is not None:
                 if seen.choice is None:
-                    raise self._doubt(
-                        each, f"could be in {_or(seen.allowed or units(si))}: {seen.why}", seen.allowed or units(si)
-                    )
+                    could = seen.allowed if seen.allowed[1:] else units(si)  # one that is not sure is no choice
+                    raise self._doubt(each, f"could be in {_or(could)}: {seen.why}", could)
                 self.units[each.column] = seen.choice, seen.why
             elif each.unit is not None:
                 unit = each.unit
