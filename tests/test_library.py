@@ -6,6 +6,7 @@ import inspect
 import json
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import pyarrow.parquet as pq
 import pytest
@@ -46,6 +47,17 @@ def test_a_name_that_is_not_there_is_told():
 
 def test_effects_go_by_name():
     assert irtwin.catalogue()["stribeck_friction"].family == "friction"
+
+
+def test_a_faulty_model_has_one_rotor_with_half_its_inertia(demo, tmp_path):
+    twin = irtwin.identify(demo, ["rigid_body", "rotor_inertia"])
+    modelling.write_model(twin, "mjcf", tmp_path / "right.xml")
+    modelling.write_faulty_model(twin, "joint_a2", tmp_path / "faulty.xml")
+    right, faulty = (
+        {one.get("name"): float(one.get("armature")) for one in ElementTree.parse(tmp_path / file).iter("joint")}
+        for file in ("right.xml", "faulty.xml")
+    )
+    assert faulty == right | {"joint_a2": right["joint_a2"] / 2}
 
 
 WITHOUT_GRAPH = """

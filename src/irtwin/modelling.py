@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -206,6 +207,15 @@ def write_model(twin: Twin, form: str, out: Path) -> list[str]:
     words = [*doubts(twin), f"{form.upper()} has {', '.join(held) or 'nothing'} of the twin"]
     words += [f"{form.upper()} has no place for {', '.join(lacking)}"] if lacking else []
     return words
+
+
+def write_faulty_model(twin: Twin, joint: str, out: Path) -> None:
+    """Write a twin's robot for MuJoCo, where the rotor of one joint has half its inertia: a fault to be found."""
+    check_place(out)
+    model = ElementTree.fromstring(text_of(twin, "mjcf"))
+    element = next(one for one in model.iter("joint") if one.get("name") == joint)
+    element.set("armature", repr(float(element.attrib["armature"]) / 2))
+    write(out, ElementTree.tostring(model))
 
 
 def read_twin(source: Path) -> Twin:

@@ -128,6 +128,7 @@ def test_the_demo_makes_its_report(away: Path) -> None:
     page = (away / "irtwin-workspace/reports/KUKA_KR6_R700.html").read_text(encoding="utf-8")
     assert 'class="irtwin-scene"' in page
     assert "concluded by SHACL rules" in page
+    assert (away / "irtwin-workspace/kuka_kr6_r700/simulator.xml").is_file()
 
 
 @pytest.mark.nightly

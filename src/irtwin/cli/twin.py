@@ -110,6 +110,9 @@ def demo(
 ) -> None:
     """Run the example data set: simulated logs of a KUKA KR6 R700. On a desktop, show its report in a browser.
 
+    Two gaps are there to be found: the twin lacks losses that the robot has, and simulator.xml, a model for MuJoCo
+    beside the logs, has a fault. The last lines say how.
+
     With --case-study, its twin plans a motion from an initial to a final configuration and says what it will take; that
     is kept and mapped, and read back from the graph. Then a simulated robot carries it out as you watch, and a random
     motion besides, and one page shows all of it beside the paper's figures. It needs a new workspace, and the extras
@@ -119,6 +122,7 @@ def demo(
     Example: irtwin demo --workspace my_demo
     Example: irtwin demo --case-study --from 0,-1.57,1.57,0,0,0 --to 1,-1,1.2,0,0.5,0 --seconds 1.5 --workspace study
     """
+    more: tuple[str, ...] = ()
     if case_study:
         from irtwin.case_study import case_study as carry_out
         from irtwin.case_study import task_of
@@ -134,10 +138,27 @@ def demo(
         data_set = unpack_demo(location.folder)
         announce(f"The example data set is in {data_set}. Use it as a template for your own.")
         page, question = run_all(data_set, location, announce=announce, **asked), "energy_per_joint"
+        more = _gaps_to_find(data_set, page.stem, location)
     click.echo(f"\nOpen the page in a browser: {page.resolve()}")
     if not no_open:
         show_page(page)
     click.echo(f"Ask the graph:              irtwin query {question} --workspace {location.folder}")
+    for line in more:
+        click.echo(line)
+
+
+def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, ...]:
+    """Write a simulator with a fault beside the demo's logs; return a line on each gap that is there to be found."""
+    from irtwin import modelling, plans
+
+    model, joint = data_set / "simulator.xml", "joint_a2"
+    modelling.write_faulty_model(plans.robot_twin(robot, location), joint, model)
+    diagnose = f"irtwin diagnose {data_set}"
+    return (
+        f"Find what the twin lacks:   {diagnose} --report gap.html",
+        f"Mend a simulator whose {joint} has half its rotor's inertia (needs irtwin[mujoco]):",
+        f"                            {diagnose} --simulator {model} --save-simulator better.xml",
+    )
 
 
 @click.command()
@@ -217,6 +238,7 @@ def diagnose(
     """
     from irtwin.diagnosing import diagnose as judge
     from irtwin.report.gap import summary
+    from irtwin.report.gap.meanings import meanings
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
@@ -252,10 +274,12 @@ def diagnose(
         if table:
             click.echo()
             show(table, counted=False)
-    for said in summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else ():
-        click.echo(f"\n{said}")
-    for said in summary.next_steps(diagnosis.document):
-        click.echo(f"\n{said}")
+    kept = summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else []
+    for said in (
+        *meanings(diagnosis.document),
+        *(f"\n{one}" for one in (*kept, *summary.next_steps(diagnosis.document))),
+    ):
+        click.echo(said)
 
 
 @click.command()
