@@ -86,6 +86,7 @@ class LiveTwin:
                 self.robots.times.add(header.robot_id, header.run_id, samples[0, 0], samples[-1, 0])
             self._close(path, header, samples, {}, None)
         self._refresh()
+        self._shown.prepare()
         work = (self._show_states, self._store_samples, self._work_out, self._close_runs)
         self._threads = [threading.Thread(target=self._guarded, args=(task,), daemon=True) for task in work]
         for thread in self._threads:

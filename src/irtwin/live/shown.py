@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import cast
 
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
@@ -36,7 +37,14 @@ class ShownRuns:
         self._rules = read_rules(graph.resources.path("rules", "live_rules.ttl"))
         self._rules_of_runs = read_rules(graph.resources.path("rules", "rules.ttl"))  # of a run that is over
         self._beside: set[Triple] | None = None
+        self._ontology: Ontology | None = None
         self._changed = False  # since the last flush
+
+    def prepare(self) -> None:
+        """Read and close the ontology, which stays as it is while robots are watched: no first state waits for that."""
+        self._ontology = Ontology(self._graph)
+        with suppress(Contradiction):
+            _ = self._ontology.schema
 
     def flush(self) -> None:
         """Make what was shown quick to open, if something was."""
@@ -60,8 +68,9 @@ class ShownRuns:
     def kinds(self, run_id: str, quads: Iterable[Quad]) -> set[Quad]:
         """Return what OWL concludes of a run from quads about it: of which kinds it is, and what leads to it."""
         run = NamedNode(self._graph.iri(run_iri(run_id)))
+        ontology = self._ontology or Ontology.of(self._graph)
         try:
-            concluded = Beside(Ontology.of(self._graph).schema, {quad.triple for quad in quads}).worth_keeping()
+            concluded = Beside(ontology.schema, {quad.triple for quad in quads}).worth_keeping()
         except (Contradiction, Equality):  # told by `irtwin run`, which sets aside what clashes
             return set()
         return set(in_graph((it for it in concluded if run in (it.subject, it.object)), GRAPH_OWL_RL))
