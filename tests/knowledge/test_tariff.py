@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
+from pyoxigraph import Literal, NamedNode, Triple
 from tests import plants
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.rules.files import read_rules
+from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import term
+from irtwin.knowledge.vocabulary import ONTOLOGY, QUDT, RDF, UNIT, term
+from irtwin.resources import shipped
 
 KWH = 3.6e6
 
@@ -77,3 +82,34 @@ def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:
     (tmp_path / "plant.toml").write_text("price_per_kwh = -1\n", encoding="utf-8")
     with pytest.raises(InputError, match="price_per_kwh is a number of 0 or more, not -1"):
         KnowledgeGraph(workspace=tmp_path).load_ontology()
+
+
+def test_what_a_robot_takes_while_it_waits_has_one_last_digit_in_whatever_order_its_runs_come() -> None:
+    def irt(name: str) -> NamedNode:
+        return NamedNode(term(name))
+
+    robot, twin, parameter, effect = (
+        NamedNode(f"http://x/{name}") for name in ("robot", "twin", "parameter", "effect")
+    )
+    triples = [
+        Triple(robot, NamedNode(f"{RDF}type"), irt("Industrial_Robot")),
+        Triple(parameter, irt("parameter_of"), twin),
+        Triple(parameter, irt("of_Effect"), effect),
+        Triple(parameter, NamedNode(f"{QUDT}hasUnit"), NamedNode(f"{UNIT}W")),
+        Triple(parameter, irt("Parameter_Value"), Literal(50.3)),
+        Triple(effect, irt("has_Channel"), NamedNode(f"{ONTOLOGY}/channel/power")),
+        Triple(effect, irt("Acts_Per"), Literal("robot")),
+        Triple(effect, irt("Baseline"), Literal(True)),
+    ]
+    rng = random.Random(0)
+    for number in range(40):
+        run = NamedNode(f"http://x/run{number}")
+        triples += [Triple(run, irt("run_of"), robot), Triple(run, irt("modelled_by"), twin)]
+        names = ("Energy_Consumption", "Run_Time", "Idle_Share", "Standby_Energy")
+        triples += [Triple(run, irt(name), Literal(rng.random())) for name in names]
+    rules = read_rules(shipped().path("rules", "tariff_rules.ttl"))
+    found = set()
+    for _ in range(5):
+        rng.shuffle(triples)
+        found.add(frozenset(one for some in conclusions(triples, rules).values() for one in some))
+    assert len(found) == 1 and len(next(iter(found))) >= 4
