@@ -13,7 +13,9 @@ _MEANINGS = """SELECT ?effect ?name ?meaning {
 
 def meanings(diagnosis: Document) -> list[str]:
     """Return a line for each parameter of the causes that matter; none for one that no module describes."""
-    told = {(cause.effect, one.name): None for cause in diagnosis.mattering for one in cause.parameters}  # each once
+    told = {  # each once, and of a vector's parts ("f_x") the whole
+        (cause.effect, one.name.partition("_")[0]): None for cause in diagnosis.mattering for one in cause.parameters
+    }
     if not told:
         return []
     with KnowledgeGraph() as graph:
