@@ -81,3 +81,7 @@ def test_papers_of_a_release_say_its_version():
     newest = re.search(r"^## ([\d.]+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
     cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert newest and cited and newest[1] == cited[1] == irtwin.__version__
+    for module in (ROOT / "ontology").rglob("*.ttl"):
+        assert re.findall(r'owl:versionInfo "([^"]+)"', module.read_text(encoding="utf-8")) == [irtwin.__version__], (
+            module
+        )
