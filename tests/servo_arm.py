@@ -14,7 +14,7 @@ from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals, columns_of
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.simulator.model import Model, read_model
-from irtwin.simulator.play import play, whole
+from irtwin.simulator.play import Push, play, whole
 from irtwin.simulator.servos import NAMES, Servos, servos
 
 MODEL = """<mujoco model="arm">
@@ -99,8 +99,9 @@ def changed(own: Servos, **changes: tuple[float, float]) -> np.ndarray:
 
 
 def played(
-    data_set: DataSet, own: Servos, numbers: np.ndarray, noise: float = 1e-3, torque_noise: float | None = None
-) -> DataSet:
+    data_set: DataSet, own: Servos, numbers: np.ndarray, noise: float = 1e-3, torque_noise: float | None = None,
+    pushes: tuple[Push, ...] = (),
+) -> DataSet:  # fmt: skip
     """Return the data set with the positions that a robot of these numbers would have, from where it rests on.
 
     With `torque_noise`, N m, the torque of its servos is logged, too.
@@ -108,7 +109,9 @@ def played(
     rng, runs = np.random.default_rng(7), []
     for run in data_set.runs:
         logged = replace(run.signals, torque=None if torque_noise is None else np.zeros(run.signals.q.shape))
-        moved = play(own, [numbers], [whole(replace(run, signals=logged))])[0][0]
+        for _ in range(3 if pushes else 1):  # a push pulls joints as the arm stands, which it changes
+            moved = play(own, [numbers], [whole(replace(run, signals=logged), pushes)])[0][0]
+            logged = replace(logged, q=moved[:, 0])
         signals = replace(logged, q=moved[:, 0] + noise * rng.standard_normal(logged.q.shape))
         if torque_noise is not None:
             torque = moved[:, 1] + torque_noise * rng.standard_normal(logged.q.shape)

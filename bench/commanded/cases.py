@@ -29,8 +29,11 @@ NOISE = 3e-4  # rad
 ARMS = tuple(SOURCES)
 KINDS = (
     "armature", "damping", "friction", "stiffness", "payload", "delay", "backlash", "torque_limit", "offset",
+    "spring", "elasticity", "contact",
 )  # fmt: skip
 TORQUE_NOISE = 0.01  # of the standard deviation of a joint's torque
+RAMP = 0.1  # s
+DAMPED = 0.02  # of critical damping, in an elastic joint
 NULLS, PAIRS = 1 / 8, 1 / 4  # shares of the cases
 
 
@@ -57,8 +60,12 @@ class Arm:
     offset: np.ndarray
     delay: np.ndarray
     backlash: np.ndarray  # rad to either side
+    spring: np.ndarray  # N m/rad
+    elasticity: np.ndarray  # rad/(N m), between a motor and its link
     payload: float = 0.0
     tilt: float = 0.0  # rad about the world's x axis
+    contact: float = 0.0  # N at the flange, during a push
+    on_links: bool = False  # whether the log has positions of links in place of motors'
 
     def with_(self, differences: tuple[Difference, ...]) -> Arm:
         """Return the arm with other numbers."""
@@ -68,7 +75,20 @@ class Arm:
                 found[one.kind] = one.robot
             else:
                 found[one.kind][one.joint] = one.robot
-        return Arm(**{**found, "payload": float(found["payload"]), "tilt": float(found["tilt"])})
+        return Arm(**{**found, **{name: float(found[name]) for name in ("payload", "tilt", "contact")}})
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force at the flange along `direction` (3,), of the world, from `start` to `stop`, s, that comes in RAMP s."""
+
+    direction: np.ndarray
+    start: float
+    stop: float
+
+    def share(self, time: float) -> float:
+        """Return how much of it acts at a time, 0 to 1."""
+        return float(np.clip(min(time - self.start, self.stop - time) / RAMP, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -98,22 +118,28 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
     machine = build(read_model(models, case.arm), case.seed)
     own = _drawn(machine, rng)
     kinds = rng.choice((*KINDS, "tilt") if case.torque else KINDS, case.count, replace=False)
-    differences = tuple(_difference(str(kind), own, rng) for kind in kinds)
+    differences = tuple(_difference(str(kind), own, _links(machine), rng) for kind in kinds)
     if case.torque:
         differences = tuple(_reached(one, machine, own, rng) for one in differences)
     text, robot = _mjcf(machine, own), own.with_(differences)
+    pushed = rng.permutation(RUNS - HELD_OUT)[: rng.integers(1, 3)]
+    start, lasts, direction = rng.uniform(1.0, 5.0), rng.uniform(1.0, 2.5), rng.standard_normal(3)
+    robot = replace(robot, on_links=bool(rng.random() < 0.5))
+    push = Push(direction / np.linalg.norm(direction), start, start + lasts)
     for part in ("data", "held_out"):
         (folder / case.name / part / "runs").mkdir(parents=True)
         (folder / case.name / part / "robot.urdf").write_text(machine.urdf, encoding="utf-8")
         (folder / case.name / part / "dataset.toml").write_text(_described(machine, part == "data"), encoding="utf-8")
     (folder / case.name / "model.xml").write_text(text, encoding="utf-8")
     model = mujoco.MjModel.from_xml_string(_mjcf(machine, robot))
+    if robot.elasticity.any():
+        _keep_friction(model, mujoco.MjModel.from_xml_string(text))
     model.opt.gravity = Rotation.from_rotvec([robot.tilt, 0, 0]).apply(model.opt.gravity)
     for run in range(RUNS):
         programme = (exciting if run % 2 else working)(machine, SECONDS, rng)
         every = round(STEP * EVERY / machine.step)
         told = programme.q[::every]
-        q, torque = simulate(model, robot, told)
+        q, torque = simulate(model, robot, told, push if run in pushed else None)
         part = "data" if run < RUNS - HELD_OUT else "held_out"
         columns = {"time": np.arange(len(told)) * STEP * EVERY}
         for k, name in enumerate(machine.model.joints):
@@ -126,24 +152,35 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
     return list(differences)
 
 
-def simulate(model: mujoco.MjModel, arm: Arm, told: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def simulate(
+    model: mujoco.MjModel, arm: Arm, told: np.ndarray, push: Push | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and servos' torques (N, n) of an arm that is told commands (N, n), each until the next."""
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION  # its servos are those below
-    data = mujoco.MjData(model)
-    data.qpos[:] = told[0]
+    data, motors = mujoco.MjData(model), np.array([model.joint(k).name[-1] != "'" for k in range(model.njnt)])
+    data.qpos[motors] = told[0]
     late = np.round(arm.delay / STEP).astype(int)
     found, torques, columns = np.empty_like(told), np.empty_like(told), np.arange(told.shape[1])
-    settling = round(1.0 / STEP)  # the log begins when the robot stands
+    flange, applied = model.body("load").id, np.zeros(model.nv)
+    settling, links = round(1.0 / STEP), np.flatnonzero(~motors)  # the log begins when the robot stands
     for row in range(-settling, len(told) * EVERY):
         if row >= 0 and row % EVERY == 0:
-            found[row // EVERY] = data.qpos
+            found[row // EVERY] = data.qpos[motors]
+            if arm.on_links:  # a joint of two is before its spring
+                found[row // EVERY, (np.cumsum(motors) - 1)[links]] += data.qpos[links]
         command = told[np.maximum(row - late, 0) // EVERY, columns] + arm.offset
-        off = command - data.qpos
+        off = command - data.qpos[motors]
         off = np.sign(off) * np.maximum(np.abs(off) - arm.backlash, 0.0)
-        torque = arm.stiffness * off - arm.servo_damping * data.qvel
-        data.qfrc_applied[:] = np.clip(torque, -arm.torque_limit, arm.torque_limit)
+        torque = arm.stiffness * off - arm.servo_damping * data.qvel[motors]
+        applied[:] = 0.0
+        applied[motors] = np.clip(torque, -arm.torque_limit, arm.torque_limit)
         if row >= 0 and row % EVERY == 0:
-            torques[row // EVERY] = data.qfrc_applied
+            torques[row // EVERY] = applied[motors]
+        share = push.share(row * STEP) if push and arm.contact else 0.0
+        if push and share:
+            force = share * arm.contact * push.direction
+            mujoco.mj_applyFT(model, data, force, np.zeros(3), data.xpos[flange], flange, applied)
+        data.qfrc_applied[:] = applied
         mujoco.mj_step(model, data)
     return found, torques
 
@@ -177,13 +214,17 @@ def _drawn(machine: Machine, rng: np.random.Generator) -> Arm:
         offset=np.zeros(n),
         delay=np.zeros(n),
         backlash=np.zeros(n),
+        spring=np.zeros(n),
+        elasticity=np.zeros(n),
     )
 
 
-def _difference(kind: str, own: Arm, rng: np.random.Generator) -> Difference:
+def _difference(kind: str, own: Arm, links: np.ndarray, rng: np.random.Generator) -> Difference:
     if kind == "tilt":
         return Difference(kind, None, 0.0, float(rng.choice([-1.0, 1.0]) * rng.uniform(0.01, 0.05)))
     joint = int(rng.integers(len(own.stiffness)))
+    if kind == "contact":
+        return Difference(kind, None, 0.0, float(own.torque_limit[1] * rng.uniform(0.05, 0.2)))
     if kind == "payload":
         return Difference(kind, None, 0.0, float(own.torque_limit[1] * rng.uniform(0.01, 0.03)))
     before = float(getattr(own, kind)[joint])
@@ -197,6 +238,8 @@ def _difference(kind: str, own: Arm, rng: np.random.Generator) -> Difference:
         "backlash": rng.uniform(0.003, 0.015),
         "torque_limit": before * rng.uniform(0.15, 0.3),
         "offset": sign * rng.uniform(0.005, 0.03),
+        "spring": own.stiffness[joint] * rng.uniform(0.05, 0.3),
+        "elasticity": 1 / (links[joint] * (2 * np.pi * rng.uniform(4.0, 12.0)) ** 2),
     }[kind]
     return Difference(kind, joint, before, float(after))
 
@@ -222,12 +265,15 @@ def _mjcf(machine: Machine, arm: Arm) -> str:
             "armature": repr(float(arm.armature[k])),
             "damping": repr(float(arm.damping[k])),
             "frictionloss": repr(float(arm.friction[k])),
+            "stiffness": repr(float(arm.spring[k])),
         }
         limit = float(arm.torque_limit[k])
         ElementTree.SubElement(
             actuator, "position", name=name, joint=name, kp=repr(float(arm.stiffness[k])),
             kv=repr(float(arm.servo_damping[k])), forcerange=f"{-limit!r} {limit!r}",
         )  # fmt: skip
+    for k in np.flatnonzero(arm.elasticity):
+        _soften(root, own[machine.model.joints[k]], arm.elasticity[k], _links(machine)[k])
     if arm.payload:
         load = next(body for body in root.iter("body") if body.get("name") == "load")
         inertial = load.find("inertial")
@@ -235,6 +281,40 @@ def _mjcf(machine: Machine, arm: Arm) -> str:
         inertial.attrib |= {"mass": repr(arm.payload), "diaginertia": " ".join([repr(arm.payload * 2e-3)] * 3)}
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _links(machine: Machine) -> np.ndarray:
+    """Return the inertia that each joint moves beyond its rotor (n,), kg m^2, the mean over poses."""
+    model, found = machine.real, []
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    for pose in np.random.default_rng(0).uniform(machine.model.lower, machine.model.upper, (64, model.nv)):
+        data.qpos[:] = pose
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, full)
+        found.append(full.diagonal() - model.dof_armature)
+    return np.asarray(np.mean(found, axis=0))
+
+
+def _soften(root: ElementTree.Element, joint: ElementTree.Element, elasticity: float, inertia: float) -> None:
+    """Put a spring behind a joint's motor."""
+    body = next(one for one in root.iter("body") if joint in list(one))
+    name, stiffness = str(joint.get("name")), float(1 / elasticity)
+    behind = {
+        "name": name + "'", "stiffness": repr(stiffness),
+        "damping": repr(float(2 * DAMPED * np.sqrt(stiffness * inertia))),
+        "armature": "0", "frictionloss": "0", "limited": "false",
+    }  # fmt: skip
+    kept = {key: value for key, value in joint.attrib.items() if key in {"type", "axis", "pos"}}
+    body.insert(list(body).index(joint) + 1, ElementTree.Element("joint", kept | behind))
+
+
+def _keep_friction(model: mujoco.MjModel, rigid: mujoco.MjModel) -> None:
+    """Give dry friction the law that it has without elasticity: MuJoCo's is as soft as what it holds is light."""
+    for k in range(rigid.njnt):
+        dof = int(model.joint(rigid.joint(k).name).dofadr[0])
+        before = rigid.dof_solimp[k, :2]
+        odds = before / (1 - before) * model.dof_invweight0[dof] / rigid.dof_invweight0[k]
+        model.dof_solimp[dof, :2] = odds / (1 + odds)
 
 
 def _described(machine: Machine, fitted: bool) -> str:

@@ -33,7 +33,9 @@ EFFECTS = {  # what each kind is called by a diagnosis
     "armature": "rotor_inertia", "damping": "viscous_friction", "friction": "coulomb_friction",
     "stiffness": "servo_stiffness", "payload": "payload", "delay": "command_delay", "backlash": "servo_dead_band",
     "torque_limit": "servo_torque_limit", "offset": "command_offset", "tilt": "base_tilt",
+    "spring": "cable_drag", "elasticity": "joint_elasticity", "contact": "external_contact",
 }  # fmt: skip
+APART = ("c_", "angle_y", "f_", "start", "stop")  # labels have a mass, a tilt's first angle and the size of a force
 Label = Mapping[str, Any]
 
 
@@ -98,7 +100,7 @@ def called_back(own: Servos, said: Path, stretch: PlayedStretch) -> np.ndarray:
 def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
     """Return what of a case is right: first cause, its joint, numbers within their intervals, all that differs."""
     causes = [one for one in found["document"]["causes"] if not one.get("folded_away")]
-    wanted = {EFFECTS[one["kind"]]: one for one in label["differences"]}
+    wanted = {EFFECTS[one["kind"]]: _as_told(one) for one in label["differences"]}
     first = causes[0] if causes else None
     right = (first["effect"] in wanted) if first and wanted else not first and not wanted
     joint = bool(first and right and first["joints"] == [one for one in [wanted[first["effect"]]["joint"]] if one])
@@ -109,7 +111,7 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
         for cause in causes
         for number in cause["parameters"]
         if cause["effect"] in wanted and number["joint"] == wanted[cause["effect"]]["joint"] and number["interval95"]
-        if not number["name"].startswith(("c_", "angle_y"))  # labels have a payload's mass and a tilt's first angle
+        if not number["name"].startswith(APART)
     ]
     return {
         "first": right,
@@ -118,6 +120,12 @@ def score(label: Label, found: Mapping[str, Any]) -> dict[str, Any]:
         "all": set(wanted) <= {one["effect"] for one in causes},
         "else": sorted({one["effect"] for one in causes} - set(wanted)),
     }
+
+
+def _as_told(difference: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a difference as it is told: elasticity as the stiffness of a joint."""
+    is_elastic = difference["kind"] == "elasticity"
+    return {**difference, "robot": 1 / difference["robot"]} if is_elastic else difference
 
 
 def page(told: Mapping[str, Label], found: Mapping[str, Mapping[str, Any]], checksum: str) -> str:

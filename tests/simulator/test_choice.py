@@ -57,6 +57,22 @@ def test_the_numbers_that_differ_are_found_with_their_values(arm):
 
 
 @pytest.mark.parametrize(
+    ("name", "true"),
+    [
+        ("spring", (0.0, 3.0)),
+        ("link_compliance", (0.0, 0.05)),
+        pytest.param("compliance", (0.05, 0.0), marks=pytest.mark.nightly),
+    ],
+)
+def test_a_spring_and_a_soft_joint_are_found(arm, name, true):
+    found = chosen(arm, servo_arm.changed(arm[2], **{name: true}))
+    row = NAMES.index(name)
+    assert np.argwhere(found.differs).tolist() == [[row, int(np.argmax(true))]]
+    np.testing.assert_allclose(found.numbers[row], true, rtol=0.05)
+    assert (found.interval[0, row] <= true).all() and (found.interval[1, row] >= true).all()
+
+
+@pytest.mark.parametrize(
     ("part", "name", "true"),
     [("payload", "payload", 0.1), pytest.param("base_tilt", "tilt_y", 0.25, marks=pytest.mark.nightly)],
 )

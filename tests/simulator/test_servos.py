@@ -9,7 +9,7 @@ from tests import servo_arm
 
 from irtwin.errors import InputError
 from irtwin.simulator.play import play, whole
-from irtwin.simulator.servos import has_servos
+from irtwin.simulator.servos import NAMES, has_servos
 
 SWING = {"a": servo_arm.swings(4, 1)}
 
@@ -21,7 +21,7 @@ def arm(folder, text=servo_arm.MODEL):
 def test_a_models_servos_are_told_by_their_numbers(tmp_path):
     own = arm(tmp_path)[2]
     expected = [[20, 15], [0.9, 0.7], [0.05, 0.05], [0.9, 0.9], [0.02, 0.02], [0, 0], [0, 0], [5, 30 * np.pi]]
-    np.testing.assert_allclose(own.numbers, np.vstack([expected, np.zeros((7, 2))]))
+    np.testing.assert_allclose(own.numbers, np.vstack([expected, np.zeros((len(NAMES) - len(expected), 2))]))
     np.testing.assert_allclose(own.of_chart(own.chart(own.numbers)), own.numbers)
 
 
@@ -29,14 +29,14 @@ def test_what_differs_is_written_and_read_back(tmp_path):
     own = arm(tmp_path)[2]
     numbers = servo_arm.changed(
         own, stiffness=(12.5, 15), damping=(0.05, 0.3), friction=(0.05, 0.2), holding=(0.9999, 0.9),
-        armature=(0.02, 0.1), offset=(0, 0.02), delay=(0.033, 0), torque_limit=(5, 2),
+        armature=(0.02, 0.1), offset=(0, 0.02), delay=(0.033, 0), torque_limit=(5, 2), spring=(1.5, 0),
     )  # fmt: skip
     file = tmp_path / "new.xml"
     file.write_bytes(own.written(numbers, numbers != own.numbers))
     again = servo_arm.read(tmp_path / "data", file)[2]
     np.testing.assert_allclose(again.numbers, numbers, rtol=1e-12, atol=1e-15)
     text = file.read_text()
-    assert '<joint name="lift" axis="0 1 0" damping="0.05" solimpfriction="0.9999 0.9999"/>' in text
+    assert '<joint name="lift" axis="0 1 0" damping="0.05" stiffness="1.5" solimpfriction="0.9999 0.9999"/>' in text
     assert "<!-- servos as the maker says -->" in text
     assert '<position joint="lift" kp="12.5" kv="0.0" ctrlrange="-1.5 1.5" forcerange="-5 5" delay=' in text
     assert '<general joint="elbow" ctrlrange="-1.5 1.5" gaintype="fixed"' in text

@@ -1,7 +1,7 @@
 """Each joint of a model played by itself, the others as they were measured: quick enough to fit numbers by.
 
 The equations are MuJoCo's of one joint: its servo within the force that it has, damping, and dry friction that gives
-way as its impedance says. Bodies load the joint as the measured motion has it.
+way as its impedance says. A soft joint has a motor and a link. Bodies load the joint as the measured motion has it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import scipy
 
 from irtwin.identification.progress import track
 from irtwin.signals.sampling import interval
+from irtwin.simulator.model import DAMPED
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
 _AT_ONCE = 6_000_000  # positions that are held at a time
+_STIFFEST = 1e-3  # of a swing that takes as long as a step, squared: a joint that is as good as rigid
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,14 @@ class Alone:
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
         """Return, for each set of numbers (k, n) and each stretch, what the joints do at its samples, as `measured`."""
         most = max(1, _AT_ONCE // (self.load[0].size * self.stretches[0].measured.shape[1]))
-        found: list[list[np.ndarray]] = []
-        for first in range(0, len(numbers), most):
-            found += self._some(np.array(numbers[first : first + most]))
+        found: list[list[np.ndarray]] = [[] for _ in numbers]
+        soft = [bool(self.servos.compliance(one).any()) for one in numbers]
+        for kind in (False, True):  # a link behind a spring takes twice the time
+            places = [place for place, is_soft in enumerate(soft) if is_soft == kind]
+            for first in range(0, len(places), most):
+                some = places[first : first + most]
+                for place, moved in zip(some, self._some(np.array([numbers[one] for one in some])), strict=True):
+                    found[place] = moved
         return found
 
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
@@ -76,48 +83,48 @@ class Alone:
     def _moved(self, numbers: np.ndarray, commanded: np.ndarray) -> np.ndarray:
         """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n)."""
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
-        at, dof = servos.actuators, servos.model.speeds
+        at = servos.actuators
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
-        stiffness, damping, friction, holding, armature, _, _, limit, band = own[: len(OF_JOINTS)]
-        mass, *off = own[len(OF_JOINTS) :]
-        changes = np.array([mass, *(mass * np.array(off[:3])), *off[3:]])[:, :, 0]
-        if (changes == changes[:, :1]).all():  # of most sets bodies are alike
-            changes = changes[:, :1]
+        stiffness, damping, _, _, _, _, _, limit, band, spring, *_ = own[: len(OF_JOINTS)]
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
-        lets_go = holding != servos.numbers[NAMES.index("holding")]
-        firm = np.where(lets_go, holding, compiled.dof_solimp[dof, 1])
-        back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
-        free = 1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - compiled.dof_armature[dof]
-        soft = (1 - holding) / holding / np.maximum(free + armature, 1e-9)
+        springs = compiled.qpos_spring[servos.model.positions], bool(spring.any())
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
-        load, bodies = (
-            of[0, :, None] + np.einsum("kvn,kspn->svpn", changes, of[1:]) for of in (self.load, self.inertia)
-        )
-        inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
-        gives = step * inverse / (1 + step * damping * inverse)
-        held_force, held_speed = inverse / (inverse + soft), back / (inverse + soft)
-        lower, upper = self._stops()
         q, v = (np.broadcast_to(one, commanded.shape[1:]).copy() for one in self.begun)
-        followed, below, lets_move, lags = q, -band, -friction, bool((share < 1).any())
+        load, bodies = self._load(own[len(OF_JOINTS) :])
+        dynamics = (_Soft if servos.compliance(own).any() else _Rigid)(servos, own, load, bodies, step, q, v)
+        q = dynamics.motor
+        lower, upper = self._stops()
+        followed, below, lags = q, -band, bool((share < 1).any())
         moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
-        moved[0, 0] = q
+        moved[0, 0] = dynamics.measured(q)
         for row in range(len(commanded)):
             followed = followed + share * (commanded[row] - followed) if lags else commanded[row]
             off = followed - q
             off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
             moved[row, 1:] = force
-            force -= joint * v + load[row]
-            held = force * held_force[row] + held_speed[row] * v
-            force -= np.minimum(np.maximum(held, lets_move), friction)
-            v += force * gives[row]
+            force -= joint * v
+            if springs[1]:
+                force -= spring * (q - springs[0])
+            v = dynamics.speed(row, force, q, v)
             before, q = q, np.minimum(np.maximum(q + step * v, lower), upper)
             v = (q - before) / step
-            moved[row + 1, 0] = q
+            moved[row + 1, 0] = dynamics.measured(q)
         moved[-1, 1:] = moved[-2, 1:]
         return moved
+
+    def _load(self, of_robot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return torque and inertia (steps, v, p, n) of the bodies with what all joints share (k, v, 1, n)."""
+        mass, *off = of_robot
+        changes = np.array([mass, *(mass * np.array(off[:3])), *off[3:]])[:, :, 0]
+        if (changes == changes[:, :1]).all():  # of most sets bodies are alike
+            changes = changes[:, :1]
+        load, bodies = (
+            of[0, :, None] + np.einsum("kvn,kspn->svpn", changes, of[1:]) for of in (self.load, self.inertia)
+        )
+        return load, bodies
 
     def _stops(self) -> np.ndarray:
         """Return where joints stop, (2, n): at the model's ranges, or as far beyond as the robot was."""
@@ -131,6 +138,86 @@ class Alone:
             ]
         )
         return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
+
+
+class _Rigid:
+    """Joints whose links turn with their motors; all arrays (steps, v, p, n), of numbers (k, v, 1, n)."""
+
+    def __init__(
+        self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
+        q: np.ndarray, v: np.ndarray,
+    ):  # fmt: skip
+        _, damping, self._most, _, armature, *_ = numbers
+        soft, back = _dry(servos, numbers, step)
+        inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
+        self.motor = q
+        self._load, self._least = load, -self._most
+        self._gives = step * inverse / (1 + step * damping * inverse)
+        self._held_force, self._held_speed = inverse / (inverse + soft), back / (inverse + soft)
+
+    def speed(self, row: int, force: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the speed after a step."""
+        force -= self._load[row]
+        held = force * self._held_force[row] + self._held_speed[row] * v
+        force -= np.minimum(np.maximum(held, self._least), self._most)
+        return np.asarray(v + force * self._gives[row])
+
+    def measured(self, q: np.ndarray) -> np.ndarray:
+        """Return the positions that are measured where motors are at some."""
+        return q
+
+
+class _Soft:
+    """Joints whose links swing behind their motors, on a spring that is a little damped.
+
+    A step knows the speeds at its end of what swings too fast for it: that does not diverge, nor is it there to see.
+    """
+
+    def __init__(
+        self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
+        q: np.ndarray, v: np.ndarray,
+    ):  # fmt: skip
+        _, damping, self._most, _, armature, *_ = numbers
+        soft, back = _dry(servos, numbers, step)
+        stiffness = 1 / np.maximum(servos.compliance(numbers), step**2 * _STIFFEST / servos.model.links)
+        slack = 2 * DAMPED * np.sqrt(stiffness * servos.model.links)
+        late = np.clip(4 * (step * np.sqrt(stiffness / np.maximum(bodies, 1e-9)) - 0.5), 0.0, 1.0)
+        self._load, self._bodies, self._least, self._step = load, bodies, -self._most, step
+        self._stiffness, self._back = stiffness, back
+        self._rotor = armature + step * damping
+        self._pulled, self._pulls = step**2 * stiffness + step * slack, late * step**2 * stiffness + step * slack
+        self._whole = (self._rotor + self._pulled) * (bodies + self._pulls) - self._pulls * self._pulled
+        self._gives = (bodies + self._pulls) / self._whole
+        self._holds = 1 / (self._gives + soft)
+        twist, self._on_links = load[0] / stiffness, servos.on_links(numbers)
+        self.motor = np.where(self._on_links, q + twist, q)
+        self._link, self._turns = self.motor - twist, v
+
+    def speed(self, row: int, force: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return the motor's speed after a step; the link's is kept."""
+        twist = self._step * self._stiffness * (q - self._link)
+        link = self._bodies[row] * self._turns + twist - self._step * self._load[row]
+        beside = self._pulls[row] * link / self._whole[row]
+        free = (self._rotor * v + self._step * force - twist) * self._gives[row] + beside
+        held = ((free - v) / self._step + self._back * v) * self._holds[row]
+        free -= self._step * self._gives[row] * np.minimum(np.maximum(held, self._least), self._most)
+        self._turns = (link + self._pulled * free) / (self._bodies[row] + self._pulls[row])
+        self._link = self._link + self._step * self._turns
+        return np.asarray(free)
+
+    def measured(self, q: np.ndarray) -> np.ndarray:
+        """Return the positions that are measured where motors are at some."""
+        return np.where(self._on_links, self._link, q)
+
+
+def _dry(servos: Servos, numbers: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return how softly dry friction holds, 1/(kg m^2), and how fast it brings a joint to rest, 1/s."""
+    compiled, dof = servos.model.compiled, servos.model.speeds
+    holding, armature = numbers[NAMES.index("holding")], numbers[NAMES.index("armature")]
+    lets_go = holding != servos.numbers[NAMES.index("holding")]
+    firm = np.where(lets_go, holding, compiled.dof_solimp[dof, 1])
+    back = 2 / (firm * np.maximum(compiled.dof_solref[dof, 0], 2 * step))
+    return (1 - holding) / holding / (servos.model.free + armature), back
 
 
 def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Alone:
@@ -148,6 +235,7 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
         found[2:5] = (found[2:5] - found[1]) / _ASIDE
         found[5:] = (found[5:] - found[0]) / _ASIDE
         found[1] -= found[0]
+        found[0, 0] -= one.pushed(servos.model, one.time, step)
         between = scipy.interpolate.make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
         times = np.minimum(np.arange(steps) * step, one.time[-1])
         load[:, :, place], inertia[:, :, place] = np.moveaxis(between(times), 2, 0).swapaxes(1, 2)
@@ -163,6 +251,7 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) ->
     dof, at = servos.model.speeds, servos.model.positions
     bare = copy.copy(compiled)
     bare.dof_armature[dof] = bare.dof_damping[dof] = bare.dof_frictionloss[dof] = 0.0
+    bare.jnt_stiffness[bare.dof_jntid[dof]] = 0.0
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     data, full = mujoco.MjData(bare), np.zeros((bare.nv, bare.nv))

@@ -104,7 +104,8 @@ def choose(fit: Fit) -> DifferingNumbers:
         back = _without(fit, best, part, differs | robots)
         odds = np.where(part, _odds(fit, (best, differs | robots), (back, differs | (robots & ~part))), odds)
         if odds[part[:, 0], 0][0] <= 0:
-            best, robots = back, robots & ~part
+            robots = robots & ~part
+            fit, best, differs = _given_back(fit, back)  # what made up for it, too
     differs |= robots
     slopes = fit.slopes(best)
     loss, worth = _weighed(fit, best, slopes, differs)
@@ -247,7 +248,7 @@ def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:
 def _judged(fit: Fit, best: Played, own: Played) -> Fit:
     """Return the fit about numbers; the least that they or the simulator's leave is taken for what is left at best."""
     usual = np.sqrt(np.minimum(*(np.median(one.squares, axis=0) for one in (best, own))))
-    return replace(fit, floor=np.maximum(usual, fit.least), certainty=_certainty(best)).about(best.at)
+    return replace(fit, floor=np.maximum(usual, fit.least), certainty=certainty(best)).about(best.at)
 
 
 def _free(fit: Fit) -> np.ndarray:
@@ -256,7 +257,7 @@ def _free(fit: Fit) -> np.ndarray:
     return found
 
 
-def _certainty(best: Played) -> np.ndarray:
+def certainty(best: Played) -> np.ndarray:
     """Return how many independent samples the remainder of a stretch has, (c, n): the median of all."""
     counts = []
     for left in best.remainders:

@@ -21,13 +21,14 @@ SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
 _LEAST, _LEAST_OF_TORQUE = 2e-4, 1e-3  # rad (m); share of a joint's torque
 _BEGUN, _LOOKS = 50.0, 3.0  # times that, and independent samples, before either is known
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
-# of a difference quotient; 0.05 of the others, in the chart
-_STEP = {"offset": 0.002, "delay": 0.004, "dead_band": 0.001} | dict.fromkeys(OF_ROBOT[1:], 0.01)
-# that one step goes; 1 of the others
-_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01} | dict.fromkeys(OF_ROBOT[1:], 0.05)
+_SOFT = ("compliance", "link_compliance")
+_STEP = {"offset": 0.002, "delay": 0.004, "dead_band": 0.001, "spring": 0.02}  # of a difference quotient
+_STEP |= dict.fromkeys(OF_ROBOT[1:], 0.01)  # 0.05 of the others, in the chart
+_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01, "spring": 0.3}  # that one step goes
+_FARTHEST |= dict.fromkeys(_SOFT, 0.5) | dict.fromkeys(OF_ROBOT[1:], 0.05)  # 1 of the others
 # standard deviation from the simulator's; 3 of the others
-_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5, "dead_band": 0.02, "payload": 9.0}
-_LIKELY |= dict.fromkeys(OF_ROBOT[1:], 0.2)
+_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5, "dead_band": 0.02, "payload": 9.0, "spring": 0.5}
+_LIKELY |= dict.fromkeys(_SOFT, 1.0) | dict.fromkeys(OF_ROBOT[1:], 0.2)
 _TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
 _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
@@ -89,6 +90,12 @@ def marginal(joints: Sequence[StepEquations], rows: Sequence[int]) -> tuple[np.n
 
 def _no_farther(step: np.ndarray, rows: Sequence[int]) -> np.ndarray:
     return np.asarray(step / max(1.0, np.abs(step / FARTHEST[rows, 0]).max(initial=0.0)))
+
+
+def _remainder(stretch: PlayedStretch, moved: np.ndarray) -> np.ndarray:
+    """Return what of a stretch (N, c, n) is left once where it began is forgotten."""
+    left = (stretch.measured - moved)[stretch.time >= _SETTLED]
+    return np.asarray(np.nan_to_num(left, nan=1e3, posinf=1e3, neginf=-1e3))
 
 
 @dataclass(frozen=True)
@@ -155,11 +162,15 @@ class Fit:
         return replace(self, beyond=tuple(one - other for one, other in zip(self._whole(at), single, strict=True)))
 
     def _left(self, at: np.ndarray, moved: Sequence[np.ndarray]) -> Played:
-        left = [
-            np.nan_to_num((one.measured - played)[one.time >= _SETTLED], nan=1e3, posinf=1e3, neginf=-1e3)
-            for one, played in zip(self.stretches, moved, strict=True)
-        ]
+        left = [_remainder(one, played) for one, played in zip(self.stretches, moved, strict=True)]
         return Played(at, tuple(left), np.array([(each**2).mean(axis=0) for each in left]))
+
+    def replaced(self, one: Played, place: int, moved: np.ndarray) -> Played:
+        """Return what is left where the model did otherwise in a stretch: `moved` (N, c, n)."""
+        left, squares = list(one.remainders), one.squares.copy()
+        left[place] = _remainder(self.stretches[place], moved)
+        squares[place] = (left[place] ** 2).mean(axis=0)
+        return Played(one.at, tuple(left), squares)
 
     def cost(self, one: Played) -> np.ndarray:
         """Return how bad numbers are, (n,), as a logarithm of probability: what is left, and how far they are."""

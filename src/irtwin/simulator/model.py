@@ -25,7 +25,11 @@ from irtwin.simulator.model_file import ModelFile
 if TYPE_CHECKING:
     import mujoco
 
-_SECOND = " beside its servo"
+_SECOND, _BEHIND = " beside its servo", " behind its motor"
+_SWING = 1.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
+DAMPED = 0.05  # of critical damping, in what is soft
+_POSES = 64  # over whose inertia a mean is taken
+_FIRMEST = 0.9999  # impedance that MuJoCo takes
 _APART = 1e-3  # m, frames that are at one place
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
@@ -70,6 +74,37 @@ class Model:
         return self.file.path.stem
 
     @cached_property
+    def free(self) -> np.ndarray:
+        """The inertia that joints move beyond their rotors (n,), kg m^2, in the model's own pose, the others free."""
+        compiled, dof = self.compiled, self.speeds
+        return np.asarray(
+            np.maximum(1 / np.maximum(compiled.dof_invweight0[dof], 1e-9) - compiled.dof_armature[dof], 1e-9)
+        )
+
+    @cached_property
+    def links(self) -> np.ndarray:
+        """The inertia that joints move beyond their rotors (n,), kg m^2, the others held: the mean over poses."""
+        import mujoco
+
+        compiled, dof, at = self.compiled, self.speeds, self.positions
+        joints, data, full = compiled.dof_jntid[dof], mujoco.MjData(compiled), np.zeros((compiled.nv, compiled.nv))
+        limited = compiled.jnt_limited[joints] == 1
+        ends = np.where(limited, compiled.jnt_range[joints].T, [[-np.pi], [np.pi]])
+        found = []
+        for pose in np.random.default_rng(0).uniform(ends[0], ends[1], (_POSES, len(at))):
+            data.qpos[at] = pose
+            mujoco.mj_forward(compiled, data)
+            mujoco.mj_fullM(compiled, data, full)
+            found.append(np.diag(full)[dof] - compiled.dof_armature[dof])
+        return np.asarray(np.maximum(np.mean(found, axis=0), 1e-9))
+
+    @cached_property
+    def stiffest(self) -> np.ndarray:
+        """The stiffness (n,), N m/rad, of a joint that swings as fast as it can be played; stiffer ones are rigid."""
+        lightest = 1 / np.maximum(self.compiled.dof_armature[self.speeds], 1e-9) + 1 / np.minimum(self.free, self.links)
+        return np.asarray(_SWING / self.compiled.opt.timestep**2 / lightest)
+
+    @cached_property
     def flange(self) -> Flange:
         """The frame fixed to the last body that is farthest from its joint; its centre of mass where there is none."""
         import mujoco
@@ -84,6 +119,22 @@ class Model:
         centre = compiled.body_ipos[body]
         own = data.xmat[body].reshape(3, 3).T @ (places[np.argmax(away)] - data.xpos[body])
         return Flange(body, own if away.max() > _APART else centre.copy())
+
+    def flange_jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Return the Jacobian (N, 3, n) of the flange's place in the world at positions (N, n)."""
+        import mujoco
+
+        data, found = mujoco.MjData(self.compiled), np.empty((len(q), 3, q.shape[1]))
+        whole = np.empty((3, self.compiled.nv))
+        for row, position in enumerate(q):
+            data.qpos[self.positions] = position
+            mujoco.mj_kinematics(self.compiled, data)
+            mujoco.mj_comPos(self.compiled, data)
+            body = self.flange.body
+            point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.flange.place
+            mujoco.mj_jac(self.compiled, data, whole, None, point, body)
+            found[row] = whole[:, self.speeds]
+        return found
 
     def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the (N, n) torque, N m, that a motion (N, n) takes: bodies, armature, damping, springs, dry friction.
@@ -164,25 +215,76 @@ def joints_of(
 
 
 @dataclass(frozen=True)
-class Paired:
-    """A model with a second actuator at each of the robot's joints, idle, told the commands of the first."""
+class Variant:
+    """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
 
+    `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `soft`: places
+    among the robot's joints of those with a second joint behind the motor's, with the same axis; `behind`: its dof.
+    `of`: the model as it is.
+    """
+
+    of: Model
     compiled: mujoco.MjModel
-    second: np.ndarray  # (n,) actuators
-    joints: np.ndarray  # (n,)
+    joints: np.ndarray
+    second: np.ndarray
+    soft: np.ndarray
+    behind: np.ndarray
+
+    @property
+    def positions(self) -> np.ndarray:
+        """The motors' places in qpos (n,)."""
+        return np.asarray(self.compiled.jnt_qposadr[self.joints])
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """The motors' places in qvel (n,)."""
+        return np.asarray(self.compiled.jnt_dofadr[self.joints])
+
+    @property
+    def links(self) -> np.ndarray:
+        """The places in qpos of joints behind motors."""
+        return np.asarray(self.compiled.jnt_qposadr[self.compiled.dof_jntid[self.behind]])
+
+    def measured(self, qpos: np.ndarray, on_links: np.ndarray) -> np.ndarray:
+        """Return the positions (N, n) that are measured of all (N, nq): of links where `on_links` (n,) says so."""
+        q = qpos[:, self.positions]
+        q[:, self.soft] += qpos[:, self.links] * on_links[self.soft]
+        return q
+
+    def soften(self, one: mujoco.MjModel, compliance: np.ndarray) -> None:
+        """Give the joints behind motors the springs of compliances (n,), rad/(N m).
+
+        Dry friction keeps its law: MuJoCo's softens by the inertia at hand, and that is the rotor's alone now.
+        """
+        dof = self.speeds[self.soft]
+        rotor, link = one.dof_armature[dof], self.of.links[self.soft]
+        stiffness = 1 / compliance[self.soft]
+        one.jnt_stiffness[one.dof_jntid[self.behind]] = stiffness
+        one.dof_damping[self.behind] = 2 * DAMPED * np.sqrt(stiffness * link)
+        before = one.dof_solimp[dof, 0]
+        odds = before / (1 - before) * (self.of.free[self.soft] + rotor) / rotor
+        ends = np.minimum(np.stack([odds, odds]) / (1 + np.stack([odds, odds])), _FIRMEST)
+        one.dof_solref[dof, 0] *= one.dof_solimp[dof, 1] / ends[1]
+        one.dof_solimp[dof, :2] = ends.T
 
 
-def pair(model: Model) -> Paired:
-    """Return a model with second actuators."""
-    compiled, *_ = _compiled(model.file, model.gains, model.joints)
-    second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints]
-    return Paired(compiled, np.array(second), np.array([compiled.joint(joint).id for joint in model.joints]))
+def variant(model: Model, banded: bool, soft: Sequence[str]) -> Variant:
+    """Return a model with second actuators where dead bands are played, and with joints soft behind their motors."""
+    compiled, *_ = _compiled(model.file, model.gains, model.joints if banded else (), soft)
+    second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints] if banded else []
+    behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
+    joints = [compiled.joint(joint).id for joint in model.joints]
+    places = [model.joints.index(joint) for joint in soft]
+    at = (np.array(one, dtype=int) for one in (joints, second, places, behind))
+    return Variant(model, compiled, *at)
 
 
-def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tuple[mujoco.MjModel, np.ndarray, Gains]:
+def _compiled(
+    file: ModelFile, gains: Gains, paired: Sequence[str] = (), soft: Sequence[str] = ()
+) -> tuple[mujoco.MjModel, np.ndarray, Gains]:
     """Return the compiled model without the delays of its actuators, these, and the gains that make servos of it.
 
-    `paired`: joints with a second actuator.
+    `paired`: joints with a second actuator; `soft`: joints with a second one behind.
     """
     try:
         import mujoco
@@ -197,6 +299,8 @@ def _compiled(file: ModelFile, gains: Gains, paired: Sequence[str] = ()) -> tupl
             one.delay, one.nsample = 0.0, 0
         for joint in paired:
             _add_second(spec, joint, mujoco)
+        for joint in soft:
+            _add_behind(spec, joint)
         for joint in spec.joints:
             if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
                 spec.add_sensor(
@@ -213,6 +317,17 @@ def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:
     second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange
     second.forcelimited, second.forcerange = True, (-1.0, 1.0)
+
+
+def _add_behind(spec: mujoco.MjSpec, joint: str) -> None:
+    """Put a joint behind a motor's, about the same axis: the link turns by both, the motor by the first alone."""
+    first = spec.joint(joint)
+    second = first.parent.add_joint(name=f"{joint}{_BEHIND}", type=first.type, pos=first.pos, axis=first.axis)
+    second.limited, second.actfrclimited = False, False
+    second.armature = second.frictionloss = second.ref = second.springref = 0.0
+    second.stiffness[:], second.damping[:] = 0.0, 0.0
+    for key in list(spec.keys):  # of as many coordinates as there were
+        spec.delete(key)
 
 
 def drop_pictures(spec: mujoco.MjSpec, is_urdf: bool) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
+from irtwin.simulator.model import Model, Variant
 from irtwin.simulator.servos import NAMES, Servos
 
 if TYPE_CHECKING:
@@ -21,12 +22,34 @@ _MOST = 20_000_000  # values of states that are held at a time: 160 MB
 
 
 @dataclass(frozen=True)
+class Push:
+    """A force (3,) at the flange, N, along the world's axes, from `start` to `stop`, s of its run's clock.
+
+    It comes and goes in `rise` s.
+    """
+
+    run: str
+    force: np.ndarray
+    start: float
+    stop: float
+    rise: float = 0.1
+
+    def share(self, time: np.ndarray) -> np.ndarray:
+        """Return how much of it acts at times of its run (N,), 0 to 1."""
+        return np.asarray(np.clip(np.minimum(time - self.start, self.stop - time) / self.rise, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
 class PlayedStretch:
-    """A part of a run that is played by itself: `rows` of it, from `begin` s; it begins as the robot did there."""
+    """A part of a run that is played by itself: `rows` of it, from `begin` s; it begins as the robot did there.
+
+    `pushes`: what the model is pushed by; those of other runs are nothing to it.
+    """
 
     run: Run
     rows: slice
     begin: float
+    pushes: tuple[Push, ...] = ()
 
     @property
     def time(self) -> np.ndarray:
@@ -60,6 +83,23 @@ class PlayedStretch:
         position, speed = np.linalg.lstsq(columns, q[near], rcond=None)[0]
         return position, speed
 
+    @property
+    def is_pushed(self) -> bool:
+        """Whether the model is pushed in its run."""
+        return any(one.run == self.run.name for one in self.pushes)
+
+    def pushed(self, model: Model, begin: np.ndarray, step: float) -> np.ndarray:
+        """Return the torque (N, n) of pushes over steps that begin at times (N,), s since its beginning."""
+        found = np.zeros((len(begin), len(model.joints)))
+        for one in (push for push in self.pushes if push.run == self.run.name):
+            share = one.share(self.begin + begin + step / 2)
+            rows = np.flatnonzero(share)
+            if len(rows):
+                inside = np.abs(self.time - begin[rows].mean()) <= np.ptp(begin[rows]) / 2 + _AROUND
+                torque = one.force @ model.flange_jacobian(self.q[inside])
+                found[rows] += share[rows, None] * _at(begin[rows], self.time[inside], torque)
+        return found
+
     def commands(
         self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0
     ) -> np.ndarray:
@@ -81,19 +121,19 @@ class PlayedStretch:
         return np.asarray(found + numbers[NAMES.index("offset")])
 
 
-def whole(run: Run) -> PlayedStretch:
+def whole(run: Run, pushes: tuple[Push, ...] = ()) -> PlayedStretch:
     """Return a run as one stretch."""
-    return PlayedStretch(run, slice(None), float(run.signals.time[0]))
+    return PlayedStretch(run, slice(None), float(run.signals.time[0]), pushes)
 
 
-def each(run: Run, seconds: float, most: int) -> list[PlayedStretch]:
+def each(run: Run, seconds: float, most: int, pushes: tuple[Push, ...] = ()) -> list[PlayedStretch]:
     """Return stretches of a run that do not overlap, of `most` at most, evenly spread; at least one."""
     time = run.signals.time
     lasts = float(time[-1] - time[0])
     count = min(max(1, int(lasts / seconds)), most)
     begins = time[0] + np.maximum((np.arange(count) + 0.5) * lasts / count - seconds / 2, 0.0)
     ends = [np.searchsorted(time, [begin - 1e-9, begin + seconds - 1e-9]) for begin in begins]
-    return [PlayedStretch(run, slice(*rows), float(begin)) for rows, begin in zip(ends, begins, strict=True)]
+    return [PlayedStretch(run, slice(*rows), float(begin), pushes) for rows, begin in zip(ends, begins, strict=True)]
 
 
 def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> list[list[np.ndarray]]:
@@ -101,39 +141,55 @@ def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Play
 
     Joints that the robot lacks are told zero.
     """
-    played = _played(servos, numbers, stretches)
-    return [[next(played) for _ in stretches] for _ in numbers]
+    needed = [servos.needs(one) for one in numbers]
+    moved: list[list[np.ndarray]] = [[] for _ in numbers]
+    for needs in dict.fromkeys(needed):
+        places = [place for place, own in enumerate(needed) if own == needs]
+        played = _played(servos, servos.variant(needs), [numbers[place] for place in places], stretches)
+        for place in places:
+            moved[place] = [next(played) for _ in stretches]
+    return moved
 
 
-def _played(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> Iterator[np.ndarray]:
+def _played(
+    servos: Servos, variant: Variant, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]
+) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     import mujoco
     from mujoco.rollout import rollout
 
-    step = servos.model.compiled.opt.timestep
+    compiled = variant.compiled
+    step = compiled.opt.timestep
     steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
-    paired = any(one[NAMES.index("dead_band")].any() for one in numbers)
-    compiled = servos.paired.compiled if paired else servos.model.compiled
     size = mujoco.mj_stateSize(compiled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
-    states = [_state(servos, one, size) for one in stretches]
-    models = [servos.compiled(one, paired) for one in numbers]
-    efforts = _efforts(compiled, servos)
     pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
+    models = [servos.compiled(one, variant) for one in numbers]
+    on_links = [servos.on_links(one) for one in numbers]
+    states = {
+        (one, place): _state(servos, variant, models[one], stretches[place], size, on_links[one])
+        for one, place in pairs
+    }
+    efforts = _efforts(variant)
+    inputs = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
     at_once = max(1, _MOST // (steps * size))
     begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
     for first in range(0, len(pairs), at_once):
         some = pairs[first : first + at_once]
-        told = np.zeros((len(some), steps, compiled.nu))
+        told = np.zeros((len(some), steps, compiled.nu + compiled.nv))
         for row, (one, place) in enumerate(some):
             commands = stretches[place].commands(begin, step, numbers[one], servos.lead(numbers[one]))
-            for drives in (servos.actuators, *([servos.paired.second] if paired else [])):
+            for drives in (servos.actuators, *([variant.second] if len(variant.second) else [])):
                 told[row][:, drives] = commands
-        begun = np.array([states[at] for _, at in some])
-        found, sensed = rollout([models[one] for one, _ in some], datas, begun, told)
-        for row, (_, place) in enumerate(some):
+            if stretches[place].is_pushed:
+                torque = stretches[place].pushed(servos.model, begin, step)
+                told[row][:, compiled.nu + variant.speeds] = torque
+                told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
+        begun = np.array([states[pair] for pair in some])
+        found, sensed = rollout([models[one] for one, _ in some], datas, begun, told, control_spec=int(inputs))
+        for row, (one, place) in enumerate(some):
             time = stretches[place].time
-            q = np.vstack([begun[row], found[row]])[:, 1 + servos.model.positions]
+            q = variant.measured(np.vstack([begun[row], found[row]])[:, 1 : 1 + compiled.nq], on_links[one])
             played = [_at(time, np.concatenate([[0.0], after]), q)]
             if stretches[place].run.signals.torque is not None:
                 played.append(_at(time, begin, sensed[row][:, efforts]))
@@ -144,26 +200,39 @@ def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(time, times, each) for each in values.T])
 
 
-def _efforts(compiled: mujoco.MjModel, servos: Servos) -> np.ndarray:
+def _efforts(variant: Variant) -> np.ndarray:
     """Return where among the sensors' values are the torques of the joints' actuators (n,)."""
     import mujoco
 
+    compiled = variant.compiled
     of = {
         int(joint): int(compiled.sensor_adr[sensor])
         for sensor, joint in enumerate(compiled.sensor_objid)
         if compiled.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTACTFRC
     }
-    return np.array([of[compiled.joint(joint).id] for joint in servos.model.joints])
+    return np.array([of[int(joint)] for joint in variant.joints])
 
 
-def _state(servos: Servos, stretch: PlayedStretch, size: int) -> np.ndarray:
-    """Return the model's state: time, positions, speeds, then what its actuators remember."""
-    compiled = servos.model.compiled
+def _state(
+    servos: Servos, variant: Variant, compiled: mujoco.MjModel, stretch: PlayedStretch, size: int, on_links: np.ndarray
+) -> np.ndarray:
+    """Return the state of a variant with numbers: time, positions, speeds, then what its actuators remember.
+
+    Links hang from soft joints as in rest.
+    """
+    import mujoco
+
     state = np.zeros(size)
-    state[1 : 1 + compiled.nq] = compiled.qpos0
     position, speed = stretch.state()
-    state[1 + servos.model.positions] = position
-    state[1 + compiled.nq + servos.model.speeds] = speed
+    data = mujoco.MjData(compiled)
+    data.qpos[variant.positions], data.qvel[variant.speeds] = position, speed
+    if len(variant.behind):
+        mujoco.mj_forward(compiled, data)
+        twist = data.qfrc_bias[variant.behind] / compiled.jnt_stiffness[compiled.dof_jntid[variant.behind]]
+        data.qpos[variant.links] = -twist
+        data.qpos[variant.positions[variant.soft]] += twist * on_links[variant.soft]
+    state[1 : 1 + compiled.nq] = data.qpos
+    state[1 + compiled.nq : 1 + compiled.nq + compiled.nv] = data.qvel
     memory = compiled.actuator_actadr[servos.actuators]
     has = memory >= 0
     state[1 + compiled.nq + compiled.nv + memory[has]] = position[has]

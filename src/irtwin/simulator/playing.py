@@ -18,7 +18,8 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import DifferingNumbers, choose
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
-from irtwin.simulator.play import PlayedStretch, each, play
+from irtwin.simulator.play import PlayedStretch, Push, each, play
+from irtwin.simulator.push import FoundPush, find_pushes
 from irtwin.simulator.refined import refined
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
@@ -81,21 +82,42 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     if _falls(own, stretches):
         stretches = _stretches(runs, _BRIEF)
     step = max(_STEP, model.compiled.opt.timestep)
-    chosen = choose(unjudged(alone(own, stretches, step)))
+    chosen, pushes = _chosen(own, stretches, step)
     if chosen.differs[NAMES.index("torque_limit")].any():  # where one is reached, an arm gives way as a whole
         chosen = refined(chosen)
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
-    after = tracked(data_set.robot, own, runs, numbers)
+    after = tracked(data_set.robot, own, runs, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
-    closed = parts(chosen, numbers, writing.families(differing))
-    horizons = restarted(own, runs, numbers)
+    named = {f"{writing.PUSH} {place}": one for place, one in enumerate(pushes)}
+    families = writing.families([*differing, *named])
+    closed = parts(chosen, numbers, families, {name: one.push for name, one in named.items()})
+    horizons = restarted(own, runs, numbers, _of(pushes))
     return Playing(
-        writing.document(data_set.robot, model.name, names, chosen, closed, before, after, horizons),
+        writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
         writing.curves(data_set.robot, names, before, after),
         chosen,
     )
+
+
+def _chosen(
+    own: Servos, stretches: Sequence[PlayedStretch], step: float
+) -> tuple[DifferingNumbers, tuple[FoundPush, ...]]:
+    """Return the numbers that differ, and pushes: numbers are chosen anew beside these, and these beside numbers."""
+    chosen = choose(unjudged(alone(own, stretches, step)))
+    found = find_pushes(chosen)
+    if not found:
+        return chosen, ()
+    tell("Fitting numbers of servos beside what pushed the flange")
+    beside = choose(unjudged(alone(own, [replace(one, pushes=_of(found)) for one in stretches], step)))
+    bare = replace(beside.fit, alone=replace(beside.fit.alone, stretches=tuple(stretches)), known={})
+    again = find_pushes(replace(beside, fit=bare))
+    return (beside, again) if again else (chosen, ())
+
+
+def _of(found: Sequence[FoundPush]) -> tuple[Push, ...]:
+    return tuple(one.push for one in found)
 
 
 def _stretches(runs: Sequence[Run], lasts: float) -> list[PlayedStretch]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,16 @@ import scipy
 
 from irtwin.errors import InputError
 from irtwin.robot.xml_elements import Element
-from irtwin.simulator.model import Model, Paired, pair
+from irtwin.simulator.model import Model, Variant, variant
 from irtwin.simulator.payload import load, loaded_tag
 
 if TYPE_CHECKING:
     import mujoco
 
-OF_JOINTS = ("stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band")
+OF_JOINTS = (
+    "stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band",
+    "spring", "compliance", "link_compliance",
+)  # fmt: skip
 PARTS = {"payload": ("payload", "payload_x", "payload_y", "payload_z"), "base_tilt": ("tilt_x", "tilt_y")}
 OF_ROBOT = tuple(name for names in PARTS.values() for name in names)  # the same at all joints
 NAMES = (*OF_JOINTS, *OF_ROBOT)
@@ -32,6 +35,7 @@ CALLED = {  # by what a model's file calls it, and MuJoCo's specification
     "offset": "offset",
     "delay": "delay",
     "torque_limit": "forcerange",
+    "spring": "stiffness",
     "payload": "inertial",
     "base_tilt": "gravity",
 }
@@ -42,6 +46,8 @@ HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more:
 # times inertia, s^-2, s^-1, s^-2, 1, s^-2
 _NEAR_ZERO = {"stiffness": 0.01, "damping": 0.1, "friction": 0.1, "armature": 0.01, "torque_limit": 0.01}
 _LIGHT = 0.01  # of the arm's mass: a payload near zero
+_SPRING, _SOFT = OF_JOINTS.index("spring"), [OF_JOINTS.index("compliance"), OF_JOINTS.index("link_compliance")]
+_SOFTEST = 2.0  # of the square of the frequency with which an arm swings on its servo, over that on the joint
 
 
 @dataclass(frozen=True)
@@ -50,32 +56,56 @@ class Servos:
 
     stiffness N m/rad; damping N m s/rad, of servo and joint together; friction N m; holding: the impedance of that
     friction, 0 to 1; armature kg m^2; offset rad, added to a command; delay s; torque_limit N m, the most of the servo;
-    dead_band rad, how far a joint is off before its servo pulls; payload kg, the same in
-    all columns, as where it is: payload_x, payload_y, payload_z m from the flange, in the frame of its body; and
-    as tilt_x, tilt_y rad, by which gravity is turned about the world's axes. N and m where a joint slides.
+    dead_band rad, how far a joint is off before its servo pulls; spring N m/rad, between a joint and where the model
+    has it at rest; compliance rad/(N m), of what is between a motor, where the position is measured, and its link, and
+    link_compliance, where that of the link is; payload kg, the same in all columns, as where it is: payload_x,
+    payload_y, payload_z m from the flange, in the frame of its body; and as tilt_x, tilt_y rad, by which gravity is
+    turned about the world's axes. N and m where a joint slides.
     """
 
     model: Model
     actuators: np.ndarray  # (n,)
     numbers: np.ndarray  # (k, n), the model's own
     scale: np.ndarray  # (k, n), below which a number is as good as zero
+    variants: dict[tuple[bool, tuple[str, ...]], Variant] = field(default_factory=dict)
 
     def chart(self, numbers: np.ndarray) -> np.ndarray:
-        """Return numbers (..., k, n) in coordinates in which equal steps matter alike: logarithms, but near zero."""
-        return np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
+        """Return numbers (..., k, n) in coordinates in which equal steps matter alike: logarithms, but near zero.
+
+        A spring is held to the servo's stiffness, a compliance to one with which link and servo swing alike.
+        """
+        found = np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
+        stiffness = numbers[..., 0, :]
+        found[..., _SPRING, :] = (numbers[..., _SPRING, :] - self.numbers[_SPRING]) / stiffness
+        found[..., _SOFT, :] = numbers[..., _SOFT, :] * (stiffness * self._of_links)[..., None, :]
+        return found
 
     def of_chart(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the numbers of coordinates (..., k, n); those that cannot be below zero are not."""
         free = np.isnan(self.scale)
-        free[[NAMES.index("delay"), NAMES.index("dead_band")]] = False
+        free[[NAMES.index("delay"), NAMES.index("dead_band"), *_SOFT]] = False
         held = np.where(free, coordinates, np.maximum(coordinates, 0.0))
-        return np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
+        found = np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
+        stiffness = found[..., 0, :]
+        found[..., _SPRING, :] = np.maximum(self.numbers[_SPRING] + held[..., _SPRING, :] * stiffness, 0.0)
+        softest = np.minimum(held[..., _SOFT, :], _SOFTEST)
+        found[..., _SOFT, :] = softest / (stiffness * self._of_links)[..., None, :]
+        return found
+
+    @property
+    def _of_links(self) -> np.ndarray:
+        """How much of the inertia that each servo moves (n,) is the link's."""
+        return np.asarray(self.model.links / (self.model.links + self.numbers[NAMES.index("armature")]))
 
     @cached_property
     def can_differ(self) -> np.ndarray:
-        """Whether numbers (k, n) of joints can be others: a servo whose commands are filtered has no dead band."""
+        """Whether numbers (k, n) of joints can be others.
+
+        A servo whose commands are filtered has no dead band, and a joint without a rotor is not soft behind it.
+        """
         found = np.repeat(np.isin(NAMES, OF_JOINTS)[:, None], self.numbers.shape[1], axis=1)
         found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
+        found[_SOFT] = self.numbers[NAMES.index("armature")] > 0
         return found
 
     @cached_property
@@ -93,10 +123,27 @@ class Servos:
         """Return how many s (n,) of a commanded speed controllers of told gains add to a commanded position."""
         return np.where(self.in_file, 0.0, self.dampings(numbers[1])[1] / numbers[0])
 
-    @cached_property
-    def paired(self) -> Paired:
-        """The model with a second actuator beside each servo, which takes from its pull what a dead band does."""
-        return pair(self.model)
+    def needs(self, numbers: np.ndarray) -> tuple[bool, tuple[str, ...]]:
+        """Return what of a variant of the model numbers (k, n) need: whether dead bands, and soft joints."""
+        soft = self.compliance(numbers) * self.model.stiffest > 1
+        banded = bool(numbers[NAMES.index("dead_band")].any())
+        return banded, tuple(name for name, is_soft in zip(self.model.joints, soft, strict=True) if is_soft)
+
+    @staticmethod
+    def compliance(numbers: np.ndarray) -> np.ndarray:
+        """Return how soft joints are (n,), rad/(N m), wherever their positions are measured."""
+        return np.asarray(numbers[_SOFT].sum(axis=0))
+
+    @staticmethod
+    def on_links(numbers: np.ndarray) -> np.ndarray:
+        """Return whether positions of joints (n,) are measured at their links."""
+        return np.asarray(numbers[_SOFT[1]] > 0)
+
+    def variant(self, needs: tuple[bool, tuple[str, ...]]) -> Variant:
+        """Return the model with dead bands, and soft joints, that numbers need."""
+        if needs not in self.variants:
+            self.variants[needs] = variant(self.model, *needs)
+        return self.variants[needs]
 
     def limits(self, torque_limit: np.ndarray) -> np.ndarray:
         """Return the least and most torque (2, ..., n) of servos: the model's, where the limit (..., n) is."""
@@ -105,36 +152,34 @@ class Servos:
         changed = torque_limit != self.numbers[NAMES.index("torque_limit")]
         return np.array([np.where(changed, side * torque_limit, end) for side, end in zip((-1, 1), own, strict=True)])
 
-    def compiled(self, numbers: np.ndarray, paired: bool) -> mujoco.MjModel:
-        """Return the compiled model with numbers (k, n) of its own; offset and delay are the commands' to have.
-
-        A dead band needs the model that is `paired`.
-        """
+    def compiled(self, numbers: np.ndarray, of: Variant) -> mujoco.MjModel:
+        """Return a variant of the model with numbers (k, n) of its own; offset and delay are the commands' to have."""
         import mujoco
 
-        one = copy.copy(self.paired.compiled if paired else self.model.compiled)
-        at, dof = self.actuators, self.model.speeds
-        stiffness, damping, friction, holding, armature, _, _, limit, band = numbers[: len(OF_JOINTS)]
+        one = copy.copy(of.compiled)
+        at, dof = self.actuators, of.speeds
+        stiffness, damping, friction, holding, armature, _, _, limit, band, spring, *_ = numbers[: len(OF_JOINTS)]
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if mass:
             load(one, self.model.flange, float(mass), np.array(off[:3]))
         one.opt.gravity = tilted(one, off[3:])
         ends = self.limits(limit)
-        if paired:
-            second, joints = self.paired.second, self.paired.joints
-            one.actuator_gainprm[second, 0], one.actuator_biasprm[second, 1] = -stiffness, stiffness
-            one.actuator_forcerange[second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
+        if len(of.second):
+            one.actuator_gainprm[of.second, 0], one.actuator_biasprm[of.second, 1] = -stiffness, stiffness
+            one.actuator_forcerange[of.second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
             one.actuator_forcelimited[at] = 0
-            one.jnt_actfrclimited[joints], one.jnt_actfrcrange[joints] = 1, ends.T
+            one.jnt_actfrclimited[of.joints], one.jnt_actfrcrange[of.joints] = 1, ends.T
         else:
             one.actuator_forcelimited[at], one.actuator_forcerange[at] = 1, ends.T
         in_joint, in_servo = self.dampings(damping)
         one.actuator_gainprm[at, 0], one.actuator_biasprm[at, 1] = stiffness, -stiffness
         one.actuator_biasprm[at, 0], one.actuator_biasprm[at, 2] = 0.0, -in_servo
         one.dof_damping[dof], one.dof_frictionloss[dof], one.dof_armature[dof] = in_joint, friction, armature
+        one.jnt_stiffness[of.joints] = spring
         changed = holding != self.numbers[NAMES.index("holding")]
         one.dof_solimp[dof, 0] = holding
         one.dof_solimp[dof, 1] = np.where(changed, holding, one.dof_solimp[dof, 1])
+        of.soften(one, self.compliance(numbers))
         mujoco.mj_setConst(one, mujoco.MjData(one))
         return one
 
@@ -160,7 +205,7 @@ class Servos:
             of_joint: dict[str, float | str | None] = {}
             if own["damping"] and in_joint[place] != self.dampings(self.numbers[1])[0][place]:
                 of_joint["damping"] = float(in_joint[place])
-            of_joint |= {CALLED[name]: told[name] for name in ("friction", "armature") if own[name]}
+            of_joint |= {CALLED[name]: told[name] for name in ("friction", "armature", "spring") if own[name]}
             if own["holding"]:
                 of_joint["solimpfriction"] = f"{told['holding']!r} {told['holding']!r}"
             for key in of_joint:
@@ -258,7 +303,9 @@ def servos(model: Model) -> Servos:
             np.where(
                 compiled.actuator_forcelimited[at] == 1, compiled.actuator_forcerange[at, 1], _FARTHEST * stiffness
             ),
-            np.zeros((1 + len(OF_ROBOT), len(at))),
+            np.zeros(len(at)),
+            compiled.jnt_stiffness[compiled.dof_jntid[dof]],
+            np.zeros((len(_SOFT) + len(OF_ROBOT), len(at))),
         ]
     )
     data = mujoco.MjData(compiled)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import factorial
 
@@ -14,7 +14,7 @@ from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
 from irtwin.simulator.choice import DifferingNumbers
-from irtwin.simulator.play import PlayedStretch, each, play, whole
+from irtwin.simulator.play import PlayedStretch, Push, each, play, whole
 from irtwin.simulator.servos import NAMES, Servos, part_of
 
 _FOLDS = 3
@@ -99,11 +99,13 @@ def held_out(chosen: DifferingNumbers, runs: Sequence[Run]) -> OfRun:
     return found
 
 
-def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[Tracked]:
-    """Play runs as a whole, each with its numbers."""
+def tracked(
+    robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun, pushes: tuple[Push, ...] = ()
+) -> list[Tracked]:
+    """Play runs as a whole, each with its numbers and pushes."""
     found = []
     for run in track(runs, lambda one: f"playing {one.name}"):
-        every = whole(run)
+        every = whole(run, pushes)
         left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
         some = slice(None, None, max(1, len(left) // _POSES))
         poses = every.q[some], (every.q - left[:, 0])[some]
@@ -113,14 +115,21 @@ def tracked(robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun) -> l
     return found
 
 
-def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[float, float, float]]:
-    """Return horizons, s, with the tracking error from the one before: of the model, and with the numbers of runs."""
+def restarted(
+    own: Servos, runs: Sequence[Run], numbers: OfRun, pushes: tuple[Push, ...] = ()
+) -> list[tuple[float, float, float]]:
+    """Return horizons, s, with the tracking error from the one before: of the model, and with the numbers of runs.
+
+    The latter with the pushes.
+    """
     left: list[list[np.ndarray]] = [[], []]
     times = []
     for run in track(runs, lambda one: f"{one.name} played again and again from where the robot is"):
         stretches = each(run, _BEGUN_ANEW, _MOST)
         times += [one.time for one in stretches]
-        for way, played in enumerate(play(own, [own.numbers, numbers[run.name]], stretches)):
+        pushed = each(run, _BEGUN_ANEW, _MOST, pushes)
+        for way, (with_, some) in enumerate(((own.numbers, stretches), (numbers[run.name], pushed))):
+            played = play(own, [with_], some)[0]
             left[way] += [(one.q - moved[:, 0]) ** 2 for one, moved in zip(stretches, played, strict=True)]
     time = np.concatenate(times)
     squares = [np.concatenate(way).mean(axis=1) for way in left]
@@ -133,8 +142,13 @@ def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun) -> list[tuple[fl
     return found
 
 
-def parts(chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[str]]) -> Parts:
-    """Play the stretches with each name's numbers alone, with all but them, and with those of any families."""
+def parts(
+    chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[str]], pushes: Mapping[str, Push]
+) -> Parts:
+    """Play the stretches with each name's numbers alone, with all but them, and with those of any families.
+
+    `pushes`: by their names, which are among those of families.
+    """
     names = tuple(name for family in families for name in family)
     sets = {frozenset[str](), frozenset(names)}
     sets |= {one for name in names for one in (frozenset([name]), frozenset(names) - {name})}
@@ -148,8 +162,13 @@ def parts(chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[
     for same in track(_alike(stretches, numbers), "what each number closes in runs"):
         some = [stretches[place] for place in same]
         own = chosen.fit.servos.numbers
-        each_set = [np.where(_rows(one), numbers[some[0].run.name], own) for one in wanted]
-        rows += list(zip(same, np.moveaxis(_squares(chosen.fit.servos, each_set, some), 1, 0), strict=True))
+        found = []
+        for one in wanted:
+            those = tuple(push for name, push in pushes.items() if name in one)
+            pushed = [replace(stretch, pushes=those) for stretch in some]
+            each_set = np.where(_rows(one), numbers[some[0].run.name], own)
+            found.append(_squares(chosen.fit.servos, each_set, pushed))
+        rows += list(zip(same, np.moveaxis(np.array(found), 1, 0), strict=True))
     squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, c, n)
     runs = [one.run.name for one in stretches]
     group = [runs.index(name) for name in runs] if len(set(runs)) > 1 else list(range(len(runs)))
@@ -171,9 +190,6 @@ def _rows(names: frozenset[str]) -> np.ndarray:
     return np.array([part_of(name) in names for name in NAMES])[:, None]
 
 
-def _squares(own: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> np.ndarray:
-    played = play(own, numbers, stretches)
-    return np.array([
-        [((one.measured - moved) ** 2).mean(axis=0) for one, moved in zip(stretches, way, strict=True)]
-        for way in played
-    ])  # fmt: skip
+def _squares(own: Servos, numbers: np.ndarray, stretches: Sequence[PlayedStretch]) -> np.ndarray:
+    played = play(own, [numbers], stretches)[0]
+    return np.array([((one.measured - moved) ** 2).mean(axis=0) for one, moved in zip(stretches, played, strict=True)])

@@ -13,11 +13,14 @@ from irtwin.document import document as said
 from irtwin.document.curves import Curves, FarthestApart, RunError
 from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
+from irtwin.effects.compliance import JointElasticity
+from irtwin.effects.load import CableDrag, ExternalContact
 from irtwin.gap.isolation.closing import share
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
 from irtwin.robot.description import Robot
 from irtwin.simulator.choice import DifferingNumbers
+from irtwin.simulator.push import FoundPush
 from irtwin.simulator.servos import OF_JOINTS, PARTS, row_of
 from irtwin.simulator.tracking import Parts, Tracked
 
@@ -25,6 +28,9 @@ AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differ
 _NONE = 1e-9  # as good as none of what the model leaves
 _ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
 _NOT_HELD = "dead_band"  # no number of MuJoCo's servos
+_COMPLIANCES = ("compliance", "link_compliance")
+_CALLED = {"spring": "k"}  # by its effect
+PUSH = "push"  # of a robot for a while; with its place
 _SYMBOLS = {
     "payload": ("m", "kg"),
     **{f"payload_{axis}": (f"c_{axis}", "m") for axis in "xyz"},
@@ -33,6 +39,7 @@ _SYMBOLS = {
 _SHARE_OF = ("the mean square of the tracking error", "the mean squares of the tracking error and of the torque's")
 
 Horizons = Sequence[tuple[float, float, float]]
+Pushes = Mapping[str, FoundPush]
 
 
 @cache
@@ -49,15 +56,22 @@ def effects() -> Mapping[str, tuple[str, str, str, str]]:
         "delay": ("command_delay", "sensing", "s", "s"),
         "torque_limit": ("servo_torque_limit", "drive", "N m", "N"),
         "dead_band": ("servo_dead_band", "drive", "rad", "m"),
+        "spring": (CableDrag.id, CableDrag.family, "N m/rad", "N/m"),
+        **dict.fromkeys(_COMPLIANCES, (JointElasticity.id, JointElasticity.family, "N m/rad", "N/m")),
+        PUSH: (ExternalContact.id, ExternalContact.family, "", ""),
         **{part: (part, catalogue()[part].family, "", "") for part in PARTS},
     }
+
+
+def _told(name: str) -> tuple[str, str, str, str]:
+    return effects()[PUSH if name.startswith(PUSH) else name]
 
 
 def families(names: Sequence[str]) -> list[tuple[str, ...]]:
     """Return names by their families, in their order."""
     of: dict[str, list[str]] = {}
     for name in names:
-        of.setdefault(effects()[name][1], []).append(name)
+        of.setdefault(_told(name)[1], []).append(name)
     return [tuple(some) for some in of.values()]
 
 
@@ -66,6 +80,7 @@ def document(
     simulator: str,
     runs: Sequence[str],
     chosen: DifferingNumbers,
+    pushes: Pushes,
     parts: Parts,
     before: Sequence[Tracked],
     after: Sequence[Tracked],
@@ -74,7 +89,7 @@ def document(
     """Return the document; `before`, `after`: each run played as a whole, by the model and by numbers of other runs."""
     squares = [np.array([one.squares for one in some]) for some in (before, after)]
     names = sorted(parts.names, key=lambda name: -parts.relative(parts.without(name)).sum())
-    causes = _causes(robot, chosen, parts, names)
+    causes = _causes(robot, chosen, pushes, parts, names)
     findings = _findings(robot, dict(zip(names, causes, strict=True)), parts, chosen.fit.floor)
     named = any(finding.matters for finding in findings)
     places, torques = [one[:, 0] for one in squares], [one[:, 1:] for one in squares]
@@ -170,30 +185,34 @@ def together(before: np.ndarray, after: np.ndarray) -> said.Change:
     )
 
 
-def _causes(robot: Robot, chosen: DifferingNumbers, parts: Parts, names: Sequence[str]) -> tuple[said.Cause, ...]:
-    rows = [row_of(name) for name in names]
+def _causes(
+    robot: Robot, chosen: DifferingNumbers, pushes: Pushes, parts: Parts, names: Sequence[str]
+) -> tuple[said.Cause, ...]:
     joints = [
-        [robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row])] if name in OF_JOINTS else []
-        for row, name in zip(rows, names, strict=True)
+        [robot.joint_names[at] for at in np.flatnonzero(chosen.differs[row_of(name)])] if name in OF_JOINTS else []
+        for name in names
     ]
-    ids = cause_ids([(effects()[name][0], on) for name, on in zip(names, joints, strict=True)], robot.joint_names)
+    ids = cause_ids([(_told(name)[0], on) for name, on in zip(names, joints, strict=True)], robot.joint_names)
+    odds = [pushes[name].odds if name in pushes else float(chosen.odds[row_of(name)].max()) for name in names]
     return tuple(
         said.Cause(
             id=one,
-            effect=effects()[name][0],
+            effect=_told(name)[0],
             joints=tuple(on),
             scope="changed",
-            confidence=float((1 - DEFAULT.criterion.unknown) * scipy.special.expit(chosen.odds[row].max())),
-            parameters=tuple(_parameters(robot, chosen, name)),
+            confidence=float((1 - DEFAULT.criterion.unknown) * scipy.special.expit(sure)),
+            parameters=tuple(_of_push(pushes[name]) if name in pushes else _parameters(robot, chosen, name)),
             indistinguishable_from=(),
-            evidence=_evidence(chosen, parts, name),
+            evidence=_evidence(chosen, pushes.get(name), parts, name, sure),
         )
-        for one, name, row, on in zip(ids, names, rows, joints, strict=True)
+        for one, name, on, sure in zip(ids, names, joints, odds, strict=True)
     )
 
 
-def _evidence(chosen: DifferingNumbers, parts: Parts, name: str) -> said.Evidence:
-    at = chosen.differs[row_of(name)]
+def _evidence(
+    chosen: DifferingNumbers, push: FoundPush | None, parts: Parts, name: str, log_odds: float
+) -> said.Evidence:
+    at = np.ones(chosen.differs.shape[1], dtype=bool) if push else chosen.differs[row_of(name)]
     everywhere, left = (float(parts.relative(some).sum()) for some in (parts.without(name), parts.after))
     without, after = (float(parts.relative(some * at).sum()) for some in (parts.without(name), parts.after))
     return said.Evidence(
@@ -201,9 +220,19 @@ def _evidence(chosen: DifferingNumbers, parts: Parts, name: str) -> said.Evidenc
         share_of_what_is_closed=None,
         closed_where_it_acts=1 - after / max(without, _NONE),
         gain=everywhere / max(left, _NONE) - 1,
-        log_odds=float(chosen.odds[row_of(name)].max()),
+        log_odds=log_odds,
         probability_of_rivals={},
+        runs=(push.push.run,) if push else None,
+        window=(push.push.start, push.push.stop) if push else None,
     )
+
+
+def _of_push(push: FoundPush) -> Iterator[said.CauseParameter]:
+    for name, unit, value, half in push.numbers:
+        ends = (value - half, value + half)
+        yield said.CauseParameter(
+            name=name, joint=None, value=value, unit=unit, interval95=ends, simulator=None, robot=None
+        )
 
 
 def _parameters(robot: Robot, chosen: DifferingNumbers, name: str) -> Iterator[said.CauseParameter]:
@@ -212,10 +241,11 @@ def _parameters(robot: Robot, chosen: DifferingNumbers, name: str) -> Iterator[s
             symbol, unit = _SYMBOLS[each]
             yield replace(_parameter(chosen, each, 0, None, unit), name=symbol)
         return
-    _, _, turning, sliding = effects()[name]
+    _, _, turning, sliding = _told(name)
     for place in np.flatnonzero(chosen.differs[row_of(name)]):
         unit = turning if robot.joints[place].unit == "rad" else sliding
-        yield _parameter(chosen, name, int(place), robot.joint_names[place], unit)
+        own = _parameter(chosen, name, int(place), robot.joint_names[place], unit)
+        yield _as_stiffness(own) if name in _COMPLIANCES else replace(own, name=_CALLED.get(name, name))
 
 
 def _parameter(chosen: DifferingNumbers, name: str, place: int, joint: str | None, unit: str) -> said.CauseParameter:
@@ -232,6 +262,13 @@ def _parameter(chosen: DifferingNumbers, name: str, place: int, joint: str | Non
         simulator=simulator if held else None,
         robot=robots if held else None,
     )
+
+
+def _as_stiffness(own: said.CauseParameter) -> said.CauseParameter:
+    """Return a compliance as the stiffness of a joint that the model has rigid."""
+    ends = own.interval95
+    held = (1 / ends[1], 1 / ends[0]) if ends and ends[0] > 0 else None
+    return replace(own, name="K", value=1 / own.value, interval95=held, simulator=None, robot=None)
 
 
 def _change(cause: said.Cause, name: str, parts: Parts) -> said.CauseChange:
@@ -263,7 +300,7 @@ def _findings(
         own = [cause for name, cause in causes.items() if name in some]
         closed = parts.closed(some, of)
         value, interval = share(parts.relative(closed), whole)
-        family = effects()[some[0]][1]
+        family = _told(some[0])[1]
         on = tuple(joint for joint in robot.joint_names if any(joint in cause.joints for cause in own))
         found.append(
             said.Finding(
