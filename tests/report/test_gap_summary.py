@@ -27,6 +27,7 @@ def test_the_filter_is_said_where_it_is_known():
 
 def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
     said = gap_cases.diagnosis("attributed")
+    said["causes"][0]["parameters"][0]["name"] = "dead_band"
     both = [2.1e-3, 2.1e-3], [3e-4, 3e-4]
     said["shrink"]["by_cause"][0] |= {"channel": "position", "rmse_when_left_out": both[0], "rmse_with_all": both[1]}
     document = Document.from_json(said)

@@ -16,9 +16,10 @@ import scipy
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
 from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Fit, Played, Slopes, StepEquations, marginal
-from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS, SOFT
 
 _HOLDING = NAMES.index("holding")
+_APART = np.isin(np.arange(len(NAMES)), (_HOLDING, *SOFT))[:, None]  # tried by themselves
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
 _PARTS = tuple(np.isin(NAMES, names)[:, None] for names in PARTS.values())
 _SHOWS = 1.0  # natural logarithm of odds that one step of a payload or a tilt gains where there is one
@@ -192,9 +193,12 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played, np.ndarray]:
-    """Return numbers to begin with where one more of each joint is to be fitted, and which differ then."""
-    more = differs.copy()
-    more[row] |= fit.servos.can_differ[row]
+    """Return numbers to begin with where one more of each joint is to be fitted, and which differ then.
+
+    A soft joint has nothing else: beside other numbers it could be anything.
+    """
+    more, taken = differs.copy(), differs if row in SOFT else differs[list(SOFT)]
+    more[row] |= fit.servos.can_differ[row] & ~taken.any(axis=0)
     begins = [best]
     for value in _BEGINS.get(NAMES[row], ()):
         at = best.at.copy()
@@ -252,9 +256,8 @@ def _judged(fit: Fit, best: Played, own: Played) -> Fit:
 
 
 def _free(fit: Fit) -> np.ndarray:
-    found = fit.servos.can_differ.copy()
-    found[_HOLDING] = False
-    return found
+    """Return the numbers (k, n) that are fitted at once; a soft joint beside many others could be anything."""
+    return np.asarray(fit.servos.can_differ & ~_APART)
 
 
 def certainty(best: Played) -> np.ndarray:

@@ -16,8 +16,12 @@ Key = tuple[str, str, str]  # effect, joint, name of a parameter
 
 
 def not_held(document: Document) -> tuple[Cause, ...]:
-    """Return the likely causes that numbers of the simulator's model cannot hold, or not all of."""
-    return tuple(cause for cause in _likely(document) if any(one.simulator is None for one in cause.parameters))
+    """Return the likely causes that numbers of the simulator's model cannot hold, or not all of.
+
+    What was there in some runs alone is nothing that a model is to hold.
+    """
+    lasting = (cause for cause in _likely(document) if not cause.evidence.runs)
+    return tuple(cause for cause in lasting if any(one.simulator is None for one in cause.parameters))
 
 
 def written(model: Model, document: Document, off: Mapping[Key, float] | None = None) -> bytes:

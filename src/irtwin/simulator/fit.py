@@ -13,7 +13,7 @@ from irtwin.identification.progress import tell_step
 from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
 from irtwin.simulator.play import PlayedStretch, play
-from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, Servos
+from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, SOFT, Servos
 
 _HOLDING = NAMES.index("holding")
 SMOOTH = tuple(NAMES.index(name) for name in OF_JOINTS if name != "holding")  # rows of joints that least squares finds
@@ -324,7 +324,7 @@ class Fit:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
         own, grids = self.servos.numbers, []
         free = self.servos.can_differ.copy()
-        free[[NAMES.index("stiffness"), NAMES.index("holding")]] = False
+        free[[NAMES.index("stiffness"), NAMES.index("holding"), *SOFT]] = False
         for times in _TIMES:
             stiffness = own[0] * times
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]

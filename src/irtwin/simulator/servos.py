@@ -46,7 +46,8 @@ HOLDS = 0.9999  # impedance of friction that lets a joint at rest creep no more:
 # times inertia, s^-2, s^-1, s^-2, 1, s^-2
 _NEAR_ZERO = {"stiffness": 0.01, "damping": 0.1, "friction": 0.1, "armature": 0.01, "torque_limit": 0.01}
 _LIGHT = 0.01  # of the arm's mass: a payload near zero
-_SPRING, _SOFT = OF_JOINTS.index("spring"), [OF_JOINTS.index("compliance"), OF_JOINTS.index("link_compliance")]
+SOFT = (OF_JOINTS.index("compliance"), OF_JOINTS.index("link_compliance"))
+_SPRING, _SOFT = OF_JOINTS.index("spring"), list(SOFT)
 _SOFTEST = 2.0  # of the square of the frequency with which an arm swings on its servo, over that on the joint
 
 

@@ -12,12 +12,13 @@ from irtwin.report.gap.verdict import closes, differing, misses, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
+_CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
 _STEPS = 3  # motions to log that are told
 
 
 def line(diagnosis: Document, against: str | None) -> str:
     """Return in one line what the page says first; `against`: role of the runs compared with, if any."""
-    told = [_told(one, against) for one in diagnosis.findings]
+    told = [_told(one, against, diagnosis.causes) for one in diagnosis.findings]
     place = next(iter(diagnosis.locations), None)
     closed, tracking = diagnosis.shrink.closed_fraction, diagnosis.shrink.position_rmse
     sentence = findings.sentence(
@@ -43,7 +44,8 @@ def line(diagnosis: Document, against: str | None) -> str:
     return f"{diagnosis.verdict}: {sentence}{numbers}{look}".replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _told(one: Finding, against: str | None) -> findings.ToldFinding:
+def _told(one: Finding, against: str | None, causes: Sequence[Cause]) -> findings.ToldFinding:
+    runs = {cause.id: f" in {listed(cause.evidence.runs)}" for cause in causes if cause.evidence.runs}
     members = [[member for member in one.members if member.cause == cause] for cause in one.causes]
     return findings.ToldFinding(
         family=one.family,
@@ -55,7 +57,10 @@ def _told(one: Finding, against: str | None) -> findings.ToldFinding:
         interval=one.share_interval95,
         of=one.share_of,
         matters=one.matters,
-        members=tuple(tuple((_words(each.effect), each.confidence) for each in some) for some in members),
+        members=tuple(
+            tuple((_words(each.effect) + runs.get(each.cause, ""), each.confidence) for each in some)
+            for some in members
+        ),
     )
 
 
@@ -137,7 +142,7 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
         name = _words(cause.effect)
         first: Row = {
             "cause": name if cause.likely else f"perhaps {name}",
-            "joints": ", ".join(cause.joints) or "whole robot",
+            "joints": ", ".join((*(cause.joints or ("whole robot",)), *(cause.evidence.runs or ()))),
             "sure, %": round(100 * cause.confidence),
         }
         nothing = dict.fromkeys(("parameter", "simulator", "robot", "value", "95 % from", "to", "unit"))
@@ -168,10 +173,11 @@ def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:
 
 def _kept(cause: Cause, diagnosis: Document) -> str:
     """Return what a model leaves of its tracking error that has all numbers of the robot but a cause's."""
+    by = "irtwin.simulator.callback" if any(one.name == _CALLED_BACK for one in cause.parameters) else "it"
     for change in diagnosis.shrink.by_cause:
         if change.cause == cause.id and change.channel == "position":
             left, all_ = (1e3 * pooled(some) for some in (change.rmse_when_left_out, change.rmse_with_all))
-            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with irtwin.simulator.callback"
+            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with {by}"
     return ""
 
 
