@@ -72,7 +72,7 @@ class ToldFinding:
         beside = f", and {guesses} less likely" if guesses else ""
         as_sure = all(wording.share(chance) == wording.share(self.confidence) for some in told for _, chance in some)
         names = [" or ".join(name if as_sure else _with(name, chance) for name, chance in some) for some in told]
-        return wording.listed(names) + beside
+        return wording.listed(list(dict.fromkeys(names))) + beside
 
     @property
     def sentence(self) -> str:
