@@ -59,6 +59,14 @@ def test_nothing_pushes_where_nothing_is_left(arm):
     assert find_pushes(choose(unjudged(alone(own, [whole(run) for run in runs], 0.01)))) == ()
 
 
+@pytest.mark.parametrize(("seconds", "rate"), [(0.45, 50.0), (4.0, 5.0)])
+def test_nothing_is_sought_where_a_run_is_too_short_or_too_coarse(tmp_path, seconds, rate):
+    told = {"a": servo_arm.swings(1.0 + seconds, 1, rate), "b": servo_arm.swings(1.0 + seconds, 2, rate)}
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, told, rate=rate))
+    runs = servo_arm.played(data_set, own, own.numbers).runs
+    assert find_pushes(choose(unjudged(alone(own, [whole(run) for run in runs], 0.01)))) == ()
+
+
 def test_what_a_load_leaves_all_the_time_is_no_push_of_a_part(arm):
     data_set, _, own = arm
     laden = servo_arm.played(data_set, own, servo_arm.changed(own, payload=(0.1, 0.1)))

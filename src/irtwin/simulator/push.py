@@ -88,13 +88,16 @@ def _likeliest(fit: Fit, best: Played) -> tuple[int, Push] | None:
     torques = [_left(fit, one, left[:, 0], numbers) for one, left in zip(fit.stretches, best.remainders, strict=True)]
     every = np.concatenate(torques)
     noise = np.maximum(1.4826 * np.median(np.abs(every), axis=0), 1e-3 * np.abs(every).max(axis=0) + 1e-9)
-    gains = []
+    best_gain, found = float(np.log(len(every) ** 2)), None
     for place, (stretch, torque) in enumerate(zip(fit.stretches, torques, strict=True)):
+        if len(torque) < _SHORTEST:
+            continue
         gain, begin, stop, force = _window(_jacobian(fit, stretch, len(torque)), torque / noise, noise)
-        start = stretch.begin + stretch.time[-1] - (len(torque) - np.array([begin, stop])) * _BIN
-        gains.append((gain, place, Push(stretch.run.name, force, *start.tolist())))
-    gain, place, push = max(gains, key=lambda one: one[0])
-    return (place, push) if gain > np.log(len(every) ** 2) else None
+        if gain > best_gain:
+            lasts = _samples(interval(stretch.time), _BIN) * interval(stretch.time)
+            start = stretch.begin + stretch.time[-1] - (len(torque) - np.array([begin, stop])) * lasts
+            best_gain, found = gain, (place, Push(stretch.run.name, force, *start.tolist()))
+    return found
 
 
 def _left(fit: Fit, stretch: PlayedStretch, off: np.ndarray, numbers: np.ndarray) -> np.ndarray:
@@ -117,9 +120,13 @@ def _jacobian(fit: Fit, stretch: PlayedStretch, bins: int) -> np.ndarray:
 
 
 def _binned(values: np.ndarray, gap: float, lasts: float = _BIN) -> np.ndarray:
-    size = max(1, round(lasts / gap))
+    size = _samples(gap, lasts)
     count = len(values) // size
     return np.asarray(values[len(values) - count * size :].reshape(count, size, *values.shape[1:]).mean(axis=1))
+
+
+def _samples(gap: float, lasts: float) -> int:
+    return max(1, round(lasts / gap))
 
 
 def _window(jacobian: np.ndarray, torque: np.ndarray, noise: np.ndarray) -> tuple[float, int, int, np.ndarray]:
