@@ -147,6 +147,18 @@ def refused(folder, *more, change=None, text=servo_arm.MODEL):
     return said.err
 
 
+def stuck(table):
+    place, told = table.column_names.index("q_lift"), table["cmd_lift"].to_numpy()
+    jitter = 0.1 * np.random.default_rng(1).standard_normal(len(told))
+    return table.set_column(place, "q_lift", pa.array(np.radians(told) + jitter))
+
+
+def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
+    data, model = logs(tmp_path, change=stuck)
+    said = irtwin("diagnose", data, "--simulator", model)
+    assert said.status == 0, said.err
+
+
 def test_commands_in_degrees_are_refused(tmp_path):
     assert "a.parquet: column cmd_lift is in degrees beside positions in rad" in refused(tmp_path, change=in_degrees)
 

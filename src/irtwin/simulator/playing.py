@@ -29,6 +29,7 @@ _FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
+_FOLLOWS = 0.8  # correlation of positions with commands, from which a joint goes where it is told
 _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 
 
@@ -139,7 +140,8 @@ def _check_commands(run: Run, robot: Robot) -> None:
         raise InputError(f"{run.file}: has no commands to play; log cmd_JOINT, or leave the run out")
     for joint, told, q in zip(robot.joints, run.signals.command.T, run.signals.q.T, strict=True):
         slope = np.polyfit(q - q.mean(), told - told.mean(), 1)[0] if np.ptp(q) > 0 else 1.0
-        if joint.unit == "rad" and _DEGREES[0] < slope < _DEGREES[1]:
+        follows = slope * q.std() >= _FOLLOWS * told.std()  # a joint that is stuck may have any slope
+        if joint.unit == "rad" and _DEGREES[0] < slope < _DEGREES[1] and follows:
             raise InputError(
                 f"{run.file}: column cmd_{joint.name} is in degrees beside positions in rad; give it in rad"
             )
