@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests import servo_arm
@@ -70,5 +68,5 @@ def test_nothing_is_sought_where_a_run_is_too_short_or_too_coarse(tmp_path, seco
 def test_what_a_load_leaves_all_the_time_is_no_push_of_a_part(arm):
     data_set, _, own = arm
     laden = servo_arm.played(data_set, own, servo_arm.changed(own, payload=(0.1, 0.1)))
-    document = diagnose(replace(laden, folder=data_set.folder), arm[1]).document
+    document = diagnose(laden, arm[1]).document
     assert [cause.effect for cause in document.causes if not cause.folded_away] == ["payload"]

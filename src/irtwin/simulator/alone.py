@@ -256,11 +256,7 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) ->
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     data, full = mujoco.MjData(bare), np.zeros((bare.nv, bare.nv))
     gap = interval(stretch.time)
-    rows = min(2 * max(2, round(_SMOOTH / gap / 2)) + 1, (len(stretch.q) - 1) // 2 * 2 + 1)
-    q, dq, ddq = (
-        scipy.signal.savgol_filter(stretch.q, rows, min(3, rows - 1), deriv=order, delta=gap, axis=0)
-        for order in range(3)
-    )
+    q, dq, ddq = smoothed(stretch.q, gap, _SMOOTH)
     torque, inertia = np.empty(q.shape), np.empty(q.shape)
     for row in range(len(q)):
         data.qpos[at], data.qvel[dof], data.qacc[dof] = q[row], dq[row], ddq[row]
@@ -269,6 +265,13 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) ->
         inertia[row] = np.diag(full)[dof]
         torque[row] = data.qfrc_inverse[dof] - inertia[row] * ddq[row]
     return torque, inertia
+
+
+def smoothed(values: np.ndarray, gap: float, lasts: float) -> list[np.ndarray]:
+    """Return values (N, ...), `gap` s apart, smoothed over `lasts` s by cubics, and their two derivatives."""
+    rows = min(2 * max(2, round(lasts / gap / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
+    order = min(3, rows - 1)
+    return [scipy.signal.savgol_filter(values, rows, order, deriv=deriv, delta=gap, axis=0) for deriv in range(3)]
 
 
 def _between(moved: np.ndarray, at: np.ndarray) -> np.ndarray:

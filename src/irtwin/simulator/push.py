@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.progress import tell_step
 from irtwin.signals.sampling import interval
+from irtwin.simulator.alone import smoothed
 from irtwin.simulator.choice import DifferingNumbers, certainty
 from irtwin.simulator.fit import Fit, Played
 from irtwin.simulator.play import PlayedStretch, Push, play
@@ -103,10 +103,7 @@ def _likeliest(fit: Fit, best: Played) -> tuple[int, Push] | None:
 def _left(fit: Fit, stretch: PlayedStretch, off: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     """Return the torque (bins, n) that would make joints off (N, n) from the model; bins are counted from the end."""
     gap = interval(stretch.time)
-    rows = min(2 * max(2, round(_SMOOTH / gap / 2)) + 1, (len(off) - 1) // 2 * 2 + 1)
-    smooth = [
-        scipy.signal.savgol_filter(off, rows, min(3, rows - 1), deriv=order, delta=gap, axis=0) for order in range(3)
-    ]
+    smooth = smoothed(off, gap, _SMOOTH)
     inertia = fit.servos.model.links + numbers[NAMES.index("armature")]
     torque = inertia * smooth[2] + numbers[NAMES.index("damping")] * smooth[1]
     torque += (numbers[0] + numbers[NAMES.index("spring")]) * smooth[0]

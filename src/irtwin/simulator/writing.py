@@ -21,14 +21,14 @@ from irtwin.gap.writing import folded
 from irtwin.robot.description import Robot
 from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.push import FoundPush
-from irtwin.simulator.servos import OF_JOINTS, PARTS, row_of
+from irtwin.simulator.servos import NAMES, OF_JOINTS, PARTS, SOFT, row_of
 from irtwin.simulator.tracking import Parts, Tracked
 
 AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
 _NONE = 1e-9  # as good as none of what the model leaves
 _ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
 _NOT_HELD = "dead_band"  # no number of MuJoCo's servos
-_COMPLIANCES = ("compliance", "link_compliance")
+_COMPLIANCES = tuple(NAMES[row] for row in SOFT)
 _CALLED = {"spring": "k"}  # by its effect
 PUSH = "push"  # of a robot for a while; with its place
 _SYMBOLS = {
