@@ -53,6 +53,12 @@ def test_a_torque_constant_may_be_off_as_far_as_the_data_set_states():
     assert any("torque_scale_uncertainty" in one.why for one in found.document.refused)
 
 
+@pytest.mark.slow
+def test_a_sensor_may_come_to_be_off_by_more_than_as_it_was_made():
+    found = diagnose(replace(logged(lambda dq, torque: torque * [1.0, 1.1]), notes={"torque": "joint torque sensor"}))
+    assert ("torque_constant_error", "joint_2") in named(found)
+
+
 def possible(effect, stated=NOTHING_STATED):
     return catalogue()[effect].possible(ROBOT, stated)
 
@@ -63,6 +69,13 @@ def test_a_load_is_bounded_by_what_is_there_and_what_is_rated():
     assert mass.high == 14.0
     assert "7 kg are rated" in mass.why
     assert possible("payload")["m"].high == 20.0
+
+
+def test_a_sensor_is_off_by_little_as_it_was_made_unless_the_data_set_says_more():
+    of_sensor = possible("torque_constant_error", Stated(torque_sensor=0.02))["g"]
+    assert (of_sensor.low, of_sensor.high) == (0.98, 1.02)
+    assert "torque_scale_uncertainty" in of_sensor.why
+    assert possible("torque_constant_error", Stated(torque_scale=0.2, torque_sensor=0.02))["g"].high == 1.2
 
 
 @pytest.mark.parametrize(

@@ -80,12 +80,13 @@ class Stated:
     """What a data set states of a robot that bounds what can be true of it; None where it says nothing.
 
     payload: kg, the most that an observed run carries; rated_payload: kg; torque_scale: share by which logged torque
-    may be off.
+    may be off; torque_sensor: the same of a sensor that is as it was made.
     """
 
     payload: float = 0.0
     rated_payload: float | None = None
     torque_scale: float | None = None
+    torque_sensor: float | None = None
 
 
 NOTHING_STATED = Stated()

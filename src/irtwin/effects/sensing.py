@@ -93,9 +93,11 @@ class TorqueConstantError(JointEffect):
         )
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
-        """Return the range of a constant that is off; of one that is stated to be right within a share, that."""
-        if stated.torque_scale is not None:
-            off, why = stated.torque_scale, "torque_scale_uncertainty of the data set allows no more"
+        """Return the range of a constant that is off; of one that is known to be right within a share, that."""
+        if (off := stated.torque_scale) is not None:
+            return {"g": Possible(1 - off, 1 + off, "torque_scale_uncertainty of the data set allows no more")}
+        if (off := stated.torque_sensor) is not None:
+            why = "a sensor measured torque; if it may be off by more, say so by torque_scale_uncertainty"
             return {"g": Possible(1 - off, 1 + off, why)}
         return {"g": Possible(*_CONSTANTS, "beyond, a gear ratio or a unit is wrong rather than a constant")}
 

@@ -25,7 +25,16 @@ from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
 from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
-from irtwin.gap.isolation.verdict import MUCH_IS_LEFT, NO_GAP, UNEXPLAINED, UNSURE, left_open, most_left, verdict_of
+from irtwin.gap.isolation.verdict import (
+    IMPOSSIBLE_NUMBER,
+    MUCH_IS_LEFT,
+    NO_GAP,
+    UNEXPLAINED,
+    UNSURE,
+    left_open,
+    most_left,
+    verdict_of,
+)
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
 from irtwin.gap.next_experiment import next_experiment
 from irtwin.gap.not_repeating import DifferingRepeats, with_removed
@@ -98,7 +107,8 @@ class Diagnosis:
             for finding, cause in self.causes
         )
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
-        doubted = set(ids) if self.left_open == MUCH_IS_LEFT else writing.closing_nothing(findings)
+        unknown_is_there = self.left_open in (MUCH_IS_LEFT, IMPOSSIBLE_NUMBER)
+        doubted = set(ids) if unknown_is_there else writing.closing_nothing(findings)
         written = tuple(
             writing.doubted(one, self.thresholds.criterion) if one.id in doubted else one for one in written
         )

@@ -99,16 +99,21 @@ def torque_scale(data_set: DataSet, motions: Sequence[Motion], torque: Torque) -
     return known if told is None else _narrowed(known, *told)
 
 
-def _stated(data_set: DataSet, by_power: bool) -> FittedTorqueScale:
+def of_sensor(data_set: DataSet) -> float | None:
+    """Return by which share torque may be off that a sensor measured, as the data set says; None: nothing says so."""
     note = data_set.notes.get("torque")
+    return _OF_SENSOR if isinstance(note, str) and _SENSOR.search(note) else None
+
+
+def _stated(data_set: DataSet, by_power: bool) -> FittedTorqueScale:
     if data_set.torque_scale_uncertainty is not None:
         share, source, why = data_set.torque_scale_uncertainty, STATED, "the data set states it"
     elif by_power:
         share, source, why = _ASSUMED, ASSUMED, "power tells the torque constants, joint by joint"
     elif data_set.simulated:
         share, source, why = 0.0, SIMULATED, "a simulator made it"
-    elif isinstance(note, str) and _SENSOR.search(note):
-        share, source, why = _OF_SENSOR, SENSOR, "a sensor measured torque"
+    elif (measured := of_sensor(data_set)) is not None:
+        share, source, why = measured, SENSOR, "a sensor measured torque"
     else:
         share, source, why = _ASSUMED, ASSUMED, "torque of drives comes from nominal constants"
     words = f"The scale of torque is {f'uncertain by {100 * share:.3g} %' if share else 'exact'}: {why}"

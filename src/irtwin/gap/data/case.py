@@ -26,6 +26,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+from irtwin.twin.torque_scale import of_sensor
 from irtwin.twin.twin import Twin
 
 _LONG = 12_000  # samples: at 12,000 a copy of the process neither wins nor costs (a diagnosis of 9 s)
@@ -188,6 +189,7 @@ def _stated(data_set: DataSet) -> Stated:
         payload=max((run.payload_mass for run in data_set.runs if run.role == "observed"), default=0.0),
         rated_payload=float(rated) if isinstance(rated, int | float) and rated > 0 else None,
         torque_scale=data_set.torque_scale_uncertainty,
+        torque_sensor=of_sensor(data_set),
     )
 
 
