@@ -164,7 +164,8 @@ def test_commands_in_degrees_are_refused(tmp_path):
 
 
 def test_logs_without_commands_are_refused(tmp_path):
-    assert "has neither torque nor power; log tau_, i_ or power" in refused(tmp_path, change=without_commands)
+    told = "has neither torque nor power; log tau_, i_ or power, or cmd_, the commands that the model is to play"
+    assert told in refused(tmp_path, change=without_commands)
 
 
 def test_what_needs_torque_is_refused(tmp_path):

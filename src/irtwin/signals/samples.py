@@ -48,7 +48,7 @@ def read_signals(
     signals = _signals(columns, robot, path)
     played = commanded and signals.command is not None
     if measured and not played and signals.torque is None and signals.power is None:
-        raise InputError(f"{path}: has neither torque nor power; {_remedy(signals)}")
+        raise InputError(f"{path}: has neither torque nor power; {_remedy(signals, commanded)}")
     return signals, repairs + dropped + _unsigned(source.columns())
 
 
@@ -154,9 +154,9 @@ def _unsigned(columns: Sequence[str]) -> list[str]:
     return [f"{prefix}JOINT is torque without its sign, as of a current's size, and no torque: left out"]
 
 
-def _remedy(signals: Signals) -> str:
+def _remedy(signals: Signals, commanded: bool) -> str:
     if signals.command is not None:
         return "its commands can be held against a model: irtwin diagnose DATASET --simulator MODEL.xml"
     if signals.current is not None:
         return "give torque_constant for each joint in dataset.toml, or log tau_ or power"
-    return "log tau_, i_ or power"
+    return "log tau_, i_ or power" + (", or cmd_, the commands that the model is to play" if commanded else "")
