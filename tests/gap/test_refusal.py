@@ -54,7 +54,7 @@ def test_a_torque_constant_may_be_off_as_far_as_the_data_set_states():
 
 
 @pytest.mark.slow
-def test_a_sensor_may_come_to_be_off_by_more_than_as_it_was_made():
+def test_a_sensor_may_come_to_be_off_by_more_than_sensors_are():
     found = diagnose(replace(logged(lambda dq, torque: torque * [1.0, 1.1]), notes={"torque": "joint torque sensor"}))
     assert ("torque_constant_error", "joint_2") in named(found)
 
@@ -71,7 +71,7 @@ def test_a_load_is_bounded_by_what_is_there_and_what_is_rated():
     assert possible("payload")["m"].high == 20.0
 
 
-def test_a_sensor_is_off_by_little_as_it_was_made_unless_the_data_set_says_more():
+def test_a_sensor_is_off_by_little_unless_the_data_set_says_more():
     of_sensor = possible("torque_constant_error", Stated(torque_sensor=0.02))["g"]
     assert (of_sensor.low, of_sensor.high) == (0.98, 1.02)
     assert "torque_scale_uncertainty" in of_sensor.why

@@ -80,7 +80,7 @@ class Stated:
     """What a data set states of a robot that bounds what can be true of it; None where it says nothing.
 
     payload: kg, the most that an observed run carries; rated_payload: kg; torque_scale: share by which logged torque
-    may be off; torque_sensor: the same of a sensor that is as it was made.
+    may be off; torque_sensor: the same of a sensor of which no other runs tell.
     """
 
     payload: float = 0.0

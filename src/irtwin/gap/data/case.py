@@ -185,11 +185,12 @@ def _turned(before: Joint, joint: Joint) -> Joint:
 
 def _stated(data_set: DataSet) -> Stated:
     rated = data_set.notes.get("rated_payload")
+    alone = all(run.role == "observed" for run in data_set.runs)  # else the others show what the sensor is off by
     return Stated(
         payload=max((run.payload_mass for run in data_set.runs if run.role == "observed"), default=0.0),
         rated_payload=float(rated) if isinstance(rated, int | float) and rated > 0 else None,
         torque_scale=data_set.torque_scale_uncertainty,
-        torque_sensor=of_sensor(data_set),
+        torque_sensor=of_sensor(data_set) if alone else None,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -59,8 +59,6 @@ def find_possible(
 
 def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated) -> list[Refused]:
     refused = []
-    if cause.scope == CHANGED:  # how a sensor was made says nothing of what became of it
-        stated = replace(stated, torque_sensor=None)
     for number, variant in enumerate(cause.variants):
         joint = place_of(variant.terms[0]) if cause.joints else None
         limits = (variant.effect if joint is None else variant.effect.on(joint)).possible(robot, stated)
