@@ -31,6 +31,7 @@ _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
 _FOLLOWS = 0.8  # correlation of positions with commands, from which a joint goes where it is told
 _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
+_UNMOVED = 0.1  # rad or m: a joint that is told to go farther moves, whatever its friction and play
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class Playing:
 def diagnose(data_set: DataSet, model: Model) -> Playing:
     """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
 
-    Raises InputError where a run has no commands or they are in degrees, or the model has no position servos.
+    Raises InputError where a run has no commands, they are in degrees or a joint does not follow, or the model
+    has no position servos.
     """
     runs = [run for run in data_set.runs if run.role == "observed"]
     if not runs:
@@ -139,6 +141,11 @@ def _check_commands(run: Run, robot: Robot) -> None:
     if run.signals.command is None:
         raise InputError(f"{run.file}: has no commands to play; log cmd_JOINT, or leave the run out")
     for joint, told, q in zip(robot.joints, run.signals.command.T, run.signals.q.T, strict=True):
+        if np.ptp(q) == 0 and np.ptp(told) > _UNMOVED:
+            raise InputError(
+                f"{run.file}: column q_{joint.name} does not change, though the joint is told to move by "
+                f"{np.ptp(told):.2g} {joint.unit}: a dead channel, or a joint without power; leave the run out"
+            )
         slope = np.polyfit(q - q.mean(), told - told.mean(), 1)[0] if np.ptp(q) > 0 else 1.0
         follows = slope * q.std() >= _FOLLOWS * told.std()  # a joint that is stuck may have any slope
         if joint.unit == "rad" and _DEGREES[0] < slope < _DEGREES[1] and follows:
