@@ -159,16 +159,6 @@ def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     assert said.status == 0, said.err
 
 
-def test_positions_that_know_nothing_of_commands_are_refused(tmp_path):
-    def dead(table):
-        place = table.column_names.index("q_lift")
-        return table.set_column(place, "q_lift", pa.array(np.full(len(table), 0.3)))
-
-    said = refused(tmp_path, change=dead)
-    assert "a.parquet: column q_lift does not change, though the joint is told to move by" in said
-    assert "leave the run out" in said
-
-
 def test_commands_in_degrees_are_refused(tmp_path):
     assert "a.parquet: column cmd_lift is in degrees beside positions in rad" in refused(tmp_path, change=in_degrees)
 

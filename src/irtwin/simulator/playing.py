@@ -9,13 +9,12 @@ import numpy as np
 
 from irtwin.document.curves import Curves
 from irtwin.document.document import Document
-from irtwin.errors import InputError
 from irtwin.identification.progress import tell
-from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
 from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import DifferingNumbers, choose
+from irtwin.simulator.commands import commanded_runs
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import PlayedStretch, Push, each, play
@@ -29,9 +28,6 @@ _FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
-_FOLLOWS = 0.8  # correlation of positions with commands, from which a joint goes where it is told
-_DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
-_UNMOVED = 0.1  # rad or m: a joint that is told to go farther moves, whatever its friction and play
 
 
 @dataclass(frozen=True)
@@ -67,14 +63,9 @@ class Playing:
 def diagnose(data_set: DataSet, model: Model) -> Playing:
     """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
 
-    Raises InputError where a run has no commands, they are in degrees or a joint does not follow, or the model
-    has no position servos.
+    Raises InputError where `commanded_runs` does, or the model has no position servos.
     """
-    runs = [run for run in data_set.runs if run.role == "observed"]
-    if not runs:
-        raise InputError(f"{data_set.folder}: no run is observed; there is nothing to hold the model against")
-    for run in runs:
-        _check_commands(run, data_set.robot)
+    runs = commanded_runs(data_set)
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = servos(model)
@@ -135,23 +126,6 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
     moved = play(own, [own.numbers], stretches)[0]
     left = [one.q - played[:, 0] for one, played in zip(stretches, moved, strict=True)]
     return bool(max(np.sqrt((one**2).mean(axis=0)).max() for one in left) > _FALLEN)
-
-
-def _check_commands(run: Run, robot: Robot) -> None:
-    if run.signals.command is None:
-        raise InputError(f"{run.file}: has no commands to play; log cmd_JOINT, or leave the run out")
-    for joint, told, q in zip(robot.joints, run.signals.command.T, run.signals.q.T, strict=True):
-        if np.ptp(q) == 0 and np.ptp(told) > _UNMOVED:
-            raise InputError(
-                f"{run.file}: column q_{joint.name} does not change, though the joint is told to move by "
-                f"{np.ptp(told):.2g} {joint.unit}: a dead channel, or a joint without power; leave the run out"
-            )
-        slope = np.polyfit(q - q.mean(), told - told.mean(), 1)[0] if np.ptp(q) > 0 else 1.0
-        follows = slope * q.std() >= _FOLLOWS * told.std()  # a joint that is stuck may have any slope
-        if joint.unit == "rad" and _DEGREES[0] < slope < _DEGREES[1] and follows:
-            raise InputError(
-                f"{run.file}: column cmd_{joint.name} is in degrees beside positions in rad; give it in rad"
-            )
 
 
 def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
