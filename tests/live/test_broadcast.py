@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from irtwin.live import broadcast
-from irtwin.live.broadcast import SOCKET, Broadcast, reachable
+from irtwin.live.broadcast import RECENT_SOCKET, SOCKET, Broadcast, reachable
 from irtwin.live.joint_stream import STREAMED, State
 
 
@@ -53,7 +53,7 @@ def test_states_and_what_the_twin_says_arrive_as_lines(tmp_path: Path, folder: s
             assert json.loads(lines.readline()) == {"robot": "r", "time": 2.0, "q": [0.5, -0.25], "power": 400.0}
             assert json.loads(lines.readline())["power"] is None
             assert json.loads(lines.readline()) == {"robot": "r", "modelled": {"time": [2.0, 3.0], "power": [6.0, 7.0]}}
-    assert not (place / SOCKET).exists()
+    assert not list(place.iterdir())
 
 
 def test_one_that_does_not_read_is_let_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,3 +78,39 @@ def test_a_socket_that_a_crash_left_is_taken_over(tmp_path: Path) -> None:
     with Broadcast(tmp_path) as told, connect(tmp_path, told) as client:
         told.state(state(1.0))
         assert client.recv(1) == b"{"
+
+
+def ask(folder: Path, question: bytes) -> bytes:
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(30)
+    with client, reachable(folder / RECENT_SOCKET) as address:
+        client.connect(address)
+        client.sendall(question)
+        with client.makefile("rb") as lines:
+            return lines.readline()
+
+
+def test_who_asks_later_gets_the_last_minutes_though_nobody_looked_on(tmp_path: Path) -> None:
+    motion = SimpleNamespace(time=np.array([1.0, 2.0, 3.0]))
+    with Broadcast(tmp_path) as told:
+        for at, power in enumerate([400.0, math.nan, 402.5]):
+            told.state(state(float(at), power))
+        told.stretches("r", [SimpleNamespace(motion=motion, power=np.array([5.0, 6.0, 7.0]), begins=True)])
+        assert json.loads(ask(tmp_path, b"r\n")) == {
+            "robot": "r",
+            "recent": {
+                "measured": {"time": [0.0, 2.0], "power": [400.0, 402.5]},
+                "modelled": {"time": [1.0, 2.0, 3.0], "power": [5.0, 6.0, 7.0]},
+            },
+            "newest": {"robot": "r", "time": 2.0, "q": [0.5, -0.25], "power": 402.5},
+        }
+
+
+def test_what_is_no_question_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(broadcast, "_ASKING", 0.05)
+    with Broadcast(tmp_path):
+        assert ask(tmp_path, b"") == b""
+        assert ask(tmp_path, b"\xff\n") == b""
+        nothing: dict[str, list[float]] = {"time": [], "power": []}
+        said = json.loads(ask(tmp_path, b"nobody\n"))
+        assert said == {"robot": "nobody", "recent": {"measured": nothing, "modelled": nothing}, "newest": None}

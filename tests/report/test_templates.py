@@ -10,7 +10,8 @@ from tests.trusting import trust_all
 
 from irtwin.report.plant import page
 from irtwin.report.templates import written
-from irtwin.resources import resources_of
+from irtwin.resources import folder, resources_of
+from irtwin.serve.page import FOLDER
 
 
 def test_a_template_that_changed_is_compiled_again(tmp_path: Path) -> None:
@@ -33,3 +34,10 @@ def test_pages_of_a_plant_are_compiled_before_anybody_asks(monkeypatch: pytest.M
     templates = page._templates("http://example.org/id/")
     for name in ("page", "frame", "robot/page", "run/page", "comparison/page", "individual/page"):
         assert templates.get_template(f"plant/{name}.html.jinja").root_render_func
+
+
+def test_no_page_asks_for_an_icon_that_is_not_there() -> None:
+    pages = [*folder("reports").rglob("*.jinja"), *FOLDER.glob("*.html")]
+    texts = {page.name: text for page in pages if "<head>" in (text := page.read_text(encoding="utf-8"))}
+    assert len(texts) >= 6
+    assert [name for name, text in texts.items() if '<link rel="icon" href="data:,">' not in text] == []

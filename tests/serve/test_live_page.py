@@ -93,6 +93,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     wait_for(lambda: page.inner_text("#stream") == "flowing")
     wait_for(lambda: page.inner_text("#energy") not in ("–", "0.00"))
     assert begun < page.evaluate("irtwinLive.time") < time.time() + 1  # of this replay, however late it is drawn
+    begins_with_what_was_missed(robot, browser)
     _, said = live.communicate()
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
@@ -104,6 +105,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
         )
     wait_for(lambda: page.inner_text("#energy") == written(row["energy"]))
     assert page.locator("#by-joint .bar").count() == 2
+    assert page.locator("#by-effect .bar").count() > 2
     wait_for(lambda: page.locator("#gaps .bar").count() == 3)
     page.goto(f"{robot.url}/live")
     wait_for(lambda: page.locator("#robots tr").count() == 1)
@@ -118,3 +120,17 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
 
 def written(joules: float) -> str:
     return f"{joules / 3600:.2f}"
+
+
+def begins_with_what_was_missed(robot: Server, browser: Any) -> None:
+    """Open the page while a log is played: its curve begins before the page did."""
+    time.sleep(1.0)
+    opened = time.time()
+    page = browser.new_page()
+    page.goto(f"{robot.url}/live/Arm")
+    wait_for(lambda: page.evaluate("irtwinLive.states") > 3)
+    first, last, low, high = page.evaluate("irtwinLive.shown()")
+    assert first < opened - 0.9 < last
+    assert low < high
+    page.select_option("#span", "30")
+    page.close()

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from irtwin.live.broadcast import SOCKET
+from irtwin.live.broadcast import RECENT_SOCKET, SOCKET
 from irtwin.serve import samples as room
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
@@ -56,6 +56,52 @@ def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
     asyncio.run(play())
 
 
+def test_a_page_begins_with_the_last_minutes_of_its_robot(tmp_path: Path) -> None:
+    async def play() -> None:
+        asked: list[bytes] = []
+
+        async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            asked.append(await reader.readline())
+            writer.write(b'{"recent": "' + asked[-1][:-1] + b'"}\n')
+            writer.close()
+
+        (tmp_path / "live").mkdir()
+        async with serving(tell, tmp_path / "live" / RECENT_SOCKET):
+            samples = Samples(tmp_path)
+            page = samples.page("b", "10.0.0.1")
+            page.put(b'{"robot": "b", "time": 1}\n')
+            assert await asyncio.wait_for(taken(page, 2), 30) == [{"recent": "b"}, {"robot": "b", "time": 1}]
+            samples.close()
+        assert asked == [b"b\n"]
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize("line", [b"", b"{" * 100_000 + b"\n"])
+def test_last_minutes_that_do_not_come_hold_nothing_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: bytes
+) -> None:
+    monkeypatch.setattr(room, "_RECALL", 0.05)
+    monkeypatch.setattr(room, "_LONGEST_LINE", 1000)
+
+    async def play() -> None:
+        over = asyncio.Event()
+
+        async def say_nothing(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(line)
+            await over.wait()
+            writer.close()
+
+        (tmp_path / "live").mkdir()
+        async with serving(say_nothing, tmp_path / "live" / RECENT_SOCKET):
+            page = Page("b", "10.0.0.1", tmp_path / "live" / RECENT_SOCKET)
+            page.put(b'{"time": 1}\n')
+            assert await asyncio.wait_for(taken(page, 1), 30) == [{"time": 1}]
+            over.set()
+
+    asyncio.run(play())
+
+
 def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "_AGAIN", 0.01)
 
@@ -85,8 +131,8 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
     asyncio.run(play())
 
 
-def test_a_page_that_takes_nothing_is_let_go() -> None:
-    page = Page("a", "10.0.0.1")
+def test_a_page_that_takes_nothing_is_let_go(tmp_path: Path) -> None:
+    page = Page("a", "10.0.0.1", tmp_path / RECENT_SOCKET)
     for _ in range(401):
         page.put(b"{}\n")
     assert page.lost
@@ -135,11 +181,11 @@ def test_another_client_takes_the_newest_page_of_the_one_that_has_most(
     asyncio.run(play())
 
 
-def test_a_page_without_samples_gets_a_word_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_without_samples_gets_a_word_now_and_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "_QUIET", 0.01)
 
     async def play() -> list[bytes]:
-        page, found = Page("a", "10.0.0.1"), []
+        page, found = Page("a", "10.0.0.1", tmp_path / RECENT_SOCKET), []
         async for piece in page.events():
             found.append(piece)
             if len(found) == 3:

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 
-from irtwin.live.broadcast import SOCKET, reachable
+from irtwin.live.broadcast import RECENT_SOCKET, SOCKET, reachable
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import Displaced, gives_way
 from irtwin.storage.schema import LIVE
@@ -19,13 +19,17 @@ _HELD = 400  # samples that wait for a page: some five seconds
 _AGAIN = 1.0  # s until the next try where nobody watches
 _QUIET = 10.0  # s after which a page without samples gets a word, so that one that is gone is found out
 _LONGEST_LINE = 1 << 20  # bytes
+_RECALL = 2.0  # s that the last minutes may take to come
 
 
 class Page:
-    """Who looks on at one robot: the newest lines that were not sent yet; `lost` once there were too many."""
+    """Who looks on at one robot: the newest lines that were not sent yet; `lost` once there were too many.
 
-    def __init__(self, robot_id: str, client: str) -> None:
-        self.robot_id, self.client = robot_id, client
+    `recent` is the socket that tells of the robot's last minutes, with which a page begins.
+    """
+
+    def __init__(self, robot_id: str, client: str, recent: Path) -> None:
+        self.robot_id, self.client, self._recent = robot_id, client, recent
         self.lost = False
         self._lines: deque[bytes] = deque()
         self._news = asyncio.Event()
@@ -42,8 +46,10 @@ class Page:
         self._news.set()
 
     async def events(self) -> AsyncIterator[bytes]:
-        """Give server-sent events until it is lost; what came meanwhile is one piece."""
+        """Give server-sent events until it is lost: the last minutes, then what came meanwhile as one piece each."""
         yield b"retry: 1000\n\n"
+        if line := await self._last_minutes():
+            yield b"data: " + line + b"\n"
         while not self.lost:
             with suppress(TimeoutError):
                 async with asyncio.timeout(_QUIET):
@@ -52,12 +58,25 @@ class Page:
             lines, self._lines = self._lines, deque()
             yield b"".join(b"data: " + line + b"\n" for line in lines) if lines else b": nothing new\n\n"
 
+    async def _last_minutes(self) -> bytes:
+        """Return the line that tells of them; none where nobody watches, or the answer does not come in time."""
+        with suppress(OSError, ValueError):  # TimeoutError is an OSError
+            async with asyncio.timeout(_RECALL):
+                with reachable(self._recent) as address:
+                    lines, writing = await asyncio.open_unix_connection(address, limit=_LONGEST_LINE)
+                try:
+                    writing.write(self.robot_id.encode() + b"\n")
+                    return await lines.readline()
+                finally:
+                    writing.close()
+        return b""
+
 
 class Samples:
     """Hands what `irtwin live` tells of a workspace to the pages, and waits for it to come where it is not there."""
 
     def __init__(self, workspace: Path) -> None:
-        self._socket = workspace / LIVE / SOCKET
+        self._socket, self._recent = workspace / LIVE / SOCKET, workspace / LIVE / RECENT_SOCKET
         self._pages: list[Page] = []  # the newest last
         self._reading: asyncio.Task[None] | None = None
 
@@ -65,7 +84,7 @@ class Samples:
         """Let one more page of a client look on, in the place of another's that has more. Raises Refusal."""
         if len(self._pages) >= MOST:
             self._make_room(client)
-        page = Page(robot_id, client)
+        page = Page(robot_id, client, self._recent)
         self._pages.append(page)
         if self._reading is None:
             self._reading = asyncio.create_task(self._read())

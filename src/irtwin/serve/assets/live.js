@@ -1,42 +1,71 @@
 "use strict";
-// A robot as it moves: poses and power from events, numbers from /sparql each second. Needs MeshCat and robot.js.
+// A robot as it moves: poses and power from events, which begin with its last minutes, numbers from /sparql each second.
+// Needs MeshCat and robot.js.
 // window.irtwinLive tells how well it keeps up: counts, and the newest lags and frames in ms.
 (function () {
   const robotId = decodeURIComponent(location.pathname.split("/")[2]);
   const here = "/live/" + encodeURIComponent(robotId), iri = "id:robot\\/" + encodeURIComponent(robotId).replace(/[.!~*'()]/g, "\\$&");
-  const SHOWN = 30, KEPT = 4096; // s of the curve; lags and frames that are remembered
+  const KEPT = 4096; // lags and frames that are remembered
+  const REMEMBERED = 300, BIN = 0.1; // s of the curve, of each bin of which the lowest sample and the highest are kept
   const SLOW_RATIO = 0.5; // of the screen's points are drawn where the processor draws
-  const CURVE_EVERY = 45; // ms
+  const CURVE_EVERY = 45, MINUTES_EVERY = 200; // ms: of minutes a point of the screen is as long
   const find = (id) => document.getElementById(id);
   const seen = (window.irtwinLive = { events: 0, states: 0, drawn: 0, lags: [], drawnLags: [], frames: [], work: [], time: null });
   const clock = () => performance.timeOrigin + performance.now();
   const note = (list, value) => { list.push(value); if (list.length > KEPT) list.splice(0, KEPT / 2); };
-  const written = (value, digits) => value.toFixed(digits).replace("-", "−");
+  const written = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−"); // no −0.00
 
   // ---- samples
 
-  const measured = { time: [], power: [] }, modelled = { time: [], power: [] };
-  let newest = null, fresh = false;
+  const emptied = (curve) => Object.assign(curve, { time: [], power: [], bin: null, count: 0 });
+  const measured = emptied({}), modelled = emptied({});
+  let newest = null, fresh = false, isFlowing = true;
 
+  seen.shown = () => [measured.time[0], measured.time[measured.time.length - 1], Math.min(...measured.power), Math.max(...measured.power)];
+
+  function remove(curve, at, count) {
+    curve.time.splice(at, count);
+    curve.power.splice(at, count);
+  }
+
+  // Takes a sample. The newest bin holds the lowest, the highest and the newest of its samples, one before it the first two.
   function keep(curve, time, power) {
     if (curve.time.length && time <= curve.time[curve.time.length - 1]) return;
+    if (curve.count === 3) {
+      const last = curve.power.slice(-3), middle = [...last].sort((one, other) => one - other)[1];
+      remove(curve, curve.power.length - 3 + last.indexOf(middle), 1);
+      curve.count = 2;
+    }
+    const bin = Math.floor(time / BIN);
+    if (bin !== curve.bin) Object.assign(curve, { bin, count: 0 });
+    curve.count += 1;
     curve.time.push(time);
     curve.power.push(power);
-    while (curve.time[0] < time - SHOWN - 2) { curve.time.shift(); curve.power.shift(); }
+    if (curve.time[0] < time - REMEMBERED - 10) remove(curve, 0, curve.time.findIndex((each) => each >= time - REMEMBERED));
   }
+
+  const keepAll = (curve, said) => said.time.forEach((time, i) => keep(curve, time, said.power[i]));
 
   function take(event) {
     const said = JSON.parse(event.data);
     seen.events += 1;
-    if (said.modelled) {
-      said.modelled.time.forEach((time, i) => keep(modelled, time, said.modelled.power[i]));
-      return;
+    if (said.recent) {
+      if (said.newest) takeState(said.newest);
+      keepAll(measured, said.recent.measured);
+      keepAll(modelled, said.recent.modelled);
+    } else if (said.modelled) {
+      keepAll(modelled, said.modelled);
+    } else {
+      note(seen.lags, clock() - 1000 * said.time);
+      seen.states += 1;
+      takeState(said);
+      if (said.power !== null) keep(measured, said.time, said.power);
     }
-    if (newest && said.time < newest.time - 60) [measured, modelled].forEach((curve) => { curve.time.length = curve.power.length = 0; });
-    note(seen.lags, clock() - 1000 * said.time);
-    seen.states += 1;
+  }
+
+  function takeState(said) {
+    if (newest && said.time < newest.time - 60) [measured, modelled].forEach(emptied); // its clock was set back
     seen.time = said.time;
-    if (said.power !== null) keep(measured, said.time, said.power);
     newest = said;
     fresh = true;
   }
@@ -45,7 +74,8 @@
 
   const canvas = find("curve"), pen = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
   const colour = (name) => style.getPropertyValue("--" + name);
-  let scale = { low: 0, high: 100 };
+  let scale = { low: 0, high: 100 }, shown = Number(find("span").value);
+  find("span").addEventListener("change", (event) => { shown = Number(event.target.value); draw(); });
 
   function round(value) {
     const step = 10 ** Math.floor(Math.log10(Math.max(value, 1))) / 2;
@@ -61,10 +91,11 @@
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     let low = 0, high = 1;
-    for (const curve of [measured, modelled]) for (const value of curve.power) { low = Math.min(low, value); high = Math.max(high, value); }
+    const end = newest ? newest.time : 0;
+    for (const curve of [measured, modelled]) curve.power.forEach((value, i) => { if (curve.time[i] >= end - shown) { low = Math.min(low, value); high = Math.max(high, value); } });
     scale = { low: low < 0 ? -round(-low) : 0, high: round(high) };
-    const left = 46, bottom = height - 18, top = 8, end = newest ? newest.time : 0;
-    const x = (time) => left + ((time - end + SHOWN) / SHOWN) * (width - left - 8), y = (value) => bottom - ((value - scale.low) / (scale.high - scale.low)) * (bottom - top);
+    const left = 46, bottom = height - 18, top = 8;
+    const x = (time) => left + ((time - end + shown) / shown) * (width - left - 8), y = (value) => bottom - ((value - scale.low) / (scale.high - scale.low)) * (bottom - top);
     pen.font = "11px system-ui, sans-serif";
     pen.fillStyle = colour("quiet");
     pen.strokeStyle = colour("line");
@@ -76,18 +107,21 @@
       pen.moveTo(left, Math.round(y(level)) + 0.5);
       pen.lineTo(width - 8, Math.round(y(level)) + 0.5);
       pen.stroke();
-      pen.fillText(written(level, 0) + " W", left - 6, y(level));
+      if (level === 0 || Math.abs(y(level) - y(0)) > 11) pen.fillText(written(level, 0) + " W", left - 6, y(level));
     }
     pen.textAlign = "center";
     pen.textBaseline = "alphabetic";
-    for (let back = 0; back <= SHOWN; back += 10) pen.fillText(back ? "−" + back + " s" : "now", Math.min(x(end - back), width - 20), height - 4);
+    const [step, unit, name] = shown > 60 ? [60, 60, " min"] : [10, 1, " s"];
+    for (let back = step; back <= shown; back += step) pen.fillText("−" + back / unit + name, Math.max(x(end - back), left), height - 4);
+    pen.textAlign = "right";
+    pen.fillText(isFlowing || !newest ? "now" : new Date(1000 * end).toLocaleTimeString(), width - 8, height - 4);
     pen.lineWidth = 1.5;
     [[measured, "ink"], [modelled, "warm"]].forEach(([curve, name]) => {
       pen.strokeStyle = colour(name);
       pen.beginPath();
       let before = null;
       curve.time.forEach((time, i) => {
-        if (time < end - SHOWN) return;
+        if (time < end - shown) return;
         if (before === null || time - before > 2) pen.moveTo(x(time), y(curve.power[i]));
         else pen.lineTo(x(time), y(curve.power[i]));
         before = time;
@@ -125,7 +159,7 @@
         robot.pose(newest.q);
         viewer.render();
       }
-      if (stamp - curveAt > CURVE_EVERY) {
+      if (stamp - curveAt > (shown > 60 ? MINUTES_EVERY : CURVE_EVERY)) {
         curveAt = stamp;
         draw();
       }
@@ -159,14 +193,14 @@
       OPTIONAL { ?run irt:performs ?planned . ?planned irt:Run_Name ?plan OPTIONAL { ?planned irt:Planned_Energy ?expected } } } }`;
   const JOINTS = `SELECT ?label ?energy { ?taken a irt:Joint_Energy ; irt:of_Run ?RUN ; irt:of_Joint ?joint ; irt:Energy ?energy .
     ?joint irt:Joint_Name ?label ; irt:Joint_Number ?number } ORDER BY ?number`;
-  const EFFECTS = `SELECT ?label (SUM(?each) AS ?energy) { ?share a irt:Energy_Share ; irt:of_Run ?RUN ; irt:of_Effect ?effect ; irt:Energy ?each .
+  const EFFECTS = `SELECT ?label (SUM(?each) AS ?energy) { ?share irt:share_of_Run ?RUN ; irt:of_Effect ?effect ; irt:Energy ?each .
     ?effect rdfs:label ?label } GROUP BY ?label ORDER BY DESC(?energy)`;
   const GAPS = `SELECT ?label ?residual ?band ?ratio ?unit ?state { ?gap a irt:Gap_State ; irt:gap_of_Run ?RUN ; irt:Gap_Residual ?residual ;
     irt:Gap_Band ?band ; irt:Gap_Ratio ?ratio ; qudt:hasUnit / qudt:symbol ?unit ; irt:Band_State ?state .
     OPTIONAL { ?gap irt:gap_at_Joint ?joint . ?joint irt:Joint_Name ?name ; irt:Joint_Number ?number }
     BIND(COALESCE(?name, "power") AS ?label) } ORDER BY COALESCE(?number, 99)`;
   const ALARMS = `SELECT ?state ?since ?until ?reason ?rule { ?alarm irt:alarm_of_Run ?RUN ; irt:Alarm_State ?state ;
-    irt:Alarm_Since ?since ; irt:Alarm_Reason ?reason ; irt:raised_by_Rule ?rule OPTIONAL { ?alarm irt:Alarm_Until ?until } } ORDER BY DESC(?since)`;
+    irt:Alarm_Since ?since ; irt:Alarm_Reason ?reason ; irt:raised_by_Rule ?rule OPTIONAL { ?alarm irt:Alarm_Until ?until } } ORDER BY ?state DESC(?since)`;
 
   const element = (kind, text, name) => Object.assign(document.createElement(kind), { textContent: text, className: name || "" });
 
@@ -191,6 +225,7 @@
     const stream = run.stream || "not watched yet";
     find("stream").textContent = stream === "ended" ? "run ended" : stream;
     find("stream").className = "stream " + (run.stream || "");
+    isFlowing = stream === "flowing";
     document.querySelector("main").classList.toggle("is-stale", stream === "stale");
     find("why").textContent = run.why && stream === "stale" ? run.why + "; the last good state is of " + new Date(run.since).toLocaleTimeString() : "";
     const [energy, unit] = run.energy === undefined ? ["–", "Wh"] : inHours(Number(run.energy));

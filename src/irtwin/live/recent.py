@@ -1,0 +1,64 @@
+"""The last minutes of the power of each robot that is watched, for a page that begins to look on."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+
+SECONDS = 300.0  # that are remembered
+BIN = 0.1  # s, of which the lowest sample and the highest are kept
+
+
+class Curve:
+    """Samples of the last minutes: of each bin the lowest and the highest, at their own times, so that peaks stay.
+
+    It takes 96 kB, whatever the rate of the samples.
+    """
+
+    def __init__(self) -> None:
+        self._ends = np.full((round(SECONDS / BIN), 2, 2), np.nan)  # a ring of bins: lowest, highest; time, value
+        self._bin = -1
+        self._newest = -np.inf
+
+    def add(self, time: float, value: float) -> None:
+        """Take a sample, its time in s since 1970; one of an earlier time than the newest begins anew."""
+        if time < self._newest:
+            self._ends.fill(np.nan)
+        self._newest = time
+        number = int(time / BIN)
+        lowest, highest = ends = self._ends[number % len(self._ends)]
+        if number != self._bin:
+            self._bin = number
+            ends[:] = time, value
+        elif value < lowest[1]:
+            lowest[:] = time, value
+        elif value > highest[1]:
+            highest[:] = time, value
+
+    def points(self) -> np.ndarray:
+        """Return times, s since 1970, and values, (M, 2), in the order of time."""
+        ends = self._ends.reshape(-1, 2)
+        return np.unique(ends[ends[:, 0] > self._newest - SECONDS], axis=0)  # one where the lowest is the highest
+
+
+class Recent:
+    """Curves of robots by name, W; more than one thread may ask."""
+
+    def __init__(self) -> None:
+        self._curves: dict[tuple[str, str], Curve] = {}
+        self._lock = threading.Lock()
+
+    def add(self, robot_id: str, name: str, times: Sequence[float], values: Sequence[float]) -> None:
+        """Take samples of a robot's curve."""
+        with self._lock:
+            curve = self._curves.setdefault((robot_id, name), Curve())
+            for time, value in zip(times, values, strict=True):
+                curve.add(time, value)
+
+    def points(self, robot_id: str, name: str) -> np.ndarray:
+        """Return the points of a robot's curve, (M, 2): times, s since 1970, and values; none of a robot not seen."""
+        with self._lock:
+            curve = self._curves.get((robot_id, name))
+            return np.empty((0, 2)) if curve is None else curve.points()
