@@ -46,6 +46,8 @@ def test_the_robot_is_made_of_the_graph(robot: Server) -> None:
     assert said["name"] == "Arm"
     assert len(said["joints"]) == 2
     assert said["parts"]
+    assert len(said["stood"]) == 2
+    assert any(said["stood"])  # where a run left it, and not all joints at zero
 
 
 @pytest.mark.parametrize("name", ["nobody", "a%3E%20b", "..%2F..%2Fetc"])
@@ -107,6 +109,8 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert page.locator("#by-joint .bar").count() == 2
     assert page.locator("#by-effect .bar").count() > 2
     wait_for(lambda: page.locator("#gaps .bar").count() == 3)
+    for link in ("#robot-page", "#run-page"):
+        assert httpx.get(page.eval_on_selector(link, "link => link.href"), timeout=60).status_code == 200
     page.goto(f"{robot.url}/live")
     wait_for(lambda: page.locator("#robots tr").count() == 1)
     assert page.inner_text("#robots a") == "Arm"

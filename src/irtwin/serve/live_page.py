@@ -29,9 +29,10 @@ from irtwin.virtual.robot_data import robot_data
 
 _MOST_ROBOTS = 64  # that are remembered as drawn
 _POSES = """SELECT ?run ?name ?q {
-  { SELECT ?run { ?run irt:run_of ?arm ; irt:Start_Time ?start . ?any irt:state_of ?run } GROUP BY ?run ?start
+  { SELECT ?run ?start { ?run irt:run_of ?arm ; irt:Start_Time ?start . ?any irt:state_of ?run } GROUP BY ?run ?start
     ORDER BY DESC(?start) LIMIT 60 }
-  ?state irt:state_of ?run ; irt:of_Joint / irt:Joint_Name ?name ; irt:Joint_Position ?q }"""
+  ?state irt:state_of ?run ; irt:of_Joint / irt:Joint_Name ?name ; irt:Joint_Position ?q }
+  ORDER BY DESC(?start)"""
 
 
 class LivePages:
@@ -99,11 +100,12 @@ def _drawn(location: Location, robot_id: str) -> bytes:
         robot = robot_of_graph(graph, iri)
         meshes = meshes_of_graph(graph, iri, location.folder)
         poses = _poses(graph, iri, robot.joint_names)
-    return json.dumps(robot_data(robot, poses, meshes) | {"name": robot.name}, allow_nan=False).encode()
+    said = {"name": robot.name, "stood": poses[0].tolist()}
+    return json.dumps(robot_data(robot, poses, meshes) | said, allow_nan=False).encode()
 
 
 def _poses(graph: KnowledgeGraph, iri: str, joints: tuple[str, ...]) -> np.ndarray:
-    """Return poses in which runs left the robot, (N, n) rad or m: what a camera should have in sight."""
+    """Return poses in which runs left the robot, the newest first, (N, n) rad or m: what a camera should see."""
     ends: dict[Any, dict[str, float]] = {}
     for row in graph.query(_POSES, {"arm": iri}).rows:
         ends.setdefault(row["run"], {})[row["name"]] = row["q"]

@@ -144,7 +144,8 @@
     if (slow) viewer.renderer.setPixelRatio(SLOW_RATIO);
     robot = irtwinRobot.build(viewer, data);
     viewer.set_3d_pane_size();
-    said.textContent = newest ? "" : "Waiting for the first sample…";
+    said.textContent = newest ? "" : "As its last run left it; no sample comes yet.";
+    if (!newest) robot.pose(data.stood);
     viewer.render();
   }
 
@@ -226,6 +227,9 @@
     find("stream").textContent = stream === "ended" ? "run ended" : stream;
     find("stream").className = "stream " + (run.stream || "");
     isFlowing = stream === "flowing";
+    find("run-page").hidden = stream !== "ended";
+    find("curve").hidden = !newest && stream === "ended";
+    if (run.run) find("run-page").href = "/run/" + run.run.split("/").pop();
     document.querySelector("main").classList.toggle("is-stale", stream === "stale");
     find("why").textContent = run.why && stream === "stale" ? run.why + "; the last good state is of " + new Date(run.since).toLocaleTimeString() : "";
     const [energy, unit] = run.energy === undefined ? ["–", "Wh"] : inHours(Number(run.energy));
@@ -277,6 +281,7 @@
     setTimeout(poll, 1000);
   }
 
+  find("robot-page").href = "/robot/" + encodeURIComponent(robotId);
   for (const place of ["by-joint", "by-effect", "gaps"]) bars(place, []);
   function follow() {
     const events = new EventSource(here + "/events");
