@@ -140,6 +140,18 @@ def diagnosis(folder: Path, joint: str = "elbow", width: float = 0.03) -> Path:
     return folder / "found.json"
 
 
+def test_the_model_is_given_the_twins_numbers_which_belong_with_what_is_added(tmp_path: Path) -> None:
+    twin = twin_of(next(iter(REST)))
+    (tmp_path / "twin.json").write_text(to_json(twin))
+    model = mujoco.MjModel.from_xml_string(text_of(twin, "mjcf"))
+    own = {number: getattr(model, f"dof_{number}").copy() for number in ("armature", "damping", "frictionloss")}
+    model.dof_damping[:] += 3.0  # as a mended file may have it, which has no place for the rest
+    model.dof_armature[:] *= 0.9
+    apply(model, tmp_path / "twin.json")
+    for number, values in own.items():
+        np.testing.assert_allclose(getattr(model, f"dof_{number}"), values, atol=1e-6, err_msg=number)
+
+
 @pytest.mark.parametrize("late", [0, 20])
 def test_a_servo_has_its_dead_band_as_it_is_played(late: int, tmp_path: Path) -> None:
     delay = f'kp="15" delay="{2e-3 * late - 1e-3}" nsample="{late + 1}"'  # MuJoCo's is of whole steps

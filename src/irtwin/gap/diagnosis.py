@@ -114,7 +114,8 @@ class Diagnosis:
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
-            written = tuple(writing.beside(self.simulator, one) for one in written)
+            alone = writing.alone_in_file(self.causes, self.scale)
+            written = tuple(writing.beside(self.simulator, one, alone) for one in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
         findings = apart.findings(findings, causes, self.thresholds.matters)

@@ -104,6 +104,12 @@ class Matters:
     closed: float = _threshold(
         0.7, "causes close so much everywhere", "share of the largest excess", "decisions/gap-verdict.md"
     )
+    number: float = _threshold(
+        0.2,
+        "a number of a simulator's model is off for sure, however little it closes",
+        "share of the model's number",
+        "decisions/gap-verdict.md",
+    )
 
 
 @dataclass(frozen=True)

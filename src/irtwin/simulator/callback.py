@@ -50,7 +50,8 @@ def apply(model: mujoco.MjModel, file: Path | str) -> Rest:
     """Let MuJoCo add to a model what it does not hold of a twin, or of a diagnosis of servos by their commands.
 
     The model has the numbers that a file can hold: of `irtwin export --mjcf`, or `diagnose --save-simulator`. It is
-    given a trace of dry friction in each joint whose friction is added. MuJoCo has one passive callback, and compiles
+    given the twin's armature, damping and dry friction, which belong with what is added, and a trace of dry friction in
+    each joint whose friction is added. MuJoCo has one passive callback, and compiles
     no model while it is set: this one takes the place of another, and `mujoco.set_mjcb_passive(None)` takes it out.
     Raises InputError where the file is neither, or the model lacks a joint of it.
     """
@@ -86,6 +87,9 @@ class _Torque:
         self._q, self._dq = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self._stack = Stack(twin.robot, known)
         self._values = np.array([twin.value(effect.id, term) for effect, term in self._stack.torque_terms])
+        for (effect, term), value in zip(self._stack.torque_terms, self._values, strict=True):
+            if number := effect.in_mjcf.get(term.name):
+                getattr(model, f"dof_{number}")[self._dq[twin.robot.index(str(term.joint))]] = max(value, 0.0)
         self._within = [effect for effect in rest if isinstance(effect, JointEffect)]
         self._across = [effect for effect in rest if not isinstance(effect, JointEffect)]
         rubs = [twin.robot.index(one.name) for effect in self._within for one in effect.acting(twin.robot)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -246,6 +246,13 @@ def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: i
 def _coefficient(term: Term, estimate: Estimate, place: int) -> Quantity:
     deviation = float(np.sqrt(max(estimate.covariance[place, place], 0.0)))
     return quantity(term.name, term.joint, float(estimate.values[place]), term.unit, deviation)
+
+
+def numbers_without(finding: ChannelFinding, told: Mapping[int, Term], others: Set[int]) -> list[Quantity]:
+    """Return the coefficients of columns that are `told`, by index, fitted beside all causes' but `others`."""
+    system, chosen = finding.system, [k for k in finding.chosen if k not in others]
+    fitted, used = estimate_of(system, chosen), [*range(system.base), *chosen]
+    return [_coefficient(term, fitted, used.index(k)) for k, term in told.items()]
 
 
 @dataclass(frozen=True)
