@@ -137,6 +137,7 @@ class _Files:
     ) -> None:
         """Write the files that are asked for."""
         if model and self.simulator:
+            announce(f"Writing {self.simulator}")
             for file, content in zip((self.simulator, *self.draws), _models(diagnosis, model, seed), strict=False):
                 write(file, content)
             if isinstance(diagnosis, Playing) and (lacking := diagnosis.unwritten):
@@ -148,13 +149,14 @@ class _Files:
         if self.twin is not None and diagnosis.twin is not None:
             for doubt in doubts(diagnosis.twin):
                 announce(f"  {doubt}")
+            announce(f"Writing {self.twin}")
             write(self.twin, to_json(diagnosis.twin).encode())
         if self.motion is not None and isinstance(diagnosis, Diagnosis):
             announce(f"  {save_motion(diagnosis, self.motion)}")
         if self.report is not None:
             from irtwin.report.gap.page import render_alone
 
-            announce("Writing the report")
+            announce(f"Writing the report {self.report}")
             resources = resources_of(None if location is None else location.folder)
             render_alone(data_set, diagnosis.document, diagnosis.curves, self.report, resources)
 

@@ -60,9 +60,9 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
         for name, simulator, robot in numbers
     ]
     said = sentence(answers("changed", simulated=True, parameters=parameters)).replace("\N{NO-BREAK SPACE}", " ")
-    assert said.endswith(
-        " The robot has other numbers than the simulator: mu of j1 0.0400 N m in place of 0, damping (Fv) of j1 8.71 "
-        "N m in place of 19.2, frictionloss (Fc) of j1 5.89 N m in place of 7.55, and 1 more."
+    assert said.startswith(
+        "The robot has other numbers than the simulator: mu of j1 0.0400 N m in place of 0, damping (Fv) of j1 8.71 "
+        "N m in place of 19.2, frictionloss (Fc) of j1 5.89 N m in place of 7.55, and 1 more. "
     )
     guessed = sentence(answers("changed", simulated=True, parameters=parameters, sure=0.3))
     assert "other numbers" not in guessed

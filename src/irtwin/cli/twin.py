@@ -275,11 +275,10 @@ def diagnose(
             click.echo()
             show(table, counted=False)
     kept = summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else []
-    for said in (
-        *meanings(diagnosis.document),
-        *(f"\n{one}" for one in (*kept, *summary.next_steps(diagnosis.document))),
-    ):
+    for said in meanings(diagnosis.document):
         click.echo(said)
+    for some in filter(None, (kept, summary.next_steps(diagnosis.document))):
+        click.echo("\n" + "\n".join(some))
 
 
 @click.command()

@@ -178,6 +178,8 @@ def _closes(one: ToldFinding, count: int) -> str:
 def other_numbers(differing: Sequence[OtherNumber]) -> str:
     """Say which numbers of the simulator's model the robot has otherwise, the farthest first; may be empty.
 
+    It comes before what the verdict says: who has a model looks for its numbers.
+
     What a model's file has another word for has this word, with the symbol that tables have.
     """
     words = {name: f"{word} ({name})" for effect in catalogue().values() for name, word in effect.in_mjcf.items()}
@@ -193,7 +195,7 @@ def other_numbers(differing: Sequence[OtherNumber]) -> str:
     ]
     rest = len(differing) - len(told)
     more = f", and {rest} more" if rest else ""
-    return f" The robot has other numbers than the simulator: {', '.join(told)}{more}." if told else ""
+    return f"The robot has other numbers than the simulator: {', '.join(told)}{more}. " if told else ""
 
 
 def look_at(verdict: str, stretches: Sequence[OddStretch]) -> str:

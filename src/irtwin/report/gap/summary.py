@@ -41,7 +41,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         if cause.likely and one.simulator is not None and one.robot is not None
     ])  # fmt: skip
     look = findings.look_at(diagnosis.verdict, diagnosis.odd_stretches or ())
-    return f"{diagnosis.verdict}: {sentence}{numbers}{look}".replace("\N{NO-BREAK SPACE}", " ")
+    return f"{diagnosis.verdict}: {numbers}{sentence}{look}".replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _told(one: Finding, against: str | None, causes: Sequence[Cause]) -> findings.ToldFinding:

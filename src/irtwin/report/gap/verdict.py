@@ -40,7 +40,7 @@ def sentence(answers: Answers) -> str:
         _against(judged),
         misses(judged["tracking_error"]) if played else None,
     )  # fmt: skip
-    return said + numbers + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
+    return numbers + said + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
 
 def _odd_stretches(answers: Answers) -> list[OddStretch]:
