@@ -119,6 +119,18 @@ def test_what_there_is_not(plant: Server, path: str, status: int, said: str) -> 
     assert response.text.count("\n") <= 1 and said in response.text
 
 
+@pytest.mark.parametrize("path", ["/robot/nobody", "/compare", "/no/such/page", "/reports/nothing.html"])
+def test_a_browser_gets_a_page_that_leads_back(plant: Server, path: str) -> None:
+    response = CLIENT.get(plant.url + path, headers=BROWSER)
+    assert (response.status_code, response.headers["content-type"]) == (404, "text/html; charset=utf-8")
+    assert "/" in Elements(response.text).paths
+    assert CLIENT.get(plant.url + path).text.rstrip("\n.") in response.text
+
+
+def test_what_a_browser_asked_for_is_not_written_into_a_page_as_it_is(plant: Server) -> None:
+    assert "<b>" not in CLIENT.get(f"{plant.url}/tables/robots.<b>", headers=BROWSER).text
+
+
 def test_a_day_that_is_none_is_said_on_the_page(plant: Server) -> None:
     response = CLIENT.get(f"{plant.url}/compare?robot=Arm_A&a_from=<b>&b_from=2026-03-02")
     assert response.status_code == 200

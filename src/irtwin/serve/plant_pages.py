@@ -243,6 +243,15 @@ async def html(drawn: Callable[[], str], policy: str = POLICY) -> Response:
     return Response(await asyncio.to_thread(drawn), media_type="text/html", headers=headers)
 
 
+async def refusal_page(refusal: Refusal) -> Response:
+    """Return what is not answered as a page that leads back to the plant."""
+    said = {"heading": "Not here" if refusal.status == 404 else "Not answered", "status": refusal.status}
+    answer = await html(lambda: page.render("refused.html.jinja", {}, {}, message=refusal.message, **said))
+    answer.status_code = refusal.status
+    answer.headers.update(refusal.headers)
+    return answer
+
+
 async def table(request: Request, name: str, made: Callable[[], Sheet]) -> Response:
     """Return a table as the file that its path asks for. Raises Refusal where it cannot be written so."""
     form = request.path_params["form"]

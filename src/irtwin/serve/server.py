@@ -16,6 +16,7 @@ from types import FrameType
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
@@ -37,7 +38,8 @@ from irtwin.serve.connections import TimedConnection
 from irtwin.serve.endpoint import Endpoint, refused
 from irtwin.serve.guard import Guard
 from irtwin.serve.live_page import LivePages
-from irtwin.serve.plant_pages import PlantPages
+from irtwin.serve.negotiation import wants_page
+from irtwin.serve.plant_pages import PlantPages, refusal_page
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.report_files import ReportFiles
@@ -217,7 +219,7 @@ def application(
             Middleware(Guard, local=_is_loopback(host), origins=frozenset(origins)),
             Middleware(GZipMiddleware, minimum_size=_SMALL, compresslevel=5),
         ],
-        exception_handlers={Refusal: _refused},
+        exception_handlers={Refusal: _refused, HTTPException: _no_page},
         lifespan=lifespan,
     )
     app.state.live_pages = live
@@ -232,9 +234,18 @@ def _opcua(asking: Asking, resources: Resources, host: str, port: int | None) ->
     return answering(asking, named_questions(resources)["plant_now"].text, host, port)
 
 
-def _refused(request: Request, error: Exception) -> Response:
+async def _refused(request: Request, error: Exception) -> Response:
+    """Say why in one line; in a browser, on a page that leads back."""
     assert isinstance(error, Refusal)
+    if error.message and wants_page(request.headers.get("accept", "")):
+        return await refusal_page(error)
     return refused(error)
+
+
+async def _no_page(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    message = "there is no page at this address" if error.status_code == 404 else error.detail
+    return await _refused(request, Refusal(error.status_code, message, error.headers))
 
 
 def _bind(host: str, port: int, instead: str = "--port 0 picks a free one") -> socket.socket:

@@ -13,6 +13,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
+    GRAPH_OWL_RL,
     GRAPH_REASONED,
     GRAPH_SOURCE,
     GRAPH_VALIDATION,
@@ -123,7 +124,7 @@ def _by(graph: str, base: str) -> tuple[str, str | None]:
         name = graph.removeprefix(GRAPH_ACTIVITY)
         return f"activity {name}", f"{base}activity/{name}"
     if graph.startswith(GRAPH_INFERRED):
-        return f"concluded by {graph.removeprefix(GRAPH_INFERRED)}", None
+        return f"concluded by {'OWL' if graph == GRAPH_OWL_RL else graph.removeprefix(GRAPH_INFERRED)}", None
     if graph.startswith(GRAPH_SOURCE):
         return f"taken in ({graph.removeprefix(GRAPH_SOURCE)})", None
     known = {
