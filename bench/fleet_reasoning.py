@@ -59,7 +59,8 @@ def step(place: Path, what: str) -> None:
             timed(f"{what}, mapping", lambda: rewriting.map_rows(workspace, graph))
         if what in ("reasoning", "five rows"):
             found = timed(f"{what}, reasoning", lambda: reason(graph))
-            print(f"  {found.owl_rl} triples from OWL 2 RL, {found.by_rules} from rules, joined by {found.joined_by}")
+            how = "each robot by itself" if found.joined_by is None else f"all together, joined by {found.joined_by}"
+            print(f"  {found.owl_rl} triples from OWL 2 RL, {found.by_rules} from rules; {how}")
         if what in ("validation", "five rows"):
             print(f"  {len(timed(f'{what}, validation', lambda: validate(graph)))} violations")
         if what == "whole":
