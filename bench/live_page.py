@@ -75,7 +75,7 @@ def main() -> None:
     width, height = map(int, said.size.split("x"))
     with irtwin("serve", "--workspace", said.workspace, "--port", 0) as server, sync_playwright() as playwright:
         assert server.stdout is not None
-        address = server.stdout.readline().split()[1].removesuffix("/sparql.").removesuffix("/sparql")
+        address = server.stdout.readline().split()[1].rstrip(".,").removesuffix("/sparql")
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         page = browser.new_page(viewport={"width": width, "height": height})
         page.on("console", lambda message: print("console:", message.text) if message.type == "error" else None)
