@@ -14,8 +14,12 @@ from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.finding import estimate_of, find
+from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
+from irtwin.gap.regression.hypotheses import MISSING, hypotheses
+from irtwin.gap.regression.joint_equations import joint_equations
+from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import Run
@@ -136,3 +140,22 @@ def test_power_tells_what_torque_alone_cannot(made, effect):
 
 def test_a_meter_out_of_scale_is_no_torque():
     assert names(found(case(gain=1.1))) == []
+
+
+def test_what_power_alone_tells_of_a_sensor_is_no_surer_than_power_is_explained():
+    one, misfit = case(gain=1.1, cable=6.0), {"torque": 0.0025, "power": 0.04}
+    stack = Stack(ROBOT, one.effects)
+    plain = LeftOut(stack, torque_system(stack, one.with_torque, one.grouping, (), None))
+    tried = [catalogue()[name] for name in ("cable_drag", "torque_constant_error")]
+    before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
+    both = joint_equations(stack, one.measured, one.grouping, (tried, ()), plain.below, plain.torque, before)
+    system = both.whole.by_speed
+    named = hypotheses(system.columns, system.base, MISSING)
+    noise = system.residual_rms((), np.ones(len(system.pattern)))
+    projection = Projection(system, noise, [shape for each in named for shape in each.variants])
+    by_equation = np.tile([misfit["torque"], misfit["torque"], misfit["power"]], 2)
+    prior = HypothesisPrior.of(named)
+    beside = Posterior.beside(projection, (), named, prior, DEFAULT.criterion, by_equation)
+    told = {(each.effect, each.joint): size**2 for each, size in zip(named, beside.misfit, strict=True)}
+    assert told["cable_drag", "joint_1"] < 2 * misfit["torque"]  # both tell that
+    assert told["torque_constant_error", "joint_2"] > 5 * misfit["torque"]

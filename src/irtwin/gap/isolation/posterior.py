@@ -205,14 +205,14 @@ class Posterior:
 def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvidence) -> np.ndarray:
     """Return (V,) the misfit, squared, of the rows in which a variant explains something; `misfit` (g,) of equations.
 
-    What it explains in one half of the equations counts by the misfit there.
+    What it explains in one kind of equations counts by the misfit there. Power may tell of torque what torque does not:
+    that a sensor is off is said by power alone, and no surer than power is explained.
     """
-    explained, own = np.zeros((2, len(seen.variants), len(system.halves)))
     acts = system.equations([variant.columns for variant in seen.variants])
-    for k, half in enumerate(system.halves):
-        inside = [each == half for each, _ in system.parts]
-        explained[:, k] = (seen.said + 2 * seen.missed)[:, inside].sum(axis=1).clip(min=0.0)
-        own[:, k] = (acts[:, half] * misfit[half]).sum(axis=1) / np.maximum(acts[:, half].sum(axis=1), 1)
+    explained, own = seen.by_kind.clip(min=0.0), np.zeros_like(seen.by_kind)
+    for k, kind in enumerate(system.kinds):
+        mine = np.where(acts[:, kind].any(axis=1, keepdims=True), acts[:, kind], True)
+        own[:, k] = (mine * misfit[kind]).sum(axis=1) / mine.sum(axis=1)
     explained[explained.sum(axis=1) <= 0] = 1.0
     return np.asarray(explained.sum(axis=1) / (explained / own).sum(axis=1))
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -25,10 +26,11 @@ _FEW = 4.0  # groups' worth of weight that the spread of the other variants has 
 
 @dataclass(frozen=True)
 class HypothesisEvidence:
-    """V variants beside a fit, G parts of the equations (`System.parts`); squares in units of the noise.
+    """V variants beside a fit, G halves of groups (`System.halves`); squares in units of the noise.
 
-    explained (V,); said, missed (V, G): what each adds to a part, and the score that this leaves there; values (V, k
-    each), beyond what is expected, in units of the prior; information (V, k, k each); rows (G,).
+    explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; values (V, k each),
+    beyond what is expected, in units of the prior; information (V, k, k each); rows (G,); by_kind (V, `System.kinds`):
+    of what is explained.
     """
 
     variants: tuple[Variant, ...]
@@ -38,6 +40,7 @@ class HypothesisEvidence:
     values: tuple[np.ndarray, ...]
     information: tuple[np.ndarray, ...]
     rows: np.ndarray
+    by_kind: np.ndarray
 
     @cached_property
     def rows_that_speak(self) -> np.ndarray:
@@ -87,9 +90,19 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
         said[places], missed[places] = squares.T, (measured - squares).T
         for place, known_of, value in zip(places, products, fit - expected, strict=True):
             information[place], values[place] = known_of, value
-    rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in system.parts])
-    shown = np.maximum(explained, 0.0), np.maximum(said, 0.0), missed
-    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows)
+    by_kind = (said + 2 * missed).reshape(len(variants), len(system.kinds), system.groups).sum(axis=2)
+    said, missed = (_in_halves(system, squares) for squares in (np.maximum(said, 0.0), missed))
+    halves = product(system.halves, range(system.groups))
+    rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in halves])
+    shown = np.maximum(explained, 0.0), said, missed
+    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows, by_kind)
+
+
+def _in_halves(system: System, squares: np.ndarray) -> np.ndarray:
+    """Return squares (V, P) of each part as those of each half and group (V, G): power's are with those of torque."""
+    kinds = squares.reshape(len(squares), len(system.kinds), system.groups)
+    starts = [kind for kind, own in enumerate(system.kinds) if own.start in {half.start for half in system.halves}]
+    return np.add.reduceat(kinds, starts, axis=1).reshape(len(squares), len(starts) * system.groups)
 
 
 def _lowest(system: System, variant: Variant, known: Set[str]) -> np.ndarray:

@@ -114,6 +114,14 @@ class System:
         return (slice(count // 2), slice(count // 2, count)) if self.apart else (slice(count),)
 
     @property
+    def kinds(self) -> tuple[slice, ...]:
+        """The equations whose misfit is alike: the halves, power's apart from torque's; it has no slow rows."""
+        if not self.beside_power:
+            return self.halves
+        first, *others = self.halves
+        return slice(first.stop - 1), slice(first.stop - 1, first.stop), *others
+
+    @property
     def base(self) -> int:
         """K, how many terms the twin has."""
         return len(self.terms)
@@ -278,8 +286,8 @@ class System:
         """
         weights = np.maximum(noise, self.quietest) ** -2.0
         return [
-            Moments(list(zip(self._products[group][half], weights[half].tolist(), strict=True)))
-            for half, group in self.parts
+            Moments(list(zip(self._products[group][kind], weights[kind].tolist(), strict=True)))
+            for kind, group in self.parts
         ]
 
     def group_moments(self, noise: np.ndarray) -> list[Moments]:
@@ -289,8 +297,8 @@ class System:
 
     @property
     def parts(self) -> list[tuple[slice, int]]:
-        """The halves of the groups, (P,): of which equations, and of which group."""
-        return [(half, group) for half in self.halves for group in range(self.groups)]
+        """The kinds of equations of the groups, (P,): of which equations, and of which group."""
+        return [(kind, group) for kind in self.kinds for group in range(self.groups)]
 
     def shaken_products(self, coefficients: np.ndarray, noise: np.ndarray) -> np.ndarray | None:
         """Return the products (P, D + 1) of all columns with what noise of positions seems to explain, in each part.
@@ -311,21 +319,21 @@ class System:
             for observed in (False, True)
         ]
         return np.array(
-            [self.rows[group, half] @ a_row[int(self.group_observed[group])][half] for half, group in self.parts]
+            [self.rows[group, kind] @ a_row[int(self.group_observed[group])][kind] for kind, group in self.parts]
         )
 
     def products_of(self, one: np.ndarray, other: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """Return in each part the product of each column with another, (N,) indices: (P, N); weighted by `noise`."""
-        sums = np.zeros((len(self.halves), self.groups, len(one)))
+        sums = np.zeros((len(self.kinds), self.groups, len(one)))
         weights = np.maximum(noise, self.quietest) ** -2.0
-        for equation, weight in enumerate(weights):
-            half = equation // (len(weights) // len(self.halves))
+        kinds = [kind for kind, own in enumerate(self.kinds) for _ in weights[own]]
+        for equation, (kind, weight) in enumerate(zip(kinds, weights, strict=True)):
             for observed in (False, True):
                 at = self._places[observed][equation].at
                 some = np.flatnonzero((at[one] >= 0) & (at[other] >= 0))
                 held = at[one[some]], at[other[some]]
                 for group in np.flatnonzero(self.group_observed == observed):
-                    sums[half, group, some] += weight * self._products[group][equation].pairs(*held)
+                    sums[kind, group, some] += weight * self._products[group][equation].pairs(*held)
         return sums.reshape(-1, len(one))
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
