@@ -13,7 +13,7 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Block, Columns, Equations, Rows, accumulate, accumulate_any, part_read
 from irtwin.identification.estimators import Estimate, estimate
-from irtwin.identification.power_line import PowerLine, power_line, power_rows, rows_of_both
+from irtwin.identification.power_line import PowerLine, power_line, power_rows, rise_over_axes, rows_of_both
 from irtwin.identification.reduced_torque import ReducedTorque
 from irtwin.signals.motion import Motion
 
@@ -63,21 +63,39 @@ def fit_power(
             assert motion.power is not None
             torque = stack.real_torque(motion, torque_values, sparse=True)
             columns = stack.predicted_power_columns(motion, torque_values, values, torque)
+            burnt = _burnt(stack, motion, torque, columns, values)
             known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
-            return Rows(columns[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
+            known -= burnt[:, ~stack.fixed] @ values[~stack.fixed]
+            return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
 
         return _of_one(motions, equations, free, stack.prior_rows(free), every)
 
     values = _expected(stack.power_terms)
     blocks, found = fit(values)
     for _ in range(_REPEATS if stack.power_coupled else 0):
-        before = found.values
-        values = values.copy()
-        values[~stack.fixed] = before
-        blocks, found = fit(values)
-        if _converged(found.values, before, _of(free)):
+        step = np.abs(found.values - values[~stack.fixed]) / np.sqrt(np.diag(found.covariance))
+        if step.max(initial=0.0) < _SETTLED:
             break
+        values = values.copy()
+        values[~stack.fixed] = found.values
+        blocks, found = fit(values)
     return blocks, found
+
+
+def _burnt(stack: Stack, motion: Motion, torque: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return by how much less columns of power (N, L) count, as what the axes give back is burnt: (N, L).
+
+    By Gauss-Newton, about the coefficients `values` (L,). Without it heat in joints that give back would count where
+    none of it is drawn.
+    """
+    if not stack.power_coupled:
+        return np.zeros_like(columns)
+    on_bus = columns * stack.on_the_bus
+    axes, rise = on_bus @ values, np.zeros(len(columns))
+    for effect in dict.fromkeys(effect for effect, _ in stack.power_terms):
+        own = [owner is effect for owner, _ in stack.power_terms]
+        rise += rise_over_axes(stack, effect, motion, torque, axes, values[own])
+    return np.asarray(rise[:, None] * on_bus)
 
 
 def fit_both(

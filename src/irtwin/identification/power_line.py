@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from irtwin.effects.effect import JointEffect
+from irtwin.effects.effect import Effect, JointEffect, Predicted
 from irtwin.effects.stack import Stack
 from irtwin.identification.accumulate import Columns, Given, Rows
 from irtwin.signals.motion import Motion
@@ -16,6 +16,7 @@ from irtwin.signals.motion import Motion
 Carried = TypeVar("Carried", np.ndarray, Columns)  # columns (N, r), or arrays of them to stand side by side
 
 _STEP = 1e-2  # N m, exact for what is quadratic in torque
+_STEP_OF_AXES = 1e-3  # W
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,22 @@ def power_rise(stack: Stack, motion: Motion, torque: np.ndarray, along: np.ndarr
     step = _STEP * along
     rise = stack.power_columns(motion, torque + step) - stack.power_columns(motion, torque - step)
     return np.asarray(rise / (2 * _STEP))
+
+
+def rise_over_axes(
+    stack: Stack, effect: Effect, motion: Motion, torque: np.ndarray, axes: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Return by how much what an effect takes rises with the power of the axes, (N,) W/W, about `axes` (N,) W.
+
+    values: (k,), the effect's coefficients. What depends on the past is taken as it is.
+    """
+    if effect.needs != "power" or effect.memory:
+        return np.zeros(len(axes))
+    more, less = (
+        effect.columns(stack.robot, motion, Predicted(torque, axes + step, axes + step))
+        for step in (_STEP_OF_AXES, -_STEP_OF_AXES)
+    )
+    return np.asarray((more - less) @ values / (2 * _STEP_OF_AXES))
 
 
 def rows_of_both(

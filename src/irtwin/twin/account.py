@@ -8,14 +8,13 @@ from itertools import chain
 
 import numpy as np
 
-from irtwin.effects.effect import NORMAL, JointEffect, Predicted
-from irtwin.identification.power_line import power_rise, power_slope
+from irtwin.effects.effect import NORMAL, JointEffect
+from irtwin.identification.power_line import power_rise, power_slope, rise_over_axes
 from irtwin.signals.motion import Motion
 from irtwin.twin.price import cost, trapezoid
 from irtwin.twin.twin import LedgerEntry, Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
-_STEP = 1e-3  # W
 _LEARNT = 0.5  # of an energy: half an interval that is wider tells nothing of it
 
 Key = tuple[str, str | None]  # effect and joint
@@ -197,18 +196,15 @@ def _of_losses(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
 
 def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
     """Yield the slopes of what is made of the power that axes give back, by what that power depends on."""
-    stack, robot, piece = about.twin.stack, about.twin.robot, about.piece
+    stack, piece = about.twin.stack, about.piece
     on_bus = np.where(stack.on_the_bus, about.values, 0.0)
     axes = about.flows @ on_bus
     for effect in stack.effects:
         row = rows.get((effect.id, None))
         if row is None or effect.needs != "power" or effect.memory:
             continue
-        more, less = (
-            effect.columns(robot, piece, Predicted(about.torque, axes + step, axes + step)) for step in (_STEP, -_STEP)
-        )
-        own = np.array([about.twin.value(effect.id, term) for term in effect.terms(robot)])
-        rise = about.weights * ((more - less) @ own) / (2 * _STEP)
+        own = np.array([about.twin.value(effect.id, term) for term in effect.terms(about.twin.robot)])
+        rise = about.weights * rise_over_axes(stack, effect, piece, about.torque, axes, own)
         over_torque = rise[:, None] * power_slope(stack, piece, about.torque, on_bus)
         torque = np.einsum("tj,tjk->k", over_torque, about.columns) * stack.real
         yield row, torque, rise @ about.flows * stack.on_the_bus
