@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.synthetic import arm, swing, with_constants
@@ -43,3 +44,18 @@ def test_closed_brakes_carry_the_links_so_that_no_current_heats() -> None:
     assert np.array_equal(held[on], free[on])
     assert not held[~on][:, heat].any() and free[~on][:, heat].all()
     assert np.array_equal(held[~on][:, np.invert(heat)], free[~on][:, np.invert(heat)])
+
+
+def test_brakes_open_before_a_motion_and_nobody_knows_power_while_they_switch() -> None:
+    motion = swing(with_constants(arm(2)), 1, seconds=6.0)
+    moves = (motion.time >= 2.0) & (motion.time < 3.0)
+    still = replace(motion, dq=np.where(moves[:, None], 1.0, 0.0) * np.ones(2))
+    stack = Stack(arm(2), ["standby_power", HoldingBrakes(delay=0.5, lead=0.2)])
+    on, near = stack.drives_on(still) > 0, stack.switching(still)
+    assert still.time[on][[0, -1]] == pytest.approx([1.8, 3.5], abs=0.02)
+    for opens in (1.8, 3.5):
+        assert near[np.abs(still.time - opens) < 0.08].all()
+    assert not near[np.abs(still.time[:, None] - [1.8, 3.5]).min(axis=1) > 0.12].any()
+    parts = [stack.switching(still.part(at, at + 70)) for at in range(0, len(still.time), 70)]
+    assert np.array_equal(np.concatenate(parts), near)
+    assert Stack(arm(2), ["standby_power"]).switching(still) is None

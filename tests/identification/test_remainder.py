@@ -7,7 +7,7 @@ import pytest
 
 from irtwin.effects.effect import Term
 from irtwin.identification.accumulate import Block
-from irtwin.identification.remainder import Remainder, of_pauses, remainder
+from irtwin.identification.remainder import Remainder, of_pauses, of_rest, remainder
 
 TERMS = [Term("P0", "W", spread=600.0, lowest=0.0), Term("F", "N m", spread=100.0)]
 SECONDS, ROWS = 10.0, 200
@@ -64,3 +64,11 @@ def test_each_pause_has_what_is_left_of_its_own():
     assert of_pauses(pauses) == pytest.approx(2.0, rel=0.2)
     assert of_pauses([rng.standard_normal(n) for n in lengths]) < 0.1
     assert of_pauses(pauses[:3]) == 0.0
+
+
+def test_the_power_at_rest_is_known_better_by_more_pauses():
+    rng = np.random.default_rng(0)
+    few, many = ([np.full(100, 2.0 * rng.standard_normal()) for _ in range(count)] for count in (5, 500))
+    assert of_rest(many) == pytest.approx(2.0 / 500**0.5, rel=0.15)
+    assert of_rest(few) == pytest.approx(of_pauses(few) / 5**0.5)
+    assert of_rest(few[:2]) == of_rest([]) == 0.0

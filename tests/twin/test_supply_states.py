@@ -10,7 +10,8 @@ from tests.synthetic import arm, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.supply import HoldingBrakes
-from irtwin.signals.motion import standstill
+from irtwin.signals.filter import lagged
+from irtwin.signals.motion import Motion, standstill
 from irtwin.twin.identify import identify
 from irtwin.twin.supply_states import supply_states
 
@@ -82,3 +83,26 @@ def test_a_joint_that_slips_at_rest_opens_no_brake():
     slipped = replace(whole, dq=slip)
     assert (HoldingBrakes(delay=DELAY).columns(ROBOT, slipped)[:, 0] == closed).all()
     assert (standstill(slipped) == standstill(whole)).all()
+
+
+def slow_coils(seed: int):
+    """Rest, a motion, rest: brakes open 0.1 s before it, as no shape that is tried, and their current rises slowly."""
+    moving = run(seed)
+    count = round(REST * moving.rate)
+    before = {name: np.repeat(getattr(moving, name)[:1], count, axis=0) for name in ("q", "dq", "ddq")}
+    states = {name: np.concatenate([rest * (name == "q"), getattr(moving, name)]) for name, rest in before.items()}
+    bare = Motion(np.arange(count + len(moving.time)) / moving.rate, **states, run=moving.run)
+    shown = measure(ROBOT, bare, 0.2, seed=seed)
+    on = HoldingBrakes(delay=DELAY, lead=0.1).columns(ROBOT, bare)[:, 0]
+    heat = (truth(ROBOT)["R"] * shown.current**2).sum(axis=1)
+    coils = lagged(on, np.exp(-1 / (0.03 * bare.rate)), before=0.0)
+    return replace(shown, power=shown.power + BRAKES * coils - heat * (1 - on))
+
+
+@pytest.mark.slow
+def test_brakes_whose_coils_take_a_while_leave_the_standby_as_it_is():
+    twin = identify(ROBOT, [slow_coils(seed) for seed in range(4)], [*BASELINE, "copper_loss", "holding_brakes"])
+    (brakes,) = (effect for effect in twin.stack.effects if effect.id == "holding_brakes")
+    assert brakes.lead == pytest.approx(0.08, abs=0.04) and brakes.delay == pytest.approx(DELAY, abs=0.1)
+    standby = next(one for one in twin.parameters if one.effect == "standby_power")
+    assert standby.lower < truth(ROBOT)["P0"] < standby.upper < standby.lower + 2.0

@@ -10,6 +10,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.load import ExternalContact
+from irtwin.effects.supply import HoldingBrakes
 from irtwin.errors import InputError
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
@@ -151,6 +152,17 @@ def test_an_effect_of_a_shape_is_written_with_it(tmp_path):
         "shape": {"start": "-inf", "stop": 4.0},
     }
     assert load(tmp_path / "twin.json").effects[-1] == shaped
+
+
+def test_brakes_of_a_former_release_open_as_a_joint_moves(tmp_path):
+    path = tmp_path / "twin.json"
+    braked = ("standby_power", "mechanical_power", "rigid_body", HoldingBrakes(delay=0.3))
+    path.write_text(to_json(identify(ROBOT, [MOTION], braked)))
+    document = json.loads(path.read_text())
+    brakes = next(effect for effect in document["effects"] if not isinstance(effect, str) and effect["shape"])
+    del brakes["shape"]["lead"]
+    path.write_text(json.dumps(document))
+    assert HoldingBrakes(delay=0.3, lead=0.0) in load(path).stack.effects
 
 
 @pytest.mark.parametrize("shape", [{}, {"start": "early", "stop": 1.0}])

@@ -157,7 +157,8 @@ class Effect(ABC):
     no motion does; `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients,
     of those that they have. What its parameters can be is `possible`.
 
-    Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined.
+    Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined, and
+    `lately` those that twins of former releases lack: they are as by default.
     `joints` are those that it acts on (None: all; an effect of the whole robot takes no notice), `runs` those in which
     it acts (None: all). To teach the twin a new effect, write a class and list it in `irtwin.effects.catalogue`.
     """
@@ -187,6 +188,7 @@ class Effect(ABC):
     of_change: ClassVar[bool] = False
     never_changed: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+    lately: ClassVar[frozenset[str]] = frozenset()
 
     joints: tuple[str, ...] | None = field(default=None, kw_only=True)
     runs: tuple[str, ...] | None = field(default=None, kw_only=True)

@@ -21,6 +21,7 @@ from irtwin.signals.sparse import Sparse, at_all, at_some, factor_at_some
 _LARGEST = 1e15  # SI: beyond, squares of what a coefficient does are no numbers
 _PIECE = 4096  # samples whose columns are held at once
 _STATES = 400  # random ones, many more than a joint has columns
+_SWITCHING = 0.1  # s: in it coils of brakes take up their current, and nobody logs when they begin
 _INDEPENDENT = 1e-9  # of a scaled column: less is rounding
 
 Span = tuple[np.ndarray, np.ndarray]  # places (r,) of columns that span others, and the (r, k) matrix that makes them
@@ -263,6 +264,20 @@ class Stack:
             part = effect.undecided(motion)
             undecided |= False if part is None else part
         return undecided
+
+    def switching(self, motion: Motion) -> np.ndarray | None:
+        """Return (N,) where brakes open or close, or are about to; None without brakes.
+
+        Coils of brakes take up their current in a while, and no log says when they begin.
+        """
+        whole, near = motion.whole or motion, max(1, round(_SWITCHING * motion.rate))
+        first, last = max(0, motion.start - near), min(len(whole.time), motion.start + len(motion.time) + near)
+        released = self.drives_on(whole.part(first, last))
+        if released is None:
+            return None
+        switches = np.pad(np.diff(released) != 0, (near, near))
+        window = np.lib.stride_tricks.sliding_window_view(switches, 2 * near)
+        return np.asarray(np.any(window, axis=1))[motion.start - first :][: len(motion.time)]
 
     def real_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients; `sparse` as in `torque_of`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +12,8 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.motion import Motion, moves
 
 _MOVING = 1e-2  # rad/s
+_DELAYS = (0.0, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0, 5.0)  # s
+_LEADS = (0.0, 0.05, 0.15)  # s
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ class NoRegeneration(Effect):
 
 @dataclass(frozen=True)
 class HoldingBrakes(Effect):
-    """Pb while the brakes are released: as long as a joint moves, and `delay` longer. Closed, they carry the links."""
+    """Pb while brakes are released, from `lead` before a joint moves to `delay` after. Closed, they carry the links."""
 
     id: ClassVar[str] = "holding_brakes"
     frees_joints: ClassVar[bool] = True
@@ -147,13 +149,15 @@ class HoldingBrakes(Effect):
     channel: ClassVar[str] = "power"
     signal: ClassVar[str] = "power"
     memory: ClassVar[bool] = True
-    ranges: ClassVar[dict[str, tuple[float, float]]] = {"delay": (0.0, 10.0)}
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {"delay": (0.0, 10.0), "lead": (0.0, 1.0)}
+    lately: ClassVar[frozenset[str]] = frozenset({"lead"})
 
     delay: float = 0.5  # s
+    lead: float = 0.0  # s
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
-        """Return delays after which brakes close."""
-        return self.variants(delay=(0.0, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0, 5.0))
+        """Return delays after which brakes close, and how long before a motion they open."""
+        return tuple(replace(self, delay=delay, lead=lead) for delay in _DELAYS for lead in _LEADS)
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return Pb."""
@@ -163,4 +167,6 @@ class HoldingBrakes(Effect):
         """Return (N, 1) whether the brakes are released."""
         moving = moves(motion, np.any(np.abs(motion.dq) > _MOVING, axis=1))
         last = np.maximum.accumulate(np.where(moving, motion.time, -np.inf))
-        return (motion.time - last <= self.delay).astype(float)[:, None]
+        following = np.minimum.accumulate(np.where(moving, motion.time, np.inf)[::-1])[::-1]
+        released = (motion.time - last <= self.delay) | (following - motion.time <= self.lead)
+        return released.astype(float)[:, None]

@@ -62,7 +62,12 @@ def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ..
     shown = added(case, [cause for finding in findings for cause in finding.causes])
     left_open = {effect: places for finding in findings for effect, places in _open(case, finding).items()}
     choices = tuple(one for finding in findings for one in _choices(case, finding))
-    return (*case.effects, *shown, *elsewhere(shown, left_open)), choices
+    return (*case.effects, *map(_of_open_shape, shown), *elsewhere(shown, left_open)), choices
+
+
+def _of_open_shape(effect: Effect) -> Effect | str:
+    """Return an effect on the power of the whole robot by its id: its shape was found beside losses yet unknown."""
+    return effect.id if effect.signal == "power" and effect.joints is None and effect.runs is None else effect
 
 
 def elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Iterator[Effect]:

@@ -50,11 +50,11 @@ def fit_torque(
 
 
 def fit_power(
-    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, every: int = 1
+    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, every: int = 1, *, switching: bool = False
 ) -> tuple[list[Block], Estimate]:
     """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them.
 
-    `every` as in `accumulate`.
+    `every` as in `accumulate`; `switching`: moments at which brakes open or close count, too, as they tell when.
     """
     free = free_terms(stack)
 
@@ -66,7 +66,8 @@ def fit_power(
             burnt = _burnt(stack, motion, torque, columns, values)
             known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
             known -= burnt[:, ~stack.fixed] @ values[~stack.fixed]
-            return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None])
+            unsure = None if switching or (near := stack.switching(motion)) is None else near[:, None]
+            return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None], unsure)
 
         return _of_one(motions, equations, free, stack.prior_rows(free), every)
 
@@ -153,7 +154,7 @@ def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
         own, (line, work) = stack.sparse_by_joint(motion, values[: len(stack.torque_terms)]), line_of(motion)
         rows = [*own, [*line.carried, line.free, work[:, None]]]
         known = stack.shift_torque(motion, sparse=True), line.known
-        return rows_of_both(stack, motion, rows, known, work < 0)
+        return rows_of_both(stack, motion, rows, known, _unsure(stack, motion, work))
 
     return equations
 
@@ -164,9 +165,16 @@ def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
 
     def equations(motion: Motion) -> Rows:
         line, work = line_of(motion)
-        return power_rows(motion, [*line.carried, line.free, work[:, None]], line.known, work < 0)
+        columns = [*line.carried, line.free, work[:, None]]
+        return power_rows(motion, columns, line.known, _unsure(stack, motion, work))
 
     return equations
+
+
+def _unsure(stack: Stack, motion: Motion, work: np.ndarray) -> np.ndarray:
+    """Return (N,) where power does not hold: what joints give back may be burnt, and brakes are about to switch."""
+    near = stack.switching(motion)
+    return np.asarray(work < 0 if near is None else (work < 0) | near)
 
 
 def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine[Columns], np.ndarray]]:

@@ -74,6 +74,15 @@ def of_pauses(left: Sequence[np.ndarray]) -> float:
     return _grown([one.mean() ** 2 - one.var() / len(one) for one in left], rows**2)
 
 
+def of_rest(left: Sequence[np.ndarray]) -> float:
+    """Return how unsure pauses leave the power at rest, W, one standard deviation; arguments as above.
+
+    That is what is left of their mean: each pose stands for itself, and is off by what dry friction holds there.
+    """
+    rows = np.array([len(one) for one in left], dtype=float)
+    return of_pauses(left) * math.sqrt((rows**2).sum()) / max(float(rows.sum()), 1.0)
+
+
 def _grown(squares: Sequence[float], weights: np.ndarray) -> float:
     """Return the root of a mean of squares, grown so that `NORMAL` of it are half a 95 % interval."""
     grown = float(scipy.special.stdtrit(len(squares) - 1, (1 + LEVEL) / 2)) / NORMAL

@@ -76,9 +76,13 @@ def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry])
     """Return the (E, E) covariance of the ledger's E energies, J^2, of a twin that has one of its parameters."""
     slopes = _slopes(twin, motion, ledger)
     covariance = np.asarray(slopes @ twin.covariance @ slopes.T)
-    if twin.remainder:  # what lasts of it looks like what is drawn at rest
-        lasting = twin.remainder.energy(float(motion.time[-1] - motion.time[0]))
-        covariance += np.diag([lasting**2 if entry.effect in twin.at_rest else 0.0 for entry in ledger])
+    seconds = float(motion.time[-1] - motion.time[0])
+    lasting = twin.remainder.energy(seconds) if twin.remainder else 0.0  # it looks like what is drawn at rest
+    unsure = {one.effect: one.upper - one.value for one in twin.parameters if one.upper is not None}
+    for k, entry in enumerate(ledger):
+        if entry.effect in twin.at_rest:
+            alone = unsure.get(entry.effect, 0.0) / NORMAL * seconds
+            covariance[k, k] = max(covariance[k, k] + lasting**2, alone**2)
     return covariance
 
 

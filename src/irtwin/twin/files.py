@@ -187,10 +187,10 @@ def _effect(path: Path, place: int, given: Any) -> Effect:
     if isinstance(given, str):
         return known
     placed, shape = form.from_json(_Placed, given, where, _MEND), given.get("shape")
-    if not isinstance(shape, dict) or shape.keys() != known.shape.keys():
+    if not isinstance(shape, dict) or not known.shape.keys() - known.lately <= shape.keys() <= known.shape.keys():
         raise InputError(f"{where}.shape must have {', '.join(known.shape) or 'no key'}; {_MEND}")
     try:
-        values = {key: type(value)(shape[key]) for key, value in known.shape.items()}
+        values = {key: type(value)(shape.get(key, value)) for key, value in known.shape.items()}
     except (TypeError, ValueError) as error:
         raise InputError(f"{where}.shape holds a wrong value ({error}); {_MEND}") from error
     return replace(known, **values, joints=placed.joints, runs=placed.runs)

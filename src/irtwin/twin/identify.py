@@ -14,7 +14,7 @@ from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Block
+from irtwin.identification.accumulate import Block, part_read
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
 from irtwin.identification.consistent_bodies import spreads, with_consistent_bodies
 from irtwin.identification.estimators import Estimate, combine
@@ -28,7 +28,7 @@ from irtwin.identification.fits import (
     real_terms,
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
-from irtwin.identification.remainder import Remainder, of_pauses, remainder
+from irtwin.identification.remainder import Remainder, of_pauses, of_rest, remainder
 from irtwin.identification.robust_weights import odd_stretches
 from irtwin.identification.run_scatter import with_run_scatter
 from irtwin.identification.torque_constants import torque_from_current
@@ -39,6 +39,7 @@ from irtwin.signals.motion import Motion, pauses
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 Found = tuple[Terms, Estimate]
+_LOOKS = 8  # at shapes between two that were tried
 
 
 @one_blas_thread()
@@ -83,7 +84,13 @@ def identify(
         powered = bool(with_power) and not stack.fixed.all()
         if powered:
             values = torque.values
-            stack = _shaped(stack, open_shapes, "power", lambda trial: fit_power(trial, with_power, values)[1])
+            every = part_read(with_power)
+            stack = _shaped(
+                stack,
+                open_shapes,
+                "power",
+                lambda trial: fit_power(trial, with_power, values, every, switching=True)[1],
+            )
             if any(effect.carries_torque for effect in stack.effects):
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known)
@@ -119,15 +126,25 @@ def identify(
         body_change=change,
         odd_stretches=odd,
     )
-    return replace(twin, remainder=_with_pauses(twin, with_power))
+    return _with_pauses(twin, with_power)
 
 
-def _with_pauses(twin: Twin, motions: Sequence[Motion]) -> Remainder | None:
-    """Return the twin's remainder, with what its effects leave of the power of pauses."""
+def _with_pauses(twin: Twin, motions: Sequence[Motion]) -> Twin:
+    """Return the twin with what its effects leave of pauses; what is drawn at rest is no surer than that."""
     if twin.remainder is None:
-        return None
+        return twin
     left = [part.power - twin.power(part) for motion in motions if motion.power is not None for part in pauses(motion)]
-    return replace(twin.remainder, pause=of_pauses(left))
+    rest = NORMAL * of_rest(left)
+    parameters = (_widened(one, rest) if one.effect in twin.at_rest else one for one in twin.parameters)
+    return replace(twin, remainder=replace(twin.remainder, pause=of_pauses(left)), parameters=tuple(parameters))
+
+
+def _widened(one: Parameter, half: float) -> Parameter:
+    """Return a parameter that is at least 0 and unsure by `half` of an interval more."""
+    if one.lower is None or one.upper is None:
+        return one
+    width = float(np.hypot(one.upper - one.value, half))
+    return replace(one, lower=max(one.value - width, 0.0), upper=one.value + width)
 
 
 def _remainder(stack: Stack, blocks: Sequence[Block], terms: Terms) -> Remainder | None:
@@ -155,9 +172,31 @@ def _shaped(stack: Stack, open_shapes: set[str], signal: str, fit: Callable[[Sta
             continue
         place = effects.index(effect)
         before, after = effects[:place], effects[place + 1 :]
-        noise = np.array([fit(stack.with_effects([*before, shape, *after])).noise for shape in shapes])
-        effects = [*before, *_best(shapes, noise, stack.robot), *after]
+
+        def left(shape: Effect, before: list[Effect] = before, after: list[Effect] = after) -> np.ndarray:
+            return fit(stack.with_effects([*before, shape, *after])).noise
+
+        best = _best(shapes, np.array([left(shape) for shape in shapes]), stack.robot)
+        if not isinstance(effect, JointEffect):
+            best = [_between(best[0], shapes, lambda shape: float(np.log(left(shape)).sum()))]
+        effects = [*before, *best, *after]
     return stack.with_effects(effects)
+
+
+def _between(best: Effect, shapes: Sequence[Effect], left: Callable[[Effect], float]) -> Effect:
+    """Return the shape that leaves least between the best of those tried and its neighbours, number by number."""
+    for name in best.ranges:
+        tried = sorted({float(shape.shape[name]) for shape in shapes})
+        at = tried.index(best.shape[name])
+        ends = tried[max(at - 1, 0)], tried[min(at + 1, len(tried) - 1)]
+
+        def of_number(value: float, best: Effect = best, name: str = name) -> float:
+            return left(best.variants(**{name: (float(value),)})[0])
+
+        found = scipy.optimize.minimize_scalar(of_number, bounds=ends, method="bounded", options={"maxiter": _LOOKS})
+        if found.fun < left(best):
+            (best,) = best.variants(**{name: (float(found.x),)})
+    return best
 
 
 def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Effect]:
