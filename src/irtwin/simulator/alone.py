@@ -16,10 +16,10 @@ import scipy
 
 from irtwin.identification.progress import track
 from irtwin.signals.sampling import interval
-from irtwin.simulator.model import DAMPED
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
+from irtwin.simulator.variant import DAMPED
 
 if TYPE_CHECKING:
     import mujoco

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,11 +25,8 @@ from irtwin.simulator.model_file import ModelFile
 if TYPE_CHECKING:
     import mujoco
 
-_SECOND, _BEHIND = " beside its servo", " behind its motor"
 _SWING = 1.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
-DAMPED = 0.05  # of critical damping, in what is soft
 _POSES = 64  # over whose inertia a mean is taken
-_FIRMEST = 0.9999  # impedance that MuJoCo takes
 _APART = 1e-3  # m, frames that are at one place
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
@@ -177,7 +174,7 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
     called = dict(zip(robot.joint_names, joints or robot.joint_names, strict=True))
     file = read_model_file(path)
     told = {called[one.name]: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
-    compiled, delays, gains = _compiled(file, told)
+    compiled, delays, gains = compiled_of(file, told)
     places, others = joints_of(compiled, tuple(called.values()), str(path), ", or say what it calls them (--joints)")
     model = Model(
         file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gains
@@ -214,77 +211,12 @@ def joints_of(
     return [own[name] for name in names], tuple(name for name in own if name not in names)
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
-
-    `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `soft`: places
-    among the robot's joints of those with a second joint behind the motor's, with the same axis; `behind`: its dof.
-    `of`: the model as it is.
-    """
-
-    of: Model
-    compiled: mujoco.MjModel
-    joints: np.ndarray
-    second: np.ndarray
-    soft: np.ndarray
-    behind: np.ndarray
-
-    @property
-    def positions(self) -> np.ndarray:
-        """The motors' places in qpos (n,)."""
-        return np.asarray(self.compiled.jnt_qposadr[self.joints])
-
-    @property
-    def speeds(self) -> np.ndarray:
-        """The motors' places in qvel (n,)."""
-        return np.asarray(self.compiled.jnt_dofadr[self.joints])
-
-    @property
-    def links(self) -> np.ndarray:
-        """The places in qpos of joints behind motors."""
-        return np.asarray(self.compiled.jnt_qposadr[self.compiled.dof_jntid[self.behind]])
-
-    def measured(self, qpos: np.ndarray, on_links: np.ndarray) -> np.ndarray:
-        """Return the positions (N, n) that are measured of all (N, nq): of links where `on_links` (n,) says so."""
-        q = qpos[:, self.positions]
-        q[:, self.soft] += qpos[:, self.links] * on_links[self.soft]
-        return q
-
-    def soften(self, one: mujoco.MjModel, compliance: np.ndarray) -> None:
-        """Give the joints behind motors the springs of compliances (n,), rad/(N m).
-
-        Dry friction keeps its law: MuJoCo's softens by the inertia at hand, and that is the rotor's alone now.
-        """
-        dof = self.speeds[self.soft]
-        rotor, link = one.dof_armature[dof], self.of.links[self.soft]
-        stiffness = 1 / compliance[self.soft]
-        one.jnt_stiffness[one.dof_jntid[self.behind]] = stiffness
-        one.dof_damping[self.behind] = 2 * DAMPED * np.sqrt(stiffness * link)
-        before = one.dof_solimp[dof, 0]
-        odds = before / (1 - before) * (self.of.free[self.soft] + rotor) / rotor
-        ends = np.minimum(np.stack([odds, odds]) / (1 + np.stack([odds, odds])), _FIRMEST)
-        one.dof_solref[dof, 0] *= one.dof_solimp[dof, 1] / ends[1]
-        one.dof_solimp[dof, :2] = ends.T
-
-
-def variant(model: Model, banded: bool, soft: Sequence[str]) -> Variant:
-    """Return a model with second actuators where dead bands are played, and with joints soft behind their motors."""
-    compiled, *_ = _compiled(model.file, model.gains, model.joints if banded else (), soft)
-    second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints] if banded else []
-    behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
-    joints = [compiled.joint(joint).id for joint in model.joints]
-    places = [model.joints.index(joint) for joint in soft]
-    at = (np.array(one, dtype=int) for one in (joints, second, places, behind))
-    return Variant(model, compiled, *at)
-
-
-def _compiled(
-    file: ModelFile, gains: Gains, paired: Sequence[str] = (), soft: Sequence[str] = ()
+def compiled_of(
+    file: ModelFile, gains: Gains, change: Callable[[mujoco.MjSpec], None] = lambda _: None
 ) -> tuple[mujoco.MjModel, np.ndarray, Gains]:
     """Return the compiled model without the delays of its actuators, these, and the gains that make servos of it.
 
-    `paired`: joints with a second actuator; `soft`: joints with a second one behind.
+    `change`: what is done to its specification, once it has those servos.
     """
     try:
         import mujoco
@@ -297,10 +229,7 @@ def _compiled(
         delays = np.array([one.delay for one in spec.actuators], dtype=float)
         for one in spec.actuators:
             one.delay, one.nsample = 0.0, 0
-        for joint in paired:
-            _add_second(spec, joint, mujoco)
-        for joint in soft:
-            _add_behind(spec, joint)
+        change(spec)
         for joint in spec.joints:
             if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
                 spec.add_sensor(
@@ -309,25 +238,6 @@ def _compiled(
         return spec.compile(), delays, added
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
-
-
-def _add_second(spec: mujoco.MjSpec, joint: str, mujoco: Any) -> None:
-    first = next(one for one in spec.actuators if one.target == joint)
-    second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-    second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange
-    second.forcelimited, second.forcerange = True, (-1.0, 1.0)
-
-
-def _add_behind(spec: mujoco.MjSpec, joint: str) -> None:
-    """Put a joint behind a motor's, about the same axis: the link turns by both, the motor by the first alone."""
-    first = spec.joint(joint)
-    second = first.parent.add_joint(name=f"{joint}{_BEHIND}", type=first.type, pos=first.pos, axis=first.axis)
-    second.limited, second.actfrclimited = False, False
-    second.armature = second.frictionloss = second.ref = second.springref = 0.0
-    second.stiffness[:], second.damping[:] = 0.0, 0.0
-    for key in list(spec.keys):  # of as many coordinates as there were
-        spec.delete(key)
 
 
 def drop_pictures(spec: mujoco.MjSpec, is_urdf: bool) -> None:

@@ -11,8 +11,9 @@ import numpy as np
 
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
-from irtwin.simulator.model import Model, Variant
+from irtwin.simulator.model import Model
 from irtwin.simulator.servos import NAMES, Servos
+from irtwin.simulator.variant import Variant
 
 if TYPE_CHECKING:
     import mujoco

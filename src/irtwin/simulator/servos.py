@@ -13,8 +13,9 @@ import scipy
 
 from irtwin.errors import InputError
 from irtwin.robot.xml_elements import Element
-from irtwin.simulator.model import Model, Variant, variant
+from irtwin.simulator.model import Model
 from irtwin.simulator.payload import load, loaded_tag
+from irtwin.simulator.variant import Variant, variant
 
 if TYPE_CHECKING:
     import mujoco
@@ -158,6 +159,7 @@ class Servos:
         import mujoco
 
         one = copy.copy(of.compiled)
+        one.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)  # an arm is one: looking for more takes time
         at, dof = self.actuators, of.speeds
         stiffness, damping, friction, holding, armature, _, _, limit, band, spring, *_ = numbers[: len(OF_JOINTS)]
         mass, *off = numbers[len(OF_JOINTS) :, 0]

@@ -1,0 +1,112 @@
+"""A model with what its file does not say, to be played: dead bands of servos, and joints that are soft."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from irtwin.simulator.model import Model, compiled_of
+
+if TYPE_CHECKING:
+    import mujoco
+
+DAMPED = 0.05  # of critical damping, in what is soft
+_SECOND, _BEHIND = " beside its servo", " behind its motor"
+_FIRMEST = 0.9999  # impedance that MuJoCo takes
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
+
+    `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `soft`: places
+    among the robot's joints of those with a second joint behind the motor's, with the same axis; `behind`: its dof.
+    `of`: the model as it is.
+    """
+
+    of: Model
+    compiled: mujoco.MjModel
+    joints: np.ndarray
+    second: np.ndarray
+    soft: np.ndarray
+    behind: np.ndarray
+
+    @property
+    def positions(self) -> np.ndarray:
+        """The motors' places in qpos (n,)."""
+        return np.asarray(self.compiled.jnt_qposadr[self.joints])
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """The motors' places in qvel (n,)."""
+        return np.asarray(self.compiled.jnt_dofadr[self.joints])
+
+    @property
+    def links(self) -> np.ndarray:
+        """The places in qpos of joints behind motors."""
+        return np.asarray(self.compiled.jnt_qposadr[self.compiled.dof_jntid[self.behind]])
+
+    def measured(self, qpos: np.ndarray, on_links: np.ndarray) -> np.ndarray:
+        """Return the positions (N, n) that are measured of all (N, nq): of links where `on_links` (n,) says so."""
+        q = qpos[:, self.positions]
+        q[:, self.soft] += qpos[:, self.links] * on_links[self.soft]
+        return q
+
+    def soften(self, one: mujoco.MjModel, compliance: np.ndarray) -> None:
+        """Give the joints behind motors the springs of compliances (n,), rad/(N m).
+
+        Dry friction keeps its law: MuJoCo's softens by the inertia at hand, and that is the rotor's alone now.
+        """
+        dof = self.speeds[self.soft]
+        rotor, link = one.dof_armature[dof], self.of.links[self.soft]
+        stiffness = 1 / compliance[self.soft]
+        one.jnt_stiffness[one.dof_jntid[self.behind]] = stiffness
+        one.dof_damping[self.behind] = 2 * DAMPED * np.sqrt(stiffness * link)
+        before = one.dof_solimp[dof, 0]
+        odds = before / (1 - before) * (self.of.free[self.soft] + rotor) / rotor
+        ends = np.minimum(np.stack([odds, odds]) / (1 + np.stack([odds, odds])), _FIRMEST)
+        one.dof_solref[dof, 0] *= one.dof_solimp[dof, 1] / ends[1]
+        one.dof_solimp[dof, :2] = ends.T
+
+
+def variant(model: Model, banded: bool, soft: Sequence[str]) -> Variant:
+    """Return a model with second actuators where dead bands are played, and with joints soft behind their motors."""
+
+    def add(spec: mujoco.MjSpec) -> None:
+        for joint in model.joints if banded else ():
+            _add_second(spec, joint)
+        for joint in soft:
+            _add_behind(spec, joint)
+
+    compiled, *_ = compiled_of(model.file, model.gains, add)
+    second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints] if banded else []
+    behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
+    joints = [compiled.joint(joint).id for joint in model.joints]
+    places = [model.joints.index(joint) for joint in soft]
+    at = (np.array(one, dtype=int) for one in (joints, second, places, behind))
+    return Variant(model, compiled, *at)
+
+
+def _add_second(spec: mujoco.MjSpec, joint: str) -> None:
+    """Put an actuator beside a joint's servo, of a force that numbers are to say."""
+    import mujoco
+
+    first = next(one for one in spec.actuators if one.target == joint)
+    second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange
+    second.forcelimited, second.forcerange = True, (-1.0, 1.0)
+
+
+def _add_behind(spec: mujoco.MjSpec, joint: str) -> None:
+    """Put a joint behind a motor's, about the same axis: the link turns by both, the motor by the first alone."""
+    first = spec.joint(joint)
+    second = first.parent.add_joint(name=f"{joint}{_BEHIND}", type=first.type, pos=first.pos, axis=first.axis)
+    second.limited, second.actfrclimited = False, False
+    second.armature = second.frictionloss = second.ref = second.springref = 0.0
+    second.stiffness[:], second.damping[:] = 0.0, 0.0
+    for key in list(spec.keys):  # of as many coordinates as there were
+        spec.delete(key)
