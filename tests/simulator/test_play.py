@@ -19,6 +19,14 @@ def test_commands_are_held_until_the_next_and_come_late(tmp_path):
     np.testing.assert_allclose(found[:, 1], begin > 0.595, atol=1e-9)
 
 
+def test_a_controller_that_damps_its_error_leads_by_the_speed_of_its_commands(tmp_path):
+    told = np.column_stack([np.zeros(100), np.linspace(0, 1, 100)])
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": told}))
+    stretch, begin = whole(data_set.runs[0]), np.arange(0.5, 1.5, 0.02)
+    plain, led = (stretch.commands(begin, 0.02, own.numbers, 0.04, damps) for damps in (False, True))
+    np.testing.assert_allclose(led - plain, [[0.0, 0.04 * 50 / 99]] * len(begin), atol=1e-12)
+
+
 def test_a_servo_settles_where_its_load_lets_it(tmp_path):
     text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))

@@ -9,9 +9,11 @@ from tests.twin.test_described import fitted, of, states, torque
 
 from irtwin.effects.rigid_body import model_of
 from irtwin.errors import InputError
+from irtwin.identification.progress import telling
 from irtwin.robot.description import Robot
 from irtwin.robot.urdf import parse_urdf
 from irtwin.simulator.model import read_model
+from irtwin.simulator.servos import NAMES, has_servos, servos
 from irtwin.twin.described import text_of
 
 mujoco = pytest.importorskip("mujoco")
@@ -164,3 +166,57 @@ def test_long_chains_and_large_files_are_refused(tmp_path):
     (tmp_path / "big.sdf").write_bytes(b" " * 20_000_001)
     with pytest.raises(InputError, match="larger than the 20 MB limit"):
         read_model(tmp_path / "big.sdf", ONE)
+
+
+CONTROLLED = PENDULUM.replace(
+    "  </model>",
+    """    <plugin filename="gz-sim-joint-position-controller-system" name="gz::sim::systems::JointPositionController">
+      <joint_name>pan</joint_name> <!-- gains of the maker -->
+      <p_gain>100</p_gain><i_gain>0</i_gain><d_gain>4</d_gain><cmd_max>30</cmd_max><cmd_min>-30</cmd_min>
+    </plugin>
+  </model>""",
+)
+
+
+def test_a_position_controller_is_a_servo(tmp_path):
+    own = servos(read(tmp_path, CONTROLLED))
+    told = dict(zip(NAMES, own.numbers[:, 0], strict=True))
+    assert (told["stiffness"], told["torque_limit"]) == (100.0, 30.0)
+    assert told["damping"] == pytest.approx(0.25 + 4.0)
+    assert own.lead(own.numbers) == pytest.approx([4 / 100])  # its damping is of the error
+
+
+def test_what_a_controller_does_besides_is_told(tmp_path):
+    heard: list[str] = []
+    with telling(heard.append):
+        read(tmp_path, CONTROLLED)
+        read(tmp_path, CONTROLLED.replace("<i_gain>0<", "<i_gain>0.5<"))
+    assert len(heard) == 1 and "i_gain" in heard[0] and heard[0].endswith("of pan are not played")
+
+
+def test_a_controller_has_the_gains_that_gazebo_takes_by_itself(tmp_path):
+    said = "<p_gain>100</p_gain><i_gain>0</i_gain><d_gain>4</d_gain><cmd_max>30</cmd_max><cmd_min>-30</cmd_min>"
+    old = CONTROLLED.replace(said, "").replace("gz::sim", "ignition::gazebo")
+    told = dict(zip(NAMES, servos(read(tmp_path, old)).numbers[:, 0], strict=True))
+    assert (told["stiffness"], told["torque_limit"]) == (1.0, 1000.0)
+    assert told["damping"] == pytest.approx(0.25 + 0.01)
+
+
+@pytest.mark.parametrize("other", ["<use_velocity_commands>true</use_velocity_commands>", "<p_gain>0</p_gain>"])
+def test_a_controller_that_does_not_pull_to_a_position_is_no_servo(tmp_path, other):
+    text = CONTROLLED.replace("<p_gain>100</p_gain>", other)
+    assert not has_servos(read(tmp_path, text))
+
+
+def test_gains_are_written_into_their_controller(tmp_path):
+    own = servos(read(tmp_path, CONTROLLED))
+    robots, differs = own.numbers.copy(), np.zeros(own.numbers.shape, dtype=bool)
+    assert own.written(own.numbers, differs) == CONTROLLED.encode()
+    changed = {"stiffness": 120.0, "damping": 5.0, "friction": 0.75, "torque_limit": 20.0}
+    for name, value in (changed | {"delay": 0.1, "offset": 0.2, "armature": 0.1}).items():
+        robots[NAMES.index(name)], differs[NAMES.index(name)] = value, True
+    text = own.written(robots, differs).decode()
+    assert own.unwritten(differs) == ["armature of pan", "offset of pan", "delay of pan"]
+    again = dict(zip(NAMES, servos(read(tmp_path, text)).numbers[:, 0], strict=True))
+    assert {name: again[name] for name in changed} == pytest.approx(changed, rel=1e-12)
+    assert "<cmd_min>-20.0</cmd_min>" in text and "<!-- gains of the maker -->" in text and "<i_gain>0</i_gain>" in text

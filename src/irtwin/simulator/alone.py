@@ -70,7 +70,8 @@ class Alone:
             lead = self.servos.lead(own)
             asked = np.append(own[NAMES.index("delay")], lead).tobytes()
             if asked not in known:
-                every = [one.commands(begin, self.step, without, lead) for one in self.stretches]
+                damps_error = self.servos.model.file.damps_error
+                every = [one.commands(begin, self.step, without, lead, damps_error) for one in self.stretches]
                 known[asked] = np.stack(every, axis=1)
             commanded[:, place] = known[asked] + own[offset]
         moved = self._moved(numbers, commanded)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.simulator.model_file import ModelFile, check_inside, read_xml
-from irtwin.simulator.sdf_file import SdfFile
+from irtwin.simulator.sdf_file import read_sdf
 from irtwin.simulator.usd_file import ENDINGS, read_usd
 
 
@@ -22,7 +22,7 @@ def read_model_file(path: Path) -> ModelFile:
         case "robot":
             return file  # files that it names are meshes: nobody loads them
         case "sdf":
-            return SdfFile(file.path, file.content, file.elements)  # the same
+            return read_sdf(file)  # the same
         case "mujoco":
             check_inside(file, path.parent, {})
             return file

@@ -62,6 +62,11 @@ class ModelFile:
         raise InputError(f'{self.path}: has no <{tags[0]} {key}="{value}"> of its own; give the file that defines it')
 
     @property
+    def damps_error(self) -> bool:
+        """Whether its servos damp how fast the error changes, not how fast the joint moves."""
+        return False
+
+    @property
     def is_urdf(self) -> bool:
         """Whether it is a URDF."""
         return any(one.tag == "robot" for one in self.elements[:1])

@@ -102,15 +102,18 @@ class PlayedStretch:
         return found
 
     def commands(
-        self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0
-    ) -> np.ndarray:
+        self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0,
+        damps_error: bool = False,
+    ) -> np.ndarray:  # fmt: skip
         """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
 
         Each command is in force until the next comes; delay and offset of `numbers` (k, n) are in them, and so is a
-        commanded speed over `lead` (n,) s, where one was logged.
+        commanded speed over `lead` (n,) s, where one was logged, or by `damps_error` that of the commands.
         """
         time, told, speed = self.run.signals.time, self.run.signals.command, self.run.signals.command_speed
         assert told is not None
+        if damps_error:
+            speed = np.diff(told, axis=0, prepend=told[:1]) / interval(time)
         told = told if speed is None else told + lead * speed
         ends = np.concatenate([[time[0] - 1e4], time, [time[-1] + 1e4]])
         held = np.vstack([told[:1], told])  # before the first sample: the first
@@ -179,7 +182,8 @@ def _played(
         some = pairs[first : first + at_once]
         told = np.zeros((len(some), steps, compiled.nu + compiled.nv))
         for row, (one, place) in enumerate(some):
-            commands = stretches[place].commands(begin, step, numbers[one], servos.lead(numbers[one]))
+            lead, damps_error = servos.lead(numbers[one]), servos.model.file.damps_error
+            commands = stretches[place].commands(begin, step, numbers[one], lead, damps_error)
             for drives in (servos.actuators, *([variant.second] if len(variant.second) else [])):
                 told[row][:, drives] = commands
             if stretches[place].is_pushed:

@@ -1,7 +1,13 @@
-"""A model in SDF, as Gazebo and Drake have it: read into MuJoCo, and changed in numbers of its joints."""
+"""A model in SDF, as Gazebo and Drake have it: read into MuJoCo, and changed in numbers of its joints.
+
+Gazebo's JointPositionController is a joint's servo. Its gains are of the error and of how fast that changes; what it
+sums up of the error (i_gain), and a force that it adds (cmd_offset), are not played.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
@@ -12,6 +18,7 @@ import scipy
 from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
+from irtwin.identification.progress import tell
 from irtwin.robot.structure import inertia_of
 from irtwin.robot.xml_elements import Element as XmlElement
 from irtwin.robot.xml_elements import numbers, outermost, with_child
@@ -22,6 +29,9 @@ if TYPE_CHECKING:
     import mujoco
 
 _IN_SDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
+_CONTROLLER = "JointPositionController"
+_OF_CONTROLLER = {"kp": ("p_gain",), "kv": ("d_gain",), "forcerange": ("cmd_min", "cmd_max")}  # by what MJCF says
+_BY_ITSELF = {"p_gain": 1.0, "d_gain": 0.01, "cmd_max": 1000.0}  # what Gazebo takes where none is said
 _READ = {**_IN_SDF, "stiffness": "spring_stiffness", "springref": "spring_reference"}
 _KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 _KNOWN = {  # where a word that SDF does not know would take a number away
@@ -37,29 +47,37 @@ _BEFORE = (1, 4)  # the last version whose axes are said in the frame of the mod
 
 
 class SdfFile(ModelFile):
-    """An SDF: its numbers are texts of elements, where those of MJCF and URDF are attributes."""
+    """An SDF: its numbers are texts of elements, where those of MJCF and URDF are attributes.
+
+    Its controllers are among its elements as servos, <position joint="...">, too.
+    """
+
+    @property
+    def damps_error(self) -> bool:
+        """As Gazebo's controllers do."""
+        return True
 
     def holds(self, number: str) -> bool:
         """Return whether it has a place for a number, by what MJCF calls it."""
-        return number in _IN_SDF
+        return number in _IN_SDF or number in _OF_CONTROLLER
 
     def number(self, joint: str, number: str) -> tuple[XmlElement, str]:
         """Return the joint, and the element of its <dynamics> that holds a number."""
         return self.element(["joint"], "name", joint), _IN_SDF[number]
 
     def changed(self, changes: Changes) -> bytes:
-        """Return the file with numbers of joints changed; all else stays, byte for byte."""
+        """Return the file with numbers of joints and controllers changed; all else stays, byte for byte."""
         content = self.content
         for own in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
-            for name, value in changes[own].items():
-                joint = next(one for one in outermost(content).walk() if one.start == own.start)
-                axis, text = joint.child("axis"), f"<{name}>{value!r}</{name}>"
-                assert axis is not None  # else it does not move
-                dynamics = axis.child("dynamics")
-                if dynamics is None:
+            for name, value in _texts(own, changes[own]):
+                one = next(one for one in outermost(content).walk() if one.start == own.start)
+                axis, text = one.child("axis"), f"<{name}>{value!r}</{name}>"
+                inside = one if axis is None else axis.child("dynamics")
+                if inside is None:
+                    assert axis is not None  # else it does not move
                     content = with_child(content, axis, "dynamics", f"<dynamics>{text}</dynamics>")
                 else:
-                    content = with_child(content, dynamics, name, text)
+                    content = with_child(content, inside, name, text)
         return content
 
     def spec(self) -> mujoco.MjSpec:
@@ -79,9 +97,56 @@ class SdfFile(ModelFile):
         frames = _Frames(model, source)
         version = tuple(int(one) for one in str(root.get("version", "1.7")).split(".") if one.isdigit())
         links = (_link(link, frames, source) for link in model.findall("link"))
-        joints = [_joint(joint, frames, source, version <= _BEFORE) for joint in model.findall("joint")]
+        of_joints = [_joint(joint, frames, source, version <= _BEFORE) for joint in model.findall("joint")]
+        drives = {(one.findtext("joint_name") or "").strip(): one for one in _controllers(model)}
+        joints = [_driven(one, drives[one.name], source) if one.name in drives else one for one in of_joints]
         gravity = root.findtext("world/gravity")
         return assembled(links, joints, np.array(numbers(gravity or "0 0 -9.81", 3, f"{self.path}: gravity")))
+
+
+def read_sdf(file: ModelFile) -> SdfFile:
+    """Return an SDF, its controllers among its elements; tell which of them do more than is played."""
+    servos, more = [], []
+    for one in file.elements:
+        if one.tag == "plugin" and _is_controller(one.attributes.get("name", "")):
+            joint, summed, force = (_text(file, one, name) for name in ("joint_name", "i_gain", "cmd_offset"))
+            servos.append(XmlElement("position", {"joint": joint}, one.start, one.inside, one.stop, one.children))
+            more += [joint] if not summed or summed.strip("0.") or force.strip("0.") else []  # Gazebo's own is 0.1
+    if more:
+        tell(f"  {file.path}: i_gain and cmd_offset of the controllers of {', '.join(more)} are not played")
+    return SdfFile(file.path, file.content, (*file.elements, *servos))
+
+
+def _text(file: ModelFile, element: XmlElement, name: str) -> str:
+    """Return the text of an element's child, nothing where it has none."""
+    child = element.child(name)
+    return "" if child is None else file.content[child.inside : child.stop].split(b"<")[0].decode().strip()
+
+
+def _is_controller(name: str) -> bool:
+    return name.rpartition("::")[2] == _CONTROLLER
+
+
+def _controllers(within: Element) -> Iterator[Element]:
+    return (one for one in within.iter("plugin") if _is_controller(one.get("name", "")))
+
+
+def _driven(joint: Connection, controller: Element, source: str) -> Connection:
+    """Return a joint with its controller as its servo; one that sets speeds is none."""
+    where = f'{source}: controller of joint "{joint.name}"'
+    stiffness, damping, most = (_number(controller, name, value, where) for name, value in _BY_ITSELF.items())
+    by_speed = (controller.findtext("use_velocity_commands") or "").strip() in ("true", "1")
+    if by_speed or stiffness <= 0:
+        return joint
+    return replace(joint, servo=(stiffness, damping), effort=min(joint.effort, most if most > 0 else np.inf))
+
+
+def _texts(own: XmlElement, said: Mapping[str, float | str | None]) -> Iterator[tuple[str, float]]:
+    """Yield names and values of what changes in an element: of a range both ends."""
+    for name, value in said.items():
+        if value is not None:
+            values = (float(one) for one in str(value).split())
+            yield from zip(_OF_CONTROLLER[name] if own.tag == "position" else (name,), values, strict=True)
 
 
 class _Frames:

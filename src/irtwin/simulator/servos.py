@@ -122,8 +122,9 @@ class Servos:
         return np.array([joint not in self.model.gains for joint in self.model.joints])
 
     def lead(self, numbers: np.ndarray) -> np.ndarray:
-        """Return how many s (n,) of a commanded speed controllers of told gains add to a commanded position."""
-        return np.where(self.in_file, 0.0, self.dampings(numbers[1])[1] / numbers[0])
+        """Return how many s (n,) of a commanded speed controllers of told gains, or of errors, add to a command."""
+        leads = ~self.in_file | self.model.file.damps_error
+        return np.where(leads, self.dampings(numbers[1])[1] / numbers[0], 0.0)
 
     def needs(self, numbers: np.ndarray) -> tuple[bool, tuple[str, ...]]:
         """Return what of a variant of the model numbers (k, n) need: whether dead bands, and soft joints."""
