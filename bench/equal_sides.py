@@ -67,7 +67,8 @@ def measured(data_set: Path) -> Document:
 
 def beside_model(folder: Path, number: int, models: Path) -> Document:
     """Diagnose logs of an arm that was told commands beside the model that it is."""
-    case = commanded.Case(folder.name, commanded.ARMS[number % len(commanded.ARMS)], 51_000_000 + number, 0)
+    arm, has_torque = commanded.ARMS[number % len(commanded.ARMS)], bool(number % 2)
+    case = commanded.Case(folder.name, arm, 51_000_000 + number, 0, has_torque)
     commanded.make(case, models, folder.parent)
     data_set = read_data_set(folder / "data", commanded=True)
     return playing.diagnose(data_set, read_model(folder / "model.xml", data_set.robot)).document
