@@ -16,6 +16,7 @@ from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report import colours
 from irtwin.report.energy import lead, tables, verdict
 from irtwin.report.energy.figures import figures
+from irtwin.report.energy.flows import flows
 from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.questions import Answers, Graph, added_to, ask, limits, questions_of
 from irtwin.report.templates import style, written
@@ -90,6 +91,7 @@ def _page(
         parameters=tables.parameters(answers["parameters"].rows, answers["joints"].rows),
         conclusions=tables.conclusions(answers["conclusions"].rows, explain),
         drawn=drawn,
+        flows=flows(answers["energy_per_joint_and_effect"].rows),
         curves=curves,
         data=page_data({name: figure for name, figure in drawn.items() if figure}, curves),
         scene=None if scene is None else scene.html,

@@ -1,0 +1,79 @@
+"""The flow of energy: what each node gets it gives on, as wide as its energy."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from irtwin.report.energy.flows import Flows, flows
+
+EFFECTS = ("coulomb_friction", "copper_loss", "mechanical_power", "standby_power")
+
+
+def row(joint, effect, energy):
+    return {"joint": joint, "effect": f"https://w3id.org/irtwin#{effect}", "label": None, "energy_j": energy}
+
+
+ROWS = [
+    row("joint_1", "coulomb_friction", 600.0),
+    row("joint_1", "mechanical_power", -100.0),
+    row("joint_2", "copper_loss", 300.0),
+    row("joint_2", "coulomb_friction", 1.0),
+    row("joint_2", "iron_loss", 1.0),
+    row(None, "standby_power", 200.0),
+]
+
+
+def named(found, name):
+    return next(node for node in found.nodes if node.name == name)
+
+
+def test_what_is_given_back_goes_on_the_bus_beside_the_supply():
+    found = flows(ROWS)
+    of_bus = named(found, "bus").height
+    assert named(found, "given back by joints").height / of_bus == pytest.approx(100 / 1102)
+    assert named(found, "supply").height / of_bus == pytest.approx(1002 / 1102)
+    assert named(found, "whole robot").height / of_bus == pytest.approx(200 / 1102)
+
+
+def test_effects_that_take_little_are_one_and_the_largest_is_first():
+    effects = [node.name for node in flows(ROWS).nodes if node.x == max(each.x for each in flows(ROWS).nodes)]
+    assert effects == ["coulomb friction", "copper loss", "standby power", "other effects"]
+
+
+def test_ribbons_say_from_where_to_where_and_how_much():
+    words = [ribbon.words.replace("\N{NO-BREAK SPACE}", " ") for ribbon in flows(ROWS).ribbons]
+    assert "joint_1 to coulomb friction: 0.167 Wh" in words
+    assert not [one for one in words if one.startswith("joint_1 to mechanical power")]
+
+
+def test_a_joint_may_be_called_like_a_node():
+    found = flows([row("supply", "copper_loss", 1.0), row("bus", "copper_loss", 2.0)])
+    assert sorted(node.name for node in found.nodes) == ["bus", "bus", "copper loss", "supply", "supply"]
+
+
+def test_without_energy_taken_there_is_no_flow():
+    assert flows([]) is None
+    assert flows([row("joint_1", "mechanical_power", -5.0)]) is None
+
+
+@given(
+    st.dictionaries(
+        st.tuples(st.sampled_from(["a", "b", None]), st.sampled_from(EFFECTS)),
+        st.one_of(st.floats(-1e6, -1e-3), st.floats(1e-3, 1e7)),
+        min_size=1,
+    )
+)
+def test_each_node_is_as_tall_as_what_flows_in_and_out(taken):
+    found = flows([row(joint, effect, energy) for (joint, effect), energy in taken.items()])
+    if found is None:
+        return
+    columns = sorted({node.x for node in found.nodes})
+    heights = [sum(node.height for node in found.nodes if node.x == x) for x in columns]
+    assert max(heights) <= Flows.size[1] + len(found.nodes)  # a hair's height for what is next to nothing
+    least = sum(1.0 for _ in found.nodes)
+    assert max(heights) - min(heights) <= least
+    assert all(re.fullmatch(r"M[-\d., C]+ L[-\d., C]+ Z", ribbon.path) for ribbon in found.ribbons)
