@@ -351,8 +351,11 @@ def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Pa
 def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> None:
     out = tmp_path / "slower.csv"
     here = ("--workspace", performed, "--out", out, "--run", "slower")
-    said = irtwin("optimise", "arm_2", "done", "--cycle", 6, *here)
+    said = irtwin("optimise", "arm_2", "done", "--cycle", 6, "--base", *here)
     assert said.status == 0, said.err
+    assert (
+        "no place of the base up to 0.3 m beside saves anything" in said.out
+    )  # two joints cannot follow from elsewhere
     *others, last = said.out.splitlines()
     (row,) = asking.ask("retimed_motions", performed)
     assert (row["run"], row["plan"]) == ("done", "slower")

@@ -14,6 +14,7 @@ from irtwin.errors import InputError
 from irtwin.location import WORKSPACE, Location
 from irtwin.modelling import Announce, Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
+from irtwin.planning.placement import Placement, better_placement
 from irtwin.planning.plan import Plan, Task
 from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.planning.waiting import PauseProposal, proposals
@@ -125,7 +126,8 @@ def predict(
 class Timings:
     """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times.
 
-    `proposals`: what to do in the pauses of the best; `hours`: how many of a year the robot is on, None: not known.
+    `proposals`: what to do in the pauses of the best; `hours`: how many of a year the robot is on, None: not known;
+    `placement`: where the base would stand better; None: nowhere, or nobody asked for it.
     """
 
     robot: Robot
@@ -135,6 +137,7 @@ class Timings:
     proposals: Sequence[PauseProposal]
     shows_off: bool
     hours: float | None
+    placement: Placement | None = None
 
 
 def optimise(
@@ -145,13 +148,15 @@ def optimise(
     name: str | None = None,
     cycle: float | None = None,
     least_pause: float | None = None,
+    base: bool = False,
     out: Path | str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Timings, Kept]:
     """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run.
 
     `name`: of the planned run, RUN_optimised if None; `cycle`: how long it may take, s, as long as the run if None;
-    `least_pause`: see `CycleTimes`; `out`: a file of the motion, as of `plan`. Raises InputError, and keeps nothing,
+    `least_pause`: see `CycleTimes`; `base`: whether to look for a better place of the base, too; `out`: a file of the
+    motion, as of `plan`. Raises InputError, and keeps nothing,
     where there is no such run or name, the run has no whole move, the robot cannot be so fast, or its twin knows no
     power.
     """
@@ -184,7 +189,8 @@ def optimise(
         )
         waiting = tuple(proposals(twin, programme.timed(best.factors), off))
         hours = read_tariff(location.folder).hours
-        return Timings(twin.robot, programme, best, times.curve(), waiting, off is not None, hours), made
+        placement = better_placement(twin, best.motion) if base else None
+        return Timings(twin.robot, programme, best, times.curve(), waiting, off is not None, hours, placement), made
 
     timings, kept = _keep(robot, name, make, location, announce)
     if out is not None:

@@ -30,6 +30,8 @@ class Anchors(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         said = dict(attrs)
+        if (tag, said.get("href")) == ("link", "data:,"):  # an empty icon, else a browser asks for one
+            return
         if "id" in said:
             self.ids.append(said["id"] or "")
         if "href" in said:

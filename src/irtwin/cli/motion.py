@@ -179,27 +179,33 @@ def predict(
     type=Number(0.0, DAY),
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
+@click.option("--base", is_flag=True, help="Look for a place where the base would stand better, too.")
 @click.option("--out", type=FILE, help=_OUT)
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
-def optimise(robot: str, run: str, out: Path | None, location: Location, name: str | None, **asked: Any) -> None:
+def optimise(
+    robot: str, run: str, base: bool, out: Path | None, location: Location, name: str | None, **asked: Any
+) -> None:
     """Time the moves of a run so that it takes least energy, by the robot's twin.
 
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
     torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, closed brakes, or off:
-    states that the robot's logs show. A year is as long as plant.toml says. The motion is kept as a planned run, and
-    the robot's report says what it saves.
+    states that the robot's logs show. With --base the flange keeps its way through the room, the base up to 0.3 m
+    beside: what stands around is not known. A year is as long as plant.toml says. The motion is kept as a planned run,
+    and the robot's report says what it saves.
 
     \b
     Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
     """
     from irtwin import plans
 
-    timings, kept = plans.optimise(robot, run, location, name=name, out=out, announce=say, **asked)
+    timings, kept = plans.optimise(robot, run, location, name=name, base=base, out=out, announce=say, **asked)
     for line in _curve_lines(timings):
         click.echo(line)
+    if base:
+        click.echo(_placement_text(timings))
     saved = _cycle_text(timings.best) + f" than {run}{_year(timings, timings.best.saved)}"
     click.echo(f"{_where(out, kept)}: {saved} (95 % interval)")
 
@@ -220,6 +226,15 @@ def _curve_lines(timings: Timings) -> Iterator[str]:
         yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
     if not timings.shows_off:
         yield "no log shows the robot off: what switching it off saves is not known"
+
+
+def _placement_text(timings: Timings) -> str:
+    if (found := timings.placement) is None:
+        return (
+            "no place of the base up to 0.3 m beside saves anything, or the arm cannot keep its flange's way from there"
+        )
+    shift = ", ".join(f"{value:+.2f}" for value in found.shift)
+    return f"base moved by {shift} m (x, y, z): {found.saved} J less{_year(timings, found.saved)}; it takes no time"
 
 
 def _year(timings: Timings, saved: Figure) -> str:
