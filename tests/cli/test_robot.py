@@ -80,6 +80,16 @@ def test_the_torque_of_a_pendulum_is_printed(pendulum):
     assert r"\ddot{q}_{1}" in irtwin("robot", "equations", pendulum, "--joint", "swing", "--latex").out
 
 
+def test_the_torque_of_six_joints_is_a_list_of_short_formulas():
+    pytest.importorskip("sympy")
+    said = irtwin("robot", "equations", KR6)
+    assert said.status == 0, said.err
+    assert "# tau6: joint_a6, N m; q6 in rad" in said.out
+    assert "\nc2 = cos(q2)\n" in said.out and "\ntau6 = " in said.out
+    alone = irtwin("robot", "equations", KR6, "--joint", "joint_a6", "--latex").out
+    assert alone.startswith("% tau6") and r"\tau_{6} = " in alone and r"\tau_{5}" not in alone
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -88,7 +98,6 @@ def test_the_torque_of_a_pendulum_is_printed(pendulum):
         (["dh", KR6, "--link", "hand"], 'has no link "hand"'),
         (["dh", KR6, "--convention", "craig"], "'craig' is not one of"),
         (["urdf", KR6, "--out", KR6 / "robot.urdf"], "robot.urdf: cannot be written"),
-        (["equations", KR6], "6 joints move; equations are written for 3 or fewer"),
         (["equations", KR6, "--joint", "wrist"], 'no moving joint "wrist"'),
     ],
 )

@@ -55,7 +55,7 @@ def test_a_joint_that_slides_has_a_force(sympy):
 
 
 def test_a_large_robot_is_refused():
-    with pytest.raises(InputError, match="4 joints move; equations are written for 3 or fewer"):
+    with pytest.raises(InputError, match="4 joints move; equations are written out for 3 or fewer"):
         equations(arm(4))
 
 

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from irtwin.robot.denavit_hartenberg import ChainTable
-    from irtwin.robot.description import Robot
+    from irtwin.robot.description import Joint, Robot
+    from irtwin.robot.equations import EquationsOfMotion
+    from irtwin.robot.recursive_equations import RecursiveEquations
 
 _source = click.argument("source", type=PLACE)
 _link = click.option("--link", metavar="NAME", help="Take this link, not the flange (the last link).")
@@ -151,30 +153,42 @@ def ros(source: Path, out: Path) -> None:
 @click.option("--joint", metavar="NAME", help="Of this joint alone.")
 @click.option("--latex", is_flag=True, help="Write LaTeX.")
 def equations(source: Path, joint: str | None, latex: bool) -> None:
-    """Print the torque of a small robot in symbols.
+    """Print the torque of a robot in symbols.
 
-    SOURCE is a URDF file, a data set's folder, or its dataset.toml, of a robot of up to three joints. Prints each
-    joint's torque by position (q), speed (dq) and acceleration (ddq), for rigid bodies of the masses in the
-    description, without friction and rotors. Coefficients have six digits. Needs irtwin[symbolic].
+    SOURCE is a URDF file, a data set's folder, or its dataset.toml. Prints each joint's torque by position (q), speed
+    (dq) and acceleration (ddq), for rigid bodies of the masses in the description, without friction and rotors. Of more
+    than three joints the results of Newton and Euler's recursion are named, each a short formula (v1, v2, ...).
+    Coefficients have six digits. Needs irtwin[symbolic].
 
     \b
     Example: irtwin robot equations my.urdf --latex
     """
+    from irtwin.robot.equations import MOST_JOINTS
     from irtwin.robot.equations import equations as derive
+    from irtwin.robot.recursive_equations import recursive_equations
     from irtwin.signals.log import read_robot
 
     described = read_robot(source)
     if joint is not None and joint not in described.joint_names:
         raise InputError(f'{described.name} has no moving joint "{joint}" (it has {", ".join(described.joint_names)})')
-    derived = derive(described)
-    for place, each in enumerate(described.joints):
-        if joint in (None, each.name):
-            unit = "N" if each.unit == "m" else "N m"
-            title = (
-                f"{'%' if latex else '#'} tau{place + 1}: {printable(each.name)}, {unit}; q{place + 1} in {each.unit}"
-            )
+    asked = [place for place, each in enumerate(described.joints) if joint in (None, each.name)]
+    titles = [_title(place + 1, described.joints[place], "%" if latex else "#") for place in asked]
+    derived: EquationsOfMotion | RecursiveEquations
+    if len(described.joints) > MOST_JOINTS:
+        derived = recursive_equations(described)
+        shown = derived if joint is None else derived.alone(asked[0])
+        click.echo("\n".join([*titles, shown.latex() if latex else shown.text()]))
+    else:
+        derived = derive(described)
+        for place, title in zip(asked, titles, strict=True):
             click.echo(f"{title}\n{derived.latex(place) if latex else derived.text(place)}\n")
     click.echo(f"These equations and Pinocchio differ by {derived.deviation:.1e} N m (N) at most.", err=True)
+
+
+def _title(number: int, joint: Joint, mark: str) -> str:
+    """Say which joint's torque is meant, and in which units, as a comment."""
+    unit = "N" if joint.unit == "m" else "N m"
+    return f"{mark} tau{number}: {printable(joint.name)}, {unit}; q{number} in {joint.unit}"
 
 
 def _columns(rows: list[list[str]]) -> Iterator[str]:

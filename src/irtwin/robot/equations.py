@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -40,14 +40,14 @@ class EquationsOfMotion:
 
     def torque(self, joint: int) -> sympy.Expr:
         """Return a joint's torque, N m (N for one that slides)."""
-        accelerations = _library().Matrix(_symbols(len(self.joints))[2])
+        accelerations = library().Matrix(symbols_of(len(self.joints))[2])
         return (self.mass * accelerations)[joint] + self.speed[joint] + self.gravity[joint]
 
     def text(self, joint: int) -> str:
         """Return a joint's torque as text in six digits, a term of acceleration or speed a line."""
-        sympy = _library()
+        sympy = library()
         torque = self.torque(joint).evalf(_DIGITS)
-        moving = {symbol for symbols in _symbols(len(self.joints))[1:] for symbol in symbols}
+        moving = {symbol for symbols in symbols_of(len(self.joints))[1:] for symbol in symbols}
         terms = sorted(sympy.Add.make_args(torque), key=sympy.default_sort_key)
         still = sympy.Add(*(term for term in terms if not term.free_symbols & moving))
         lines = [str(term) for term in terms if term.free_symbols & moving] + ([str(still)] if still != 0 else [])
@@ -56,12 +56,9 @@ class EquationsOfMotion:
 
     def latex(self, joint: int) -> str:
         """Return a joint's torque in LaTeX, in six digits."""
-        sympy = _library()
-        names: dict[Any, str] = {}
-        for accent, symbols in zip(("q", r"\dot{q}", r"\ddot{q}"), _symbols(len(self.joints)), strict=True):
-            names |= {symbol: f"{accent}_{{{number}}}" for number, symbol in enumerate(symbols, start=1)}
+        sympy = library()
         torque = self.torque(joint).evalf(_DIGITS)
-        return rf"\tau_{{{joint + 1}}} = {sympy.latex(torque, symbol_names=names)}"
+        return rf"\tau_{{{joint + 1}}} = {sympy.latex(torque, symbol_names=latex_names(len(self.joints)))}"
 
 
 def equations(robot: Robot) -> EquationsOfMotion:
@@ -71,12 +68,12 @@ def equations(robot: Robot) -> EquationsOfMotion:
     """
     if len(robot.joints) > MOST_JOINTS:
         raise InputError(
-            f"{robot.name}: {len(robot.joints)} joints move; equations are written for {MOST_JOINTS} or fewer. "
-            "For longer chains, `irtwin predict` computes the torque"
+            f"{robot.name}: {len(robot.joints)} joints move; equations are written out for {MOST_JOINTS} or fewer. "
+            "For longer chains, `recursive_equations` names what joint after joint gives"
         )
-    sympy = _library()
+    sympy = library()
     mass, height = _energies(robot)
-    q, dq, _ = _symbols(len(robot.joints))
+    q, dq, _ = symbols_of(len(robot.joints))
     gravity = sympy.Matrix([sympy.diff(height, position) for position in q])
     least = _DUST * max(map(abs, mass.atoms(sympy.Float)), default=0.0)
     speed = sympy.Matrix([_speed_terms(mass, q, dq, joint, least) for joint in range(len(q))])
@@ -84,7 +81,7 @@ def equations(robot: Robot) -> EquationsOfMotion:
     return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, derived))
 
 
-def _library() -> Any:
+def library() -> Any:
     """Import sympy, which is an extra."""
     try:
         import sympy
@@ -93,10 +90,19 @@ def _library() -> Any:
     return sympy
 
 
-def _symbols(joints: int) -> tuple[list[Any], list[Any], list[Any]]:
-    sympy = _library()
+def symbols_of(joints: int) -> tuple[list[Any], list[Any], list[Any]]:
+    """Return the symbols of positions, speeds and accelerations."""
+    sympy = library()
     q, dq, ddq = ([sympy.Symbol(f"{sign}{n}") for n in range(1, joints + 1)] for sign in ("q", "dq", "ddq"))
     return q, dq, ddq
+
+
+def latex_names(joints: int) -> dict[Any, str]:
+    """Return what the symbols of `symbols_of` are called in LaTeX."""
+    names: dict[Any, str] = {}
+    for accent, symbols in zip(("q", r"\dot{q}", r"\ddot{q}"), symbols_of(joints), strict=True):
+        names |= {symbol: f"{accent}_{{{number}}}" for number, symbol in enumerate(symbols, start=1)}
+    return names
 
 
 def _speed_terms(mass: Any, q: list[Any], dq: list[Any], joint: int, least: float) -> Any:
@@ -104,7 +110,7 @@ def _speed_terms(mass: Any, q: list[Any], dq: list[Any], joint: int, least: floa
 
     Coefficients below the `least` are left out: what rounding leaves of terms that cancel.
     """
-    total = _library().Integer(0)
+    total = library().Integer(0)
     for j, k in product(range(len(q)), repeat=2):
         if k < j:
             continue
@@ -126,9 +132,9 @@ def _energies(robot: Robot) -> tuple[Any, Any]:
     upper = np.triu([[pin.crba(model, data, q)] for q in poses.reshape(-1, count)])
     height = [pin.computePotentialEnergy(model, data, q) for q in poses.reshape(-1, count)]
     mass = _coefficients((upper + np.triu(upper, 1).swapaxes(-1, -2)).reshape(*poses.shape[:-1], count, count), slides)
-    entries = [_in_symbols(mass[..., row, column], slides, mass) for row, column in np.ndindex(count, count)]
+    entries = [_insymbols_of(mass[..., row, column], slides, mass) for row, column in np.ndindex(count, count)]
     potential = _coefficients(np.reshape(height, poses.shape[:-1]), slides)
-    return _library().Matrix(count, count, entries), _in_symbols(potential, slides, potential)
+    return library().Matrix(count, count, entries), _insymbols_of(potential, slides, potential)
 
 
 def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
@@ -142,13 +148,13 @@ def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
     return values
 
 
-def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.ndarray) -> Any:
+def _insymbols_of(coefficients: np.ndarray, slides: Sequence[bool], beside: np.ndarray) -> Any:
     """Return a sum of cosines and sines of sums of positions, times powers of those that slide.
 
     Coefficients below the dust of the largest `beside` them are left out.
     """
-    sympy = _library()
-    q, *_ = _symbols(len(slides))
+    sympy = library()
+    q, *_ = symbols_of(len(slides))
     terms = []
     for place, amplitude in np.ndenumerate(coefficients):
         wave = [0 if each else int(_WAVES[k]) for k, each in zip(place, slides, strict=True)]
@@ -165,12 +171,17 @@ def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.nda
 
 
 def _deviation(robot: Robot, derived: EquationsOfMotion) -> float:
-    sympy = _library()
+    sympy = library()
     count = len(robot.joints)
-    q, dq, ddq = _symbols(count)
+    q, dq, ddq = symbols_of(count)
     said = sympy.lambdify([*q, *dq, *ddq], [derived.torque(joint) for joint in range(count)], "numpy")
+    return deviation_of(robot, said)
+
+
+def deviation_of(robot: Robot, said: Callable[..., Sequence[float]]) -> float:
+    """Return by how much torques (n,) that are `said` of q, dq, ddq (3 n numbers) differ from Pinocchio's at most."""
     data, worst = robot.model.createData(), 0.0
-    for state in np.random.default_rng(0).uniform(-2.0, 2.0, (_STATES, 3, count)):
+    for state in np.random.default_rng(0).uniform(-2.0, 2.0, (_STATES, 3, len(robot.joints))):
         expected = pin.rnea(robot.model, data, *state)
         worst = max(worst, float(np.abs(np.array(said(*state.ravel()), dtype=float) - expected).max()))
     return worst
