@@ -171,6 +171,14 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
     assert not (tmp_path / "workspace").exists()
 
 
+def test_a_command_by_its_old_name_says_the_new_one_and_does_what_it_did(tmp_path):
+    kept = irtwin("status", "--workspace", tmp_path)
+    assert kept.err.startswith("irtwin: `irtwin status` is now `irtwin workspace status`\n")
+    now = irtwin("workspace", "status", "--workspace", tmp_path)
+    assert (kept.status, kept.out) == (now.status, now.out)
+    assert kept.err.endswith(now.err)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -181,7 +189,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, break_it, message):
         (["workspace", "map", "nowhere.ttl", "--database", "sqlite:///nowhere.db", "--out", "x.nq"], "nowhere"),
         (["frobnicate"], "there is no command and no file `frobnicate`; `irtwin --help` lists the commands\n"),
         (["diagnos", "set"], "did you mean `irtwin diagnose`?"),
-        (["adopt", "Arm"], "irtwin: `irtwin adopt` is now `irtwin improve ROBOT`\n"),
+        (["adopt", "Arm"], "irtwin: `irtwin adopt` is now `irtwin improve`\n"),
         (["restore", "kept.zip"], "irtwin: `irtwin restore` is now `irtwin workspace restore`\n"),
         (["graph", "docs"], "is now `irtwin workspace reason` and `map`, and `irtwin docs --ontology FILE`\n"),
         (["run", "robots", "--workers", "2"], "--workers goes with --out"),

@@ -87,7 +87,7 @@ def _check_system() -> None:
     },
     moved={
         "init": "import --robot ROBOT --out FOLDER",
-        "adopt": "improve ROBOT",
+        "adopt": "improve",
         "case-study": "demo --case-study",
         "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
         "excite": "robot excite",

@@ -17,7 +17,8 @@ _WHOLE = 1000  # characters: a sentence is wrapped, not cut
 class Sections(click.Group):
     """A group whose help lists commands by what people do, and which answers `irtwin FILE`.
 
-    `moved` says of names that commands had before what they are called now.
+    `moved` says of names that commands had before what they are called now; where that is no more than other words,
+    they still do what they did.
     """
 
     def __init__(
@@ -43,10 +44,14 @@ class Sections(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is asked for: of a file's name, one that says what the file is for.
 
-        Raises InputError for a name that a command had before, and for one that is none.
+        Raises InputError for a name that a command had before and that asked otherwise, and for one that is none.
         """
         if now := self._moved.get(args[0]):
-            raise InputError(f"`irtwin {args[0]}` is now `irtwin {now}`")
+            told = f"`irtwin {args[0]}` is now `irtwin {now}`"
+            if now != now.lower() or "`" in now:
+                raise InputError(told)
+            click.echo(f"irtwin: {told}", err=True)
+            return super().resolve_command(context, [*now.split(), *args[1:]])
         if args[0] in self.commands:
             return super().resolve_command(context, args)
         if (path := Path(args[0])).exists():
