@@ -66,89 +66,102 @@ def recursive_equations(robot: Robot) -> RecursiveEquations:
     return RecursiveEquations(steps, tuple(torques), len(robot.joints), deviation)
 
 
+@dataclass(frozen=True)
+class _Frame:
+    """A joint's frame in its parent's: what turns vectors `back` into it, where it is, its axis, whether it slides."""
+
+    back: list[Vector]
+    shift: Vector
+    axis: Vector
+    slides: bool
+
+
+@dataclass(frozen=True)
+class _State:
+    """Angular velocity and acceleration of a body, and the acceleration of its joint, in the joint's frame."""
+
+    velocity: Vector
+    turning: Vector
+    acceleration: Vector
+
+
 class _Recursion:
     """Newton and Euler's recursion over a robot's tree, vectors in the frames of the joints."""
 
     def __init__(self, robot: Robot):
         """Take the robot's tree."""
-        self._sympy, self._robot, self._model = library(), robot, robot.model
+        self._sympy, self._model = library(), robot.model
         self._q, self._dq, self._ddq = symbols_of(len(robot.joints))
         self.steps: list[tuple[Any, Any]] = []
 
     def torques(self) -> list[Any]:
         """Return each joint's torque, in the order of the robot's joints; `steps` are made on the way."""
-        count = self._model.njoints
-        spin, turn, speed = [[self._vector(np.zeros(3))] * count for _ in range(3)]
-        speed[0] = self._vector(-self._model.gravity.linear)  # the base accelerates upwards in place of gravity
-        places = [self._place(joint) for joint in range(count)]
-        forces, moments = [[self._vector(np.zeros(3))] * count for _ in range(2)]
-        for joint in range(1, count):
-            parent, (back, shift, axis, slides) = self._model.parents[joint], places[joint]
-            dq, ddq = self._dq[joint - 1], self._ddq[joint - 1]
-            there = _sum(speed[parent], _cross(turn[parent], shift), _cross(spin[parent], _cross(spin[parent], shift)))
-            carried = self._named(_times(back, spin[parent]))
-            before, here = _times(back, turn[parent]), _times(back, there)
-            if slides:
-                spin[joint], turn[joint] = carried, self._named(before)
-                coriolis = _scaled(_cross(carried, axis), 2 * dq)
-                speed[joint] = self._named(_sum(here, coriolis, _scaled(axis, ddq)))
-            else:
-                spin[joint] = self._named(_sum(carried, _scaled(axis, dq)))
-                turn[joint] = self._named(_sum(before, _scaled(_cross(carried, axis), dq), _scaled(axis, ddq)))
-                speed[joint] = self._named(here)
-            forces[joint], moments[joint] = self._body(joint, spin[joint], turn[joint], speed[joint])
-        torques: list[Any] = [None] * (count - 1)
-        for joint in reversed(range(1, count)):
-            parent, (back, shift, axis, slides) = self._model.parents[joint], places[joint]
+        still, model = self._vector(np.zeros(3)), self._model
+        frames = {joint: self._frame(joint) for joint in range(1, model.njoints)}
+        states = {0: _State(still, still, self._vector(-model.gravity.linear))}  # the base accelerates for gravity
+        forces, moments = {0: still}, {0: still}
+        for joint, frame in frames.items():
+            states[joint] = self._state(joint, frame, states[model.parents[joint]])
+            forces[joint], moments[joint] = self._taken(joint, states[joint])
+        torques = []
+        for joint, frame in reversed(frames.items()):
+            parent, outwards = model.parents[joint], _transposed(frame.back)
             force, moment = self._named(forces[joint]), self._named(moments[joint])
-            torques[joint - 1] = _dot(axis, force if slides else moment)
-            outward = self._named(_times(_transposed(back), force))
-            forces[parent] = _sum(forces[parent], outward)
-            moments[parent] = _sum(moments[parent], _times(_transposed(back), moment), _cross(shift, outward))
-        return torques
+            torques.append(_dot(frame.axis, force if frame.slides else moment))
+            borne = self._named(_times(outwards, force))
+            forces[parent] = _sum(forces[parent], borne)
+            moments[parent] = _sum(moments[parent], _times(outwards, moment), _cross(frame.shift, borne))
+        return torques[::-1]
 
-    def _body(self, joint: int, spin: Vector, turn: Vector, speed: Vector) -> tuple[Vector, Vector]:
+    def _state(self, joint: int, frame: _Frame, parent: _State) -> _State:
+        """Return how the body behind a joint moves, by how its parent does."""
+        dq, ddq = self._dq[joint - 1], self._ddq[joint - 1]
+        around = _cross(parent.velocity, _cross(parent.velocity, frame.shift))
+        here = _times(frame.back, _sum(parent.acceleration, _cross(parent.turning, frame.shift), around))
+        velocity = self._named(_times(frame.back, parent.velocity))
+        turning = _times(frame.back, parent.turning)
+        across = _cross(velocity, frame.axis)
+        if frame.slides:
+            here = _sum(here, _scaled(across, 2 * dq), _scaled(frame.axis, ddq))
+        else:
+            velocity = self._named(_sum(velocity, _scaled(frame.axis, dq)))
+            turning = _sum(turning, _scaled(across, dq), _scaled(frame.axis, ddq))
+        return _State(velocity, self._named(turning), self._named(here))
+
+    def _taken(self, joint: int, state: _State) -> tuple[Vector, Vector]:
         """Return the force on a body and the moment about its joint that its motion takes."""
         inertia = self._model.inertias[joint]
         centre, mass = self._vector(inertia.lever), self._number(inertia.mass)
         about = [self._vector(row) for row in inertia.inertia]
-        pull = _sum(speed, _cross(turn, centre), _cross(spin, _cross(spin, centre)))
-        force = self._named(_scaled(pull, mass))
-        moment = _sum(_times(about, turn), _cross(spin, self._named(_times(about, spin))), _cross(centre, force))
-        return force, moment
+        around = _cross(state.velocity, _cross(state.velocity, centre))
+        force = self._named(_scaled(_sum(state.acceleration, _cross(state.turning, centre), around), mass))
+        spin = self._named(_times(about, state.velocity))
+        return force, _sum(_times(about, state.turning), _cross(state.velocity, spin), _cross(centre, force))
 
-    def _place(self, joint: int) -> tuple[list[Vector], Vector, Vector, bool]:
-        """Return what turns vectors of a joint's parent into its frame, where it is there, its axis, and its kind."""
-        if joint == 0:
-            return [], [], [], False
-        model, number = self._model, joint - 1
+    def _frame(self, joint: int) -> _Frame:
+        model, q = self._model, self._q[joint - 1]
         jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-        along = np.reshape(jacobian, (6, -1))[:, number]
-        slides = bool(np.linalg.norm(along[:3]) > np.linalg.norm(along[3:]))
-        axis = self._vector(along[:3] if slides else along[3:])
+        linear, angular = np.split(np.reshape(jacobian, (6, -1))[:, joint - 1], 2)
         fixed = model.jointPlacements[joint]
-        if slides:
-            back = [self._vector(row) for row in fixed.rotation.T]
-            return (
-                back,
-                _sum(self._vector(fixed.translation), _scaled(_times(_transposed(back), axis), self._q[number])),
-                axis,
-                True,
-            )
-        cosine, sine = self._symbol(f"c{joint}", "cos", number), self._symbol(f"s{joint}", "sin", number)
+        shift = self._vector(fixed.translation)
+        if np.linalg.norm(linear) > np.linalg.norm(angular):
+            axis, back = self._vector(linear), [self._vector(row) for row in fixed.rotation.T]
+            return _Frame(back, _sum(shift, _scaled(_times(_transposed(back), axis), q)), axis, True)
+        axis = self._vector(angular)
+        cosine, sine = (self._symbol(f"{name[0]}{joint}", getattr(self._sympy, name)(q)) for name in ("cos", "sin"))
         turned = [
             [
                 cosine * int(row == column) + (1 - cosine) * axis[row] * axis[column] + sine * skew
-                for column, skew in enumerate(_skew_transposed(axis)[row])
+                for column, skew in enumerate(skews)
             ]
-            for row in range(3)
+            for row, skews in enumerate(_skew_transposed(axis))
         ]
         back = [self._named([_dot(row, self._vector(column)) for column in fixed.rotation]) for row in turned]
-        return back, self._vector(fixed.translation), axis, False
+        return _Frame(back, shift, axis, False)
 
-    def _symbol(self, name: str, function: str, number: int) -> Any:
+    def _symbol(self, name: str, formula: Any) -> Any:
         symbol = self._sympy.Symbol(name)
-        self.steps.append((symbol, getattr(self._sympy, function)(self._q[number])))
+        self.steps.append((symbol, formula))
         return symbol
 
     def _number(self, value: float) -> Any:
@@ -165,12 +178,9 @@ class _Recursion:
         return [self._name(self._sympy.sympify(entry)) for entry in vector]
 
     def _name(self, entry: Any) -> Any:
-        entry = self._sympy.nsimplify(entry, rational=False) if entry.is_number else entry
         if entry.is_number or entry.is_Symbol or (-entry).is_Symbol:
             return entry
-        symbol = self._sympy.Symbol(f"v{len(self.steps) + 1}")
-        self.steps.append((symbol, entry))
-        return symbol
+        return self._symbol(f"v{len(self.steps) + 1}", entry)
 
 
 def _needed(steps: Sequence[tuple[Any, Any]], torques: Sequence[tuple[Any, Any]]) -> tuple[tuple[Any, Any], ...]:
