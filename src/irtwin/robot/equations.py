@@ -132,9 +132,9 @@ def _energies(robot: Robot) -> tuple[Any, Any]:
     upper = np.triu([[pin.crba(model, data, q)] for q in poses.reshape(-1, count)])
     height = [pin.computePotentialEnergy(model, data, q) for q in poses.reshape(-1, count)]
     mass = _coefficients((upper + np.triu(upper, 1).swapaxes(-1, -2)).reshape(*poses.shape[:-1], count, count), slides)
-    entries = [_insymbols_of(mass[..., row, column], slides, mass) for row, column in np.ndindex(count, count)]
+    entries = [_in_symbols(mass[..., row, column], slides, mass) for row, column in np.ndindex(count, count)]
     potential = _coefficients(np.reshape(height, poses.shape[:-1]), slides)
-    return library().Matrix(count, count, entries), _insymbols_of(potential, slides, potential)
+    return library().Matrix(count, count, entries), _in_symbols(potential, slides, potential)
 
 
 def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
@@ -148,7 +148,7 @@ def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
     return values
 
 
-def _insymbols_of(coefficients: np.ndarray, slides: Sequence[bool], beside: np.ndarray) -> Any:
+def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.ndarray) -> Any:
     """Return a sum of cosines and sines of sums of positions, times powers of those that slide.
 
     Coefficients below the dust of the largest `beside` them are left out.
