@@ -85,15 +85,17 @@ def _check_system() -> None:
         "Keep": (upkeep.workspace,),
         "Learn": (docs.docs,),
     },
-    moved={
-        "init": "import --robot ROBOT --out FOLDER",
+    renamed={
         "adopt": "improve",
         "case-study": "demo --case-study",
-        "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
         "excite": "robot excite",
-        "slow": "optimise",
-        "graph": "workspace reason` and `map`, and `irtwin docs --ontology FILE",
         **{name: f"workspace {name}" for name in upkeep.workspace.commands},
+    },
+    replaced={
+        "init": "import --robot ROBOT --out FOLDER",
+        "fleet": "run FOLDER --out RESULTS`, or `irtwin diagnose FOLDER --out RESULTS",
+        "slow": "optimise ROBOT RUN --cycle SECONDS",
+        "graph": "workspace reason` and `map`, and `irtwin docs --ontology FILE",
     },
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -17,19 +17,20 @@ _WHOLE = 1000  # characters: a sentence is wrapped, not cut
 class Sections(click.Group):
     """A group whose help lists commands by what people do, and which answers `irtwin FILE`.
 
-    `moved` says of names that commands had before what they are called now; where that is no more than other words,
-    they still do what they did.
+    `renamed` says of names that commands had before what they are called now: by these they still do what they did.
+    `replaced` says what takes the place of commands that asked otherwise.
     """
 
     def __init__(
         self,
         *arguments: Any,
         sections: Mapping[str, Sequence[click.Command]],
-        moved: Mapping[str, str],
+        renamed: Mapping[str, str],
+        replaced: Mapping[str, str],
         **named: Any,
     ) -> None:
         super().__init__(*arguments, **named)
-        self._sections, self._moved = sections, moved
+        self._sections, self._renamed, self._replaced = sections, renamed, replaced
         for command in (one for commands in sections.values() for one in commands):
             self.add_command(command)
 
@@ -44,13 +45,12 @@ class Sections(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is asked for: of a file's name, one that says what the file is for.
 
-        Raises InputError for a name that a command had before and that asked otherwise, and for one that is none.
+        Raises InputError for a command that was replaced, and for one that is none.
         """
-        if now := self._moved.get(args[0]):
-            told = f"`irtwin {args[0]}` is now `irtwin {now}`"
-            if now != now.lower() or "`" in now:
-                raise InputError(told)
-            click.echo(f"irtwin: {told}", err=True)
+        if now := self._replaced.get(args[0]):
+            raise InputError(f"`irtwin {args[0]}` is now `irtwin {now}`")
+        if now := self._renamed.get(args[0]):
+            click.echo(f"irtwin: `irtwin {args[0]}` is now `irtwin {now}`", err=True)
             return super().resolve_command(context, [*now.split(), *args[1:]])
         if args[0] in self.commands:
             return super().resolve_command(context, args)
