@@ -44,11 +44,11 @@ def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model()
         cause, effect="temperature_dependent_friction", scope="changed", confidence=0.9, parameters=(thinning, damping)
     )
     model = SimpleNamespace(name="m", numbers=lambda joint: {"damping": 19.0})
-    told = beside(model, warm)
+    told = beside(model, warm, {})
     assert [(one.simulator, one.robot) for one in told.parameters] == [(None, None), (19.0, 9.5)]
     assert not_held(SimpleNamespace(causes=(told,))) == (told,)
     coupled = replace(warm, effect="joint_coupling", parameters=(damping,))
-    assert beside(model, coupled) == coupled  # a friction of its own
+    assert beside(model, coupled, {}) == coupled  # a friction of its own
 
 
 def parameter(value: float, interval: tuple[float, float] | None, simulator: float | None = None) -> CauseParameter:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -25,7 +24,6 @@ from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
-NO_NUMBERS: Mapping[tuple[str, str], document.CauseParameter] = MappingProxyType({})
 
 
 class Simulator(Protocol):
@@ -202,7 +200,7 @@ def parameters(
 
 
 def beside(
-    simulator: Simulator, cause: document.Cause, alone: Mapping[tuple[str, str], document.CauseParameter] = NO_NUMBERS
+    simulator: Simulator, cause: document.Cause, alone: Mapping[tuple[str, str], document.CauseParameter]
 ) -> document.Cause:
     """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both.
 
