@@ -2,7 +2,7 @@
 
 Loads the ontology through the OWL API, as Protégé does, and asks HermiT and Openllet for all individuals and links of
 the classes and properties that its rules conclude. Prints a JSON object: the labels of the `rules`, what breaks
-OWL 2 DL (`violations`), and by reasoner the triples found, in IRIs.
+OWL 2 DL (`violations`), the `concluded` classes and properties, and by reasoner the triples found, in IRIs.
 """
 
 from __future__ import annotations
@@ -27,12 +27,14 @@ def check(file: Path) -> dict[str, Any]:
 
     ontology = OWLManager.createOWLOntologyManager().loadOntologyFromOntologyDocument(jpype.java.io.File(str(file)))
     rules = list(ontology.getAxioms(AxiomType.SWRL_RULE))
+    heads = {atom.getPredicate() for rule in rules for atom in rule.head().iterator()}
     found = {"HermiT": importlib.import_module("org.semanticweb.HermiT").ReasonerFactory()}
     found["Openllet"] = importlib.import_module("openllet.owlapi").OpenlletReasonerFactory.getInstance()
     return {
         "rules": sorted(str(one.getValue().getLiteral()) for rule in rules for one in _labels(rule)),
         "violations": sorted(map(str, OWL2DLProfile().checkOntology(ontology).getViolations())),
-        **{name: sorted(set(_concluded(ontology, by.createReasoner(ontology), rules))) for name, by in found.items()},
+        "concluded": sorted(map(_iri, heads)),
+        **{name: sorted(set(_concluded(ontology, by.createReasoner(ontology), heads))) for name, by in found.items()},
     }
 
 
@@ -40,9 +42,8 @@ def _labels(rule: Any) -> list[Any]:
     return [one for one in rule.getAnnotations() if one.getProperty().isLabel()]
 
 
-def _concluded(ontology: Any, reasoner: Any, rules: list[Any]) -> Iterator[tuple[str, str, str]]:
-    for atom in (atom for rule in rules for atom in rule.head().iterator()):
-        predicate = atom.getPredicate()
+def _concluded(ontology: Any, reasoner: Any, heads: set[Any]) -> Iterator[tuple[str, str, str]]:
+    for predicate in heads:
         if predicate.isOWLClass():
             for one in reasoner.getInstances(predicate, False).getFlattened():
                 yield _iri(one), TYPE, _iri(predicate)

@@ -16,6 +16,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.java import NoJava, java
 from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.owl_rl.closure import Contradiction
+from irtwin.knowledge.rules.value_rules import values_as_rules
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL
 
 _IMPORTS = NamedNode(OWL + "imports")
@@ -31,11 +32,12 @@ def classify(triples: Iterable[Triple]) -> set[Triple]:
     nothing can belong to.
     """
     owlready2.JAVA_EXE = _java("HermiT")
-    world = _world(triples)
+    given = set(triples)
+    world = _world(values_as_rules(given))
     try:
         owlready2.sync_reasoner_hermit(world, infer_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
-        raise Contradiction(f"statements contradict each other, HermiT finds. {_clash(world)}") from error
+        raise Contradiction(f"statements contradict each other, HermiT finds. {_clash(_world(given))}") from error
     except owlready2.base.OwlReadyJavaError as error:
         if "OutOfMemoryError" in str(error):
             raise InputError(

@@ -90,14 +90,30 @@ def _imps(rule: Rule, model: _Model) -> Iterator[str]:
     SWRL lets a rule conclude several things, but Openllet then draws one of them.
     """
     parts = conjunction(rule.construct)
-    own = joined_to(rdflib.Variable("this"), parts.patterns)
-    rows = model.values([it for it in parts.patterns if it not in own])
+    joined = joined_to(rdflib.Variable("this"), parts.patterns)
+    rows = model.values([it for it in parts.patterns if it not in joined])
+    own = _without_repeats(joined, [*parts.comparisons, *parts.template])
     if not rows or len(rows) > MOST_VALUES:
         raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
     for row, conclusion in product(rows, parts.template):
         imp = _Imp(model)
         body = imp.body(_bound(own, row), _bound(parts.comparisons, row))
         yield imp.written(rule, body, imp.head(*_bound([conclusion], row)))
+
+
+def _without_repeats(patterns: list[Pattern], elsewhere: list[Pattern]) -> list[Pattern]:
+    """Leave out what asks for any value of a property where another pattern asks for one: it says nothing more.
+
+    Openllet draws nothing from a rule that asks for two unnamed classes of one individual.
+    """
+    kept = list(patterns)
+    for pattern in patterns:
+        rest = [other for other in kept if other is not pattern]
+        value = pattern[2]
+        is_any = isinstance(value, rdflib.Variable) and not any(value in other for other in (*rest, *elsewhere))
+        if is_any and any(other[:2] == pattern[:2] for other in rest):
+            kept = rest
+    return kept
 
 
 def _bound(patterns: Iterable[Pattern], row: dict[str, Any]) -> list[Pattern]:

@@ -13,6 +13,7 @@ from irtwin.knowledge.literals import to_milliseconds
 from irtwin.knowledge.rules.as_swrl import as_swrl
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.rules.rule import Rule
+from irtwin.knowledge.rules.value_rules import values_as_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
@@ -62,7 +63,7 @@ def exported(graph: KnowledgeGraph) -> set[Triple]:
     rules = as_swrl(graph, all_rules(graph.resources))
     kept |= rules.triples
     kept |= {Triple(_ONTOLOGY, _COMMENT, _left_out(rule, why)) for rule, why in rules.left_out}
-    return kept
+    return values_as_rules(kept)
 
 
 def _left_out(rule: Rule, why: str) -> Literal:

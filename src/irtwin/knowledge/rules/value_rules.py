@@ -1,0 +1,133 @@
+"""Classes that an individual defines, as SWRL rules: what tableau reasoners conclude from them is the same, and soon.
+
+A restriction to an individual (`owl:hasValue`) makes HermiT carry every individual of a graph through each of its tests
+of a class or property: the demo's graph did not end in 400 s. A rule speaks of named individuals alone, as our graph
+does, and costs it nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import product
+
+from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+
+from irtwin.knowledge.rules.swrl import NAMESPACE
+from irtwin.knowledge.store.by_subject import BySubject, Node
+from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, shorten
+
+_TYPE, _FIRST, _REST, _NIL = (NamedNode(RDF + name) for name in ("type", "first", "rest", "nil"))
+_LABEL, _BELOW, _SAME = NamedNode(RDFS + "label"), NamedNode(RDFS + "subClassOf"), NamedNode(OWL + "equivalentClass")
+_THIS = NamedNode("urn:swrl:var#this")
+
+Atom = tuple[NamedNode, Node]  # a property and its value; rdf:type and a class
+
+
+class _NoRule(Exception):
+    """A class expression that is more than named classes and values."""
+
+
+def values_as_rules(triples: Iterable[Triple]) -> set[Triple]:
+    """Return triples in which each axiom of a class and an individual is a rule, or two where they are equivalent.
+
+    What an alternative of values ("wear or play") would say of a member, that it has one of them, no rule says. An
+    axiom of other expressions besides stays as it is.
+    """
+    kept = set(triples)
+    said = BySubject(kept, OWL)
+    for axiom in [triple for triple in kept if triple.predicate in (_BELOW, _SAME)]:
+        if isinstance(axiom.subject, NamedNode) and _individuals(said, axiom.object):
+            try:
+                rules = _rules(said, axiom.subject, axiom)
+            except _NoRule:
+                continue
+            kept -= {axiom, *_expression(said, axiom.object)}
+            kept |= rules
+    return kept
+
+
+def _individuals(said: BySubject, expression: Node) -> bool:
+    """Whether a class expression has an individual for a value, however deep."""
+    if not isinstance(expression, BlankNode):
+        return False
+    return isinstance(said.value(expression, "hasValue"), NamedNode) or any(
+        _individuals(said, part) for part in _parts(said, expression)
+    )
+
+
+def _parts(said: BySubject, expression: Node) -> list[Node]:
+    return [part for name in ("intersectionOf", "unionOf") for part in said.items(said.value(expression, name))]
+
+
+def _rules(said: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
+    is_class = (_TYPE, of_class)
+    label = f"definition of {said.text(of_class, RDFS + 'label') or shorten(of_class.value)}"
+    made = set[Triple]()
+    alternatives = _alternatives(said, axiom.object)
+    if len(alternatives) == 1:
+        for predicate, value in alternatives[0]:
+            if predicate != _TYPE:
+                made.update(_imp(label, [is_class], (predicate, value)))
+            elif value != of_class:
+                made.add(Triple(of_class, _BELOW, value))
+    if axiom.predicate == _SAME:
+        for atoms in alternatives:
+            made.update(_imp(label, atoms, is_class))
+    return made
+
+
+def _alternatives(said: BySubject, expression: Node) -> list[list[Atom]]:
+    """Return what a class expression asks of a member: the atoms of one of the lists."""
+    if isinstance(expression, NamedNode):
+        return [[(_TYPE, expression)]]
+    of_property, value = said.value(expression, "onProperty"), said.value(expression, "hasValue")
+    if isinstance(of_property, NamedNode) and isinstance(value, NamedNode):
+        return [[(of_property, value)]]
+    if one_of := said.items(said.value(expression, "unionOf")):
+        return [atoms for part in one_of for atoms in _alternatives(said, part)]
+    if all_of := said.items(said.value(expression, "intersectionOf")):
+        chosen = product(*(_alternatives(said, part) for part in all_of))
+        return [[atom for atoms in each for atom in atoms] for each in chosen]
+    raise _NoRule
+
+
+def _expression(said: BySubject, expression: Node) -> Iterator[Triple]:
+    """Yield the triples that write a class expression, its lists among them."""
+    if isinstance(expression, BlankNode):
+        for name, values in said.said_of(expression):
+            for value in values:
+                yield Triple(expression, NamedNode(name), value)
+                yield from _expression(said, value)
+
+
+def _imp(label: str, body: list[Atom], head: Atom) -> Iterator[Triple]:
+    rule = BlankNode()
+    yield Triple(rule, _TYPE, _swrl("Imp"))
+    yield Triple(rule, _LABEL, Literal(label, language="en"))
+    yield Triple(_THIS, _TYPE, _swrl("Variable"))
+    for part, atoms in (("body", body), ("head", [head])):
+        rest: NamedNode | BlankNode = _NIL
+        for atom in reversed(atoms):
+            cell = BlankNode()
+            yield Triple(cell, _TYPE, _swrl("AtomList"))
+            yield Triple(cell, _REST, rest)
+            yield from _atom(cell, *atom)
+            rest = cell
+        yield Triple(rule, _swrl(part), rest)
+
+
+def _atom(cell: BlankNode, predicate: NamedNode, value: Node) -> Iterator[Triple]:
+    atom = BlankNode()
+    yield Triple(cell, _FIRST, atom)
+    yield Triple(atom, _swrl("argument1"), _THIS)
+    if predicate == _TYPE:
+        yield Triple(atom, _TYPE, _swrl("ClassAtom"))
+        yield Triple(atom, _swrl("classPredicate"), value)
+    else:
+        yield Triple(atom, _TYPE, _swrl("IndividualPropertyAtom"))
+        yield Triple(atom, _swrl("propertyPredicate"), predicate)
+        yield Triple(atom, _swrl("argument2"), value)
+
+
+def _swrl(name: str) -> NamedNode:
+    return NamedNode(NAMESPACE + name)
