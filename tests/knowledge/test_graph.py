@@ -7,6 +7,7 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 from tests.individuals import individual
 
 from irtwin.errors import InputError
+from irtwin.knowledge.store import graph as graph_module
 from irtwin.knowledge.store import table
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.rdf_input import read_turtle
@@ -88,6 +89,27 @@ def test_failed_first_load_leaves_nothing(tmp_path: Path) -> None:
             graph.replace(breaking(), A)
         assert graph.graphs() == []
         assert graph.triples() == set()
+
+
+def test_a_first_load_that_fails_after_its_first_piece_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(graph_module, "_AT_ONCE", 2)
+
+    def breaking():
+        yield from (quad(name, 1.0, A) for name in "xyz")
+        raise RuntimeError("the database went away")
+
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        graph.replace([quad("x", 1.0, B), quad("w", 1.0, B)], B)
+        before = graph.triples()
+        with pytest.raises(RuntimeError):
+            graph.replace(breaking(), A)
+        assert graph.graphs() == [B]
+        assert graph.triples() == before
+        graph.replace((quad(name, 1.0, A) for name in "vwxyz"), A)
+        assert len(graph.triples(A)) == 5
+        assert graph.triples() == before | graph.triples(A)
 
 
 def test_blank_node_of_a_first_load_is_the_same_in_the_union() -> None:
