@@ -48,8 +48,8 @@ def as_swrl(graph: KnowledgeGraph, rules: Iterable[Rule]) -> Written:
     written, model = Written(), _Model(graph)
     for rule in rules:
         try:
-            for imp in _imps(rule, model):
-                written.triples |= {quad.triple for quad in parse(_PROLOGUE + imp, format=RdfFormat.TURTLE)}
+            for text in _imps(rule, model):
+                written.triples |= triples_of(text)
         except NoConjunction as why:
             written.left_out.append((rule, str(why)))
     return written
@@ -96,9 +96,9 @@ def _imps(rule: Rule, model: _Model) -> Iterator[str]:
     if not rows or len(rows) > MOST_VALUES:
         raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
     for row, conclusion in product(rows, parts.template):
-        imp = _Imp(model)
-        body = imp.body(_bound(own, row), _bound(parts.comparisons, row))
-        yield imp.written(rule, body, imp.head(*_bound([conclusion], row)))
+        written = _Imp(model)
+        body = written.body(_bound(own, row), _bound(parts.comparisons, row))
+        yield written.written(rule, body, written.head(*_bound([conclusion], row)))
 
 
 def _without_repeats(patterns: list[Pattern], elsewhere: list[Pattern]) -> list[Pattern]:
@@ -158,19 +158,15 @@ class _Imp:
 
     def written(self, rule: Rule, body: list[str], head: str) -> str:
         """Return the rule with its label and comment."""
-        words = f"rdfs:label {rdflib.Literal(rule.label, lang='en').n3()} ; "
-        if rule.comment:
-            words += f"rdfs:comment {rdflib.Literal(rule.comment, lang='en').n3()} ; "
-        variables = "".join(f"<{VARIABLE}{name}> a swrl:Variable . " for name in self._variables)
-        return f"{variables}[] a swrl:Imp ; {words}swrl:body {_atoms(body)} ; swrl:head {_atoms([head])} ."
+        comment = f"rdfs:comment {rdflib.Literal(rule.comment, lang='en').n3()} ; " if rule.comment else ""
+        return imp(rule.label, self._variables, body, head, comment)
 
     def _atom(self, pattern: Pattern, limits: dict[Any, list[tuple[str, rdflib.Literal]]]) -> str:
         subject, predicate, object = pattern
         if _is_type(predicate) and isinstance(object, rdflib.URIRef):
-            return self._class_atom(subject, object.n3())
+            return class_atom(self._term(subject), object.n3())
         if self._is_object_property(predicate):
-            ends = f"swrl:argument1 {self._term(subject)} ; swrl:argument2 {self._term(object)}"
-            return f"[ a swrl:IndividualPropertyAtom ; swrl:propertyPredicate {predicate.n3()} ; {ends} ]"
+            return link_atom(self._term(subject), predicate.n3(), self._term(object))
         if not self._model.is_a(predicate, OWL.DatatypeProperty):
             name = shorten(str(predicate)) if isinstance(predicate, rdflib.URIRef) else "a path"
             raise NoConjunction(f"{name} is no property of individuals or of data in OWL")
@@ -178,7 +174,7 @@ class _Imp:
             values = f"owl:hasValue {object.n3()}"
         else:
             values = f"owl:someValuesFrom {self._range(predicate, limits.get(object, []))}"
-        return self._class_atom(subject, f"[ a owl:Restriction ; owl:onProperty {predicate.n3()} ; {values} ]")
+        return class_atom(self._term(subject), f"[ a owl:Restriction ; owl:onProperty {predicate.n3()} ; {values} ]")
 
     def _range(self, predicate: Any, limits: list[tuple[str, rdflib.Literal]]) -> str:
         """Return the values of a property's datatype within limits."""
@@ -190,9 +186,6 @@ class _Imp:
             facets += f"[ xsd:{_FACET_OF[sign]} {value.n3()} ] "
         return f"[ a rdfs:Datatype ; owl:onDatatype {datatype.n3()} ; owl:withRestrictions ( {facets}) ]"
 
-    def _class_atom(self, subject: Any, kind: str) -> str:
-        return f"[ a swrl:ClassAtom ; swrl:classPredicate {kind} ; swrl:argument1 {self._term(subject)} ]"
-
     def _is_object_property(self, predicate: Any) -> bool:
         return self._model.is_a(predicate, OWL.ObjectProperty)
 
@@ -203,6 +196,29 @@ class _Imp:
         if isinstance(term, rdflib.URIRef):
             return term.n3()
         raise NoConjunction("it speaks of an individual without a name")
+
+
+def imp(label: str, variables: Iterable[str], body: list[str], head: str, more: str = "") -> str:
+    """Return a rule in Turtle, as all below."""
+    declared = "".join(f"<{VARIABLE}{name}> a swrl:Variable . " for name in variables)
+    words = f"rdfs:label {rdflib.Literal(label, lang='en').n3()} ; {more}"
+    return f"{declared}[] a swrl:Imp ; {words}swrl:body {_atoms(body)} ; swrl:head {_atoms([head])} ."
+
+
+def class_atom(subject: str, kind: str) -> str:
+    """Return the atom of a member of a class."""
+    return f"[ a swrl:ClassAtom ; swrl:classPredicate {kind} ; swrl:argument1 {subject} ]"
+
+
+def link_atom(subject: str, predicate: str, object: str) -> str:
+    """Return the atom of two individuals that a property joins."""
+    ends = f"swrl:argument1 {subject} ; swrl:argument2 {object}"
+    return f"[ a swrl:IndividualPropertyAtom ; swrl:propertyPredicate {predicate} ; {ends} ]"
+
+
+def triples_of(text: str) -> set[Triple]:
+    """Return a rule's triples."""
+    return {quad.triple for quad in parse(_PROLOGUE + text, format=RdfFormat.TURTLE)}
 
 
 def _atoms(atoms: list[str]) -> str:

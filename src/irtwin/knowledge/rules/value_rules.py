@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import product
 
-from pyoxigraph import BlankNode, Literal, NamedNode, Triple
+from pyoxigraph import BlankNode, NamedNode, Triple
 
-from irtwin.knowledge.rules.swrl import NAMESPACE
+from irtwin.knowledge.rules.as_swrl import VARIABLE, class_atom, imp, link_atom, triples_of
 from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, shorten
 
-_TYPE, _FIRST, _REST, _NIL = (NamedNode(RDF + name) for name in ("type", "first", "rest", "nil"))
-_LABEL, _BELOW, _SAME = NamedNode(RDFS + "label"), NamedNode(RDFS + "subClassOf"), NamedNode(OWL + "equivalentClass")
-_THIS = NamedNode("urn:swrl:var#this")
+_TYPE, _BELOW, _SAME = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf"), NamedNode(OWL + "equivalentClass")
+_THIS = f"<{VARIABLE}this>"
 
-Atom = tuple[NamedNode, Node]  # a property and its value; rdf:type and a class
+Atom = tuple[NamedNode, NamedNode]  # a property and its value; rdf:type and a class
 
 
 class _NoRule(Exception):
@@ -100,34 +99,9 @@ def _expression(said: BySubject, expression: Node) -> Iterator[Triple]:
                 yield from _expression(said, value)
 
 
-def _imp(label: str, body: list[Atom], head: Atom) -> Iterator[Triple]:
-    rule = BlankNode()
-    yield Triple(rule, _TYPE, _swrl("Imp"))
-    yield Triple(rule, _LABEL, Literal(label, language="en"))
-    yield Triple(_THIS, _TYPE, _swrl("Variable"))
-    for part, atoms in (("body", body), ("head", [head])):
-        rest: NamedNode | BlankNode = _NIL
-        for atom in reversed(atoms):
-            cell = BlankNode()
-            yield Triple(cell, _TYPE, _swrl("AtomList"))
-            yield Triple(cell, _REST, rest)
-            yield from _atom(cell, *atom)
-            rest = cell
-        yield Triple(rule, _swrl(part), rest)
+def _imp(label: str, body: list[Atom], head: Atom) -> set[Triple]:
+    return triples_of(imp(label, ("this",), [_atom(*atom) for atom in body], _atom(*head)))
 
 
-def _atom(cell: BlankNode, predicate: NamedNode, value: Node) -> Iterator[Triple]:
-    atom = BlankNode()
-    yield Triple(cell, _FIRST, atom)
-    yield Triple(atom, _swrl("argument1"), _THIS)
-    if predicate == _TYPE:
-        yield Triple(atom, _TYPE, _swrl("ClassAtom"))
-        yield Triple(atom, _swrl("classPredicate"), value)
-    else:
-        yield Triple(atom, _TYPE, _swrl("IndividualPropertyAtom"))
-        yield Triple(atom, _swrl("propertyPredicate"), predicate)
-        yield Triple(atom, _swrl("argument2"), value)
-
-
-def _swrl(name: str) -> NamedNode:
-    return NamedNode(NAMESPACE + name)
+def _atom(predicate: NamedNode, value: NamedNode) -> str:
+    return class_atom(_THIS, str(value)) if predicate == _TYPE else link_atom(_THIS, str(predicate), str(value))

@@ -7,7 +7,7 @@ goes into a named graph of its own; what it takes from there is taken from every
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
@@ -15,6 +15,7 @@ from pyoxigraph import DefaultGraph, NamedNode, Quad, Store, Triple
 from irtwin.errors import InputError
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.keywords import is_update, parse_update, refuse_service_and_load
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.union import with_union
@@ -67,7 +68,7 @@ def by_asking(
     if not forms or any(has_blank_node(some) for some in (*gone, *come)):
         return None
     new = come[1] - {quad.triple for quad in (*come[0], *holding(come[1]))}
-    return gone[0] | set(holding(gone[1] - come[1])), come[0] | set(_in_graph(new))
+    return gone[0] | set(holding(gone[1] - come[1])), come[0] | set(in_graph(new, GRAPH_ASSERTED))
 
 
 def by_doing(
@@ -104,13 +105,8 @@ def by_doing(
     named = {quad for quad in result if quad.graph_name != DefaultGraph()} - lost
     named |= lost & done(lost) if lost else set()
     new = union - old - {quad.triple for quad in named}
-    after = named | set(_in_graph(new))
+    after = named | set(in_graph(new, GRAPH_ASSERTED))
     return before - after, after - before
-
-
-def _in_graph(triples: Iterable[Triple]) -> Iterator[Quad]:
-    graph = NamedNode(GRAPH_ASSERTED)
-    return (Quad(triple.subject, triple.predicate, triple.object, graph) for triple in triples)
 
 
 def _operation(prologue: str, rest: str, base: str | None) -> tuple[dict[str, str], str | None]:
