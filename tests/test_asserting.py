@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad
+from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad, RdfFormat, Triple, parse, serialize
 from sqlalchemy import select
 
 from irtwin.asking import ask, explain, export
@@ -19,7 +19,7 @@ from irtwin.knowledge.owl_rl.beside import Beside
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY, OWL
 from irtwin.rewriting import conclude, fill, map_rows, rewriting
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
@@ -211,6 +211,17 @@ def test_an_edited_export_comes_back_as_a_difference(workspace: Path, tmp_path: 
     assert rows(workspace, PAYLOAD) == [(5.5,)]
     with Workspace.existing(workspace) as again, again.reading() as session:
         assert {fact.author for fact in session.scalars(select(AssertedFact))} == {"anna", "bert"}
+
+
+def test_an_axiom_that_an_editor_writes_from_its_other_end_is_no_difference(workspace: Path, tmp_path: Path) -> None:
+    owl, turned, disjoint = tmp_path / "edited.owl", tmp_path / "edited.ttl", NamedNode(f"{OWL}disjointWith")
+    export(owl, workspace)
+    said = [quad.triple for quad in parse(path=str(owl), format=RdfFormat.RDF_XML)]
+    kept = [it for it in said if it.predicate != disjoint]
+    assert len(kept) < len(said)
+    kept += [Triple(it.object, disjoint, it.subject) for it in said if it.predicate == disjoint]
+    serialize(kept, str(turned), RdfFormat.TURTLE)
+    assert irtwin("import", workspace, "--owl", turned).err.strip().endswith("Nothing was taken.")
 
 
 TAKEN = "Taken. Run the data set again, by `irtwin run`, to have the twin follow."

@@ -9,8 +9,9 @@ from sqlalchemy import select
 from tests.data_sets import irtwin
 
 from irtwin.asking import ask, export
+from irtwin.identification.validation import FIT
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run, Twin
+from irtwin.storage.schema import Run, Twin, TwinRun
 from irtwin.workflow import run, unpack_demo
 
 pytest.importorskip("jpype")
@@ -48,6 +49,7 @@ def twin_of(place: Path) -> str:
 
 
 def of_first_run(place: Path) -> tuple[str, str]:
+    """Return the first run that the twin was fitted to, and its IRI: no other changes the twin."""
     with Workspace.existing(place) as there, there.reading() as session:
-        run_id = session.scalars(select(Run.run_id).where(Run.role == "observed").order_by(Run.run_id)).first()
+        run_id = session.scalars(select(TwinRun.run_id).where(TwinRun.part == FIT).order_by(TwinRun.run_id)).first()
         return str(run_id), f"{there.base}run/{run_id}"

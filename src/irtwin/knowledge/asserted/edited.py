@@ -18,6 +18,13 @@ from irtwin.knowledge.store.rdf_input import parsing, read_rdf
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
 
 _TYPE = NamedNode(f"{RDF}type")
+_OF_BOTH_ENDS = {
+    NamedNode(f"{OWL}{name}")
+    for name in (
+        *("disjointWith", "equivalentClass", "equivalentProperty", "inverseOf", "propertyDisjointWith"),
+        *("sameAs", "differentFrom"),
+    )
+}
 _FORMATS = {".owl": RdfFormat.RDF_XML, ".rdf": RdfFormat.RDF_XML, ".xml": RdfFormat.RDF_XML, ".ttl": RdfFormat.TURTLE}
 
 
@@ -39,9 +46,13 @@ def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
     new, old = _named(_parsed(path)), _named(exported(graph))
     if not new & old:
         raise InputError(f"{path}: says nothing that this workspace says; give a file that `irtwin export --owl` wrote")
-    gone = old - new
+    gone = {triple for triple in old - new if _turned(triple) not in new}
     known = {triple.subject for triple in old}
-    came = {triple for triple in new - old if not (triple.subject in known and _is_declaration(triple))}
+    came = {
+        triple
+        for triple in new - old
+        if _turned(triple) not in old and not (triple.subject in known and _is_declaration(triple))
+    }
     removed = {
         quad for triple in gone for quad in graph.said(triple.subject, triple.predicate) if quad.triple == triple
     }
@@ -62,6 +73,13 @@ def _named(triples: Iterable[Triple]) -> set[Triple]:
     store = Store()
     store.extend(in_graph(triple for triple in triples if not has_blank_node([triple])))
     return {quad.triple for quad in store if quad.subject != NamedNode(ONTOLOGY)}
+
+
+def _turned(triple: Triple) -> Triple:
+    """Return an axiom that says the same of both its ends as editors may write it, from the other end."""
+    if triple.predicate not in _OF_BOTH_ENDS or not isinstance(triple.object, NamedNode):
+        return triple
+    return Triple(triple.object, triple.predicate, triple.subject)
 
 
 def _is_declaration(triple: Triple) -> bool:
