@@ -14,6 +14,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
+from irtwin.gap.beside_file import Simulator, alone_in_file, beside
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
@@ -45,7 +46,6 @@ from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
 from irtwin.gap.search import Search, check_observed, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
-from irtwin.gap.writing import Simulator
 from irtwin.identification.progress import tell, tell_step
 from irtwin.identification.two_processes import begun, one_blas_thread
 from irtwin.robot.description import Robot
@@ -114,8 +114,8 @@ class Diagnosis:
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
-            alone = writing.alone_in_file(self.causes, self.scale)
-            written = tuple(writing.beside(self.simulator, one, alone) for one in written)
+            alone = alone_in_file(self.causes, self.scale)
+            written = tuple(beside(self.simulator, one, alone) for one in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
         findings = apart.findings(findings, causes, self.thresholds.matters)

@@ -4,37 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from irtwin.document import document
 from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Quantity, Term
+from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.finding import ChannelFinding, branches, numbers_without, quantities
+from irtwin.gap.isolation.finding import ChannelFinding, branches, quantities
 from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
-from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Criterion, Matters
 from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
-
-
-class Simulator(Protocol):
-    """A simulator's model of the robot."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    def numbers(self, joint: str) -> Mapping[str, float]:
-        """Return a joint's numbers, by what MJCF calls them."""
 
 
 def gap(joints: Sequence[str], findings: Sequence[ChannelFinding], energies: EnergyErrors | None) -> document.Gap:
@@ -142,12 +129,11 @@ def number_is_off(cause: document.Cause, limits: Matters) -> bool:
     One joint's rotor can be a hundredth of the gap, and half of what it should be: who mends the model would miss it.
     """
     return cause.likely and any(
-        one.simulator is not None and _least_change(one) > limits.number * abs(one.simulator)
-        for one in cause.parameters
+        one.simulator is not None and least_change(one) > limits.number * abs(one.simulator) for one in cause.parameters
     )
 
 
-def _least_change(one: document.CauseParameter) -> float:
+def least_change(one: document.CauseParameter) -> float:
     """Return the least magnitude of a change within its 95 % interval."""
     low, high = one.interval95 or (one.value, one.value)
     return max(low, -high, 0.0)
@@ -197,54 +183,6 @@ def parameters(
     if one.of_bodies:  # most of a body's numbers do not show: those that do
         stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
     return tuple(stated)
-
-
-def beside(
-    simulator: Simulator, cause: document.Cause, alone: Mapping[tuple[str, str], document.CauseParameter]
-) -> document.Cause:
-    """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both.
-
-    `alone`: changes by joint and name where they are others in a file, which has no place for all that differs. One
-    that is not sure there goes with what the file cannot hold: the file's number stays.
-    """
-
-    def told(one: document.CauseParameter) -> document.CauseParameter:
-        if one.joint is None or cause.scope != CHANGED:
-            return one
-        own = simulator.numbers(one.joint).get(catalogue()[cause.effect].changed_in_mjcf.get(one.name, ""))
-        other = alone.get((one.joint, one.name), one)
-        if own is None or (other is not one and not _least_change(other)):
-            return one
-        return replace(other, simulator=own, robot=max(0.0, own + other.value))
-
-    return replace(cause, parameters=tuple(map(told, cause.parameters)))
-
-
-def alone_in_file(
-    found: Sequence[tuple[ChannelFinding, FoundCause]], scale: FittedTorqueScale | None
-) -> dict[tuple[str, str], document.CauseParameter]:
-    """Return changes of friction that a simulator's file holds, by joint and name, as they are best in that file.
-
-    Friction that no number holds (by load, by temperature) leaves another Coulomb and viscous friction beside it than
-    without it, so they are fitted without it; empty where nothing of that kind was found.
-    """
-    changed = [(finding, cause) for finding, cause in found if finding.name == "torque" and cause.scope == CHANGED]
-    held: dict[int, Term] = {}
-    others: set[int] = set()
-    for _, cause in changed:
-        names = catalogue()[cause.effect].changed_in_mjcf
-        columns = [pair for one in cause.variants for pair in zip(one.columns, one.terms, strict=True)]
-        for k, term in columns if catalogue()[cause.effect].family == "friction" else ():
-            name = term.name.removeprefix("d")  # of a change beside another number
-            if name in names:
-                held[k] = replace(term, name=name)
-            else:
-                others.add(k)
-    if not held or not others:
-        return {}
-    fitted = numbers_without(changed[0][0], held, others)
-    widened = [one if scale is None else scale.widened(one) for one in fitted]
-    return {(str(one.joint), one.name): parameter(one) for one in widened}
 
 
 def torque_scale(one: FittedTorqueScale) -> document.TorqueScale:

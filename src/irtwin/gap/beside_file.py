@@ -1,0 +1,73 @@
+"""Causes beside the file of a simulator's model: its numbers and the robot's, as they are best in that file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from irtwin.document.document import Cause, CauseParameter
+from irtwin.effects.catalogue import catalogue
+from irtwin.effects.effect import Term
+from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.finding import ChannelFinding, numbers_without
+from irtwin.gap.regression.hypotheses import CHANGED
+from irtwin.gap.writing import least_change, parameter
+from irtwin.twin.torque_scale import FittedTorqueScale
+
+Changes = Mapping[tuple[str, str], CauseParameter]  # by joint and name
+
+
+class Simulator(Protocol):
+    """A simulator's model of the robot."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    def numbers(self, joint: str) -> Mapping[str, float]:
+        """Return a joint's numbers, by what MJCF calls them."""
+
+
+def beside(simulator: Simulator, cause: Cause, alone: Changes) -> Cause:
+    """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both.
+
+    `alone`: changes by joint and name where they are others in a file, which has no place for all that differs. One
+    that is not sure there goes with what the file cannot hold: the file's number stays.
+    """
+
+    def told(one: CauseParameter) -> CauseParameter:
+        if one.joint is None or cause.scope != CHANGED:
+            return one
+        own = simulator.numbers(one.joint).get(catalogue()[cause.effect].changed_in_mjcf.get(one.name, ""))
+        other = alone.get((one.joint, one.name), one)
+        if own is None or (other is not one and not least_change(other)):
+            return one
+        return replace(other, simulator=own, robot=max(0.0, own + other.value))
+
+    return replace(cause, parameters=tuple(map(told, cause.parameters)))
+
+
+def alone_in_file(found: Sequence[tuple[ChannelFinding, FoundCause]], scale: FittedTorqueScale | None) -> Changes:
+    """Return changes of friction that a simulator's file holds, by joint and name, as they are best in that file.
+
+    Friction that no number holds (by load, by temperature) leaves another Coulomb and viscous friction beside it than
+    without it, so they are fitted without it; empty where nothing of that kind was found.
+    """
+    changed = [(finding, cause) for finding, cause in found if finding.name == "torque" and cause.scope == CHANGED]
+    held: dict[int, Term] = {}
+    others: set[int] = set()
+    for _, cause in changed:
+        names = catalogue()[cause.effect].changed_in_mjcf
+        columns = [pair for one in cause.variants for pair in zip(one.columns, one.terms, strict=True)]
+        for k, term in columns if catalogue()[cause.effect].family == "friction" else ():
+            name = term.name.removeprefix("d")  # of a change beside another number
+            if name in names:
+                held[k] = replace(term, name=name)
+            else:
+                others.add(k)
+    if not held or not others:
+        return {}
+    fitted = numbers_without(changed[0][0], held, others)
+    widened = [one if scale is None else scale.widened(one) for one in fitted]
+    return {(str(one.joint), one.name): parameter(one) for one in widened}
