@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 
 from irtwin.identification.progress import track
+from irtwin.identification.two_processes import can_copy, shared
 from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
-_AT_ONCE = 6_000_000  # positions that are held at a time
+_AT_ONCE = 12_000_000  # positions that are held at a time
+_LONG = 4_000_000  # positions, from which a copy of this process plays half of them
 _STIFFEST = 1e-3  # of a swing that takes as long as a step, squared: a joint that is as good as rigid
 
 
@@ -48,16 +50,20 @@ class Alone:
 
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
         """Return, for each set of numbers (k, n) and each stretch, what the joints do at its samples, as `measured`."""
-        most = max(1, _AT_ONCE // (self.load[0].size * self.stretches[0].measured.shape[1]))
         found: list[list[np.ndarray]] = [[] for _ in numbers]
         soft = [bool(self.servos.compliance(one).any()) for one in numbers]
         for kind in (False, True):  # a link behind a spring takes twice the time
             places = [place for place, is_soft in enumerate(soft) if is_soft == kind]
-            for first in range(0, len(places), most):
-                some = places[first : first + most]
-                for place, moved in zip(some, self._some(np.array([numbers[one] for one in some])), strict=True):
-                    found[place] = moved
+            some = [numbers[place] for place in places]
+            is_long = len(some) * self.load[0].size > _LONG and can_copy()
+            for place, moved in zip(places, shared(self._each, some) if is_long else self._each(some), strict=True):
+                found[place] = moved
         return found
+
+    def _each(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
+        most = max(1, _AT_ONCE // (self.load[0].size * self.stretches[0].measured.shape[1]))
+        parts = [np.array(numbers[first : first + most]) for first in range(0, len(numbers), most)]
+        return [moved for part in parts for moved in self._some(part)]
 
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
         steps = self.load.shape[1]
@@ -97,13 +103,14 @@ class Alone:
         dynamics = (_Soft if servos.compliance(own).any() else _Rigid)(servos, own, load, bodies, step, q, v)
         q = dynamics.motor
         lower, upper = self._stops()
-        followed, below, lags = q, -band, bool((share < 1).any())
+        followed, below, banded, lags = q, -band, bool(band.any()), bool((share < 1).any())
         moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
         moved[0, 0] = dynamics.measured(q)
         for row in range(len(commanded)):
             followed = followed + share * (commanded[row] - followed) if lags else commanded[row]
             off = followed - q
-            off -= np.minimum(np.maximum(off, below), band)
+            if banded:
+                off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
             moved[row, 1:] = force
             force -= joint * v
@@ -148,27 +155,26 @@ class _Rigid:
         self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
         q: np.ndarray, v: np.ndarray,
     ):  # fmt: skip
-        _, damping, self._most, _, armature, *_ = numbers
-        soft, back = _dry(servos, numbers, step)
-        inverse = 1 / (bodies + armature)  # what no step changes is worked out before the steps
+        _, damping, self._most, _, self._armature, *_ = numbers
+        self._softness, self._back = _dry(servos, numbers, step)
         self.motor = q
-        self._load, self._least = load, -self._most
-        self._gives = step * inverse / (1 + step * damping * inverse)
-        self._held_force, self._held_speed = inverse / (inverse + soft), back / (inverse + soft)
+        self._load, self._bodies, self._least = load, bodies, -self._most
+        self._step, self._damping = step, step * damping
 
     def speed(self, row: int, force: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the speed after a step."""
         force -= self._load[row]
-        held = force * self._held_force[row] + self._held_speed[row] * v
+        inertia = self._bodies[row] + self._armature
+        held = (force + self._back * inertia * v) / (1 + self._softness * inertia)
         force -= np.minimum(np.maximum(held, self._least), self._most)
-        return np.asarray(v + force * self._gives[row])
+        return np.asarray(v + self._step * force / (inertia + self._damping))
 
     def measured(self, q: np.ndarray) -> np.ndarray:
         """Return the positions that are measured where motors are at some."""
         return q
 
 
-class _Soft:
+class _Soft(_Rigid):
     """Joints whose links swing behind their motors, on a spring that is a little damped.
 
     A step knows the speeds at its end of what swings too fast for it: that does not diverge, nor is it there to see.
@@ -178,18 +184,15 @@ class _Soft:
         self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
         q: np.ndarray, v: np.ndarray,
     ):  # fmt: skip
-        _, damping, self._most, _, armature, *_ = numbers
-        soft, back = _dry(servos, numbers, step)
+        super().__init__(servos, numbers, load, bodies, step, q, v)
         stiffness = 1 / np.maximum(servos.compliance(numbers), step**2 * _STIFFEST / servos.model.links)
         slack = 2 * DAMPED * np.sqrt(stiffness * servos.model.links)
         late = np.clip(4 * (step * np.sqrt(stiffness / np.maximum(bodies, 1e-9)) - 0.5), 0.0, 1.0)
-        self._load, self._bodies, self._least, self._step = load, bodies, -self._most, step
-        self._stiffness, self._back = stiffness, back
-        self._rotor = armature + step * damping
+        self._stiffness, self._rotor = stiffness, self._armature + self._damping
         self._pulled, self._pulls = step**2 * stiffness + step * slack, late * step**2 * stiffness + step * slack
         self._whole = (self._rotor + self._pulled) * (bodies + self._pulls) - self._pulls * self._pulled
         self._gives = (bodies + self._pulls) / self._whole
-        self._holds = 1 / (self._gives + soft)
+        self._holds = 1 / (self._gives + self._softness)
         twist, self._on_links = load[0] / stiffness, servos.on_links(numbers)
         self.motor = np.where(self._on_links, q + twist, q)
         self._link, self._turns = self.motor - twist, v
@@ -232,7 +235,8 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
         models.append(copy.copy(own))
         models[-1].opt.gravity = tilted(own, angles)
     for place, one in track(enumerate(stretches), "load of the bodies in each stretch"):
-        found = np.array([_bodies(servos, compiled, one) for compiled in models])
+        motion = smoothed(one.q, interval(one.time), _SMOOTH)
+        found = np.array([_bodies(servos, compiled, *motion) for compiled in models])
         found[2:5] = (found[2:5] - found[1]) / _ASIDE
         found[5:] = (found[5:] - found[0]) / _ASIDE
         found[1] -= found[0]
@@ -245,8 +249,10 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
     )
 
 
-def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) -> tuple[np.ndarray, np.ndarray]:
-    """Return at a stretch's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
+def _bodies(
+    servos: Servos, compiled: mujoco.MjModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return at a motion's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
     import mujoco
 
     dof, at = servos.model.speeds, servos.model.positions
@@ -256,8 +262,6 @@ def _bodies(servos: Servos, compiled: mujoco.MjModel, stretch: PlayedStretch) ->
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     data, full = mujoco.MjData(bare), np.zeros((bare.nv, bare.nv))
-    gap = interval(stretch.time)
-    q, dq, ddq = smoothed(stretch.q, gap, _SMOOTH)
     torque, inertia = np.empty(q.shape), np.empty(q.shape)
     for row in range(len(q)):
         data.qpos[at], data.qvel[dof], data.qacc[dof] = q[row], dq[row], ddq[row]

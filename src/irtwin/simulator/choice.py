@@ -226,14 +226,17 @@ def _better(fit: Fit, ways: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Fit, P
 
 def _evidences(fit: Fit, ways: Sequence[tuple[Played, np.ndarray]]) -> list[np.ndarray]:
     """Return of each way how bad numbers (n,) are with what those that differ (k, n) could have been besides."""
-    every = []
-    for (best, differs), slopes in zip(ways, fit.all_slopes([(best, SMOOTH) for best, _ in ways]), strict=True):
+    rows = [[row for row in SMOOTH if differs[row].any()] or SMOOTH[:1] for _, differs in ways]
+    every = fit.all_slopes([(best, own) for (best, _), own in zip(ways, rows, strict=True)])
+    evidences = []
+    for (best, differs), own, slopes in zip(ways, rows, every, strict=True):
         found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
         for joint in range(differs.shape[1]):
-            rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-            found[joint] += np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2
-        every.append(found)
-    return every
+            some = [row for row in own if differs[row, joint]]
+            _, normal, _ = fit.equations(best.at, slopes, own, some, joint)
+            found[joint] += np.linalg.slogdet(normal * LIKELY[some, 0] * LIKELY[some, 0, None])[1] / 2
+        evidences.append(found)
+    return evidences
 
 
 def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:
