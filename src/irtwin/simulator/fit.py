@@ -88,7 +88,8 @@ def marginal(joints: Sequence[StepEquations], rows: Sequence[int]) -> tuple[np.n
     return normal, right
 
 
-def _no_farther(step: np.ndarray, rows: Sequence[int]) -> np.ndarray:
+def no_farther(step: np.ndarray, rows: Sequence[int]) -> np.ndarray:
+    """Return a step of rows, or the part of it that goes no farther than one step should."""
     return np.asarray(step / max(1.0, np.abs(step / FARTHEST[rows, 0]).max(initial=0.0)))
 
 
@@ -254,13 +255,13 @@ class Fit:
             equations.append(one._replace(normal=one.normal + damping[joint] * np.diag(np.diag(one.normal))))
         alike = [row for row in rows if row in SHARED]
         if alike:
-            steps[alike] = _no_farther(np.linalg.solve(*marginal(equations, alike)), alike)[:, None]
+            steps[alike] = no_farther(np.linalg.solve(*marginal(equations, alike)), alike)[:, None]
         for joint, (own, normal, right) in enumerate(equations):
             of_joint = [place for place, row in enumerate(own) if row not in SHARED]
             right = (right - normal @ steps[own, joint])[of_joint]  # beside the step of what joints share
             step = np.linalg.solve(normal[np.ix_(of_joint, of_joint)], right)
             some = [own[place] for place in of_joint]
-            steps[some, joint] = _no_farther(step, some)
+            steps[some, joint] = no_farther(step, some)
         return steps
 
     def equations(

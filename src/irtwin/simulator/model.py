@@ -25,7 +25,7 @@ from irtwin.simulator.model_file import ModelFile
 if TYPE_CHECKING:
     import mujoco
 
-_SWING = 1.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
+_SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
 _POSES = 64  # over whose inertia a mean is taken
 _APART = 1e-3  # m, frames that are at one place
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one

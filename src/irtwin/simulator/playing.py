@@ -19,8 +19,8 @@ from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import PlayedStretch, Push, each, play
 from irtwin.simulator.push import FoundPush, find_pushes
-from irtwin.simulator.refined import refined
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
+from irtwin.simulator.soft import softened
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
@@ -77,8 +77,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
         stretches = _stretches(runs, _BRIEF)
     step = max(_STEP, model.compiled.opt.timestep)
     chosen, pushes = _chosen(own, stretches, step)
-    if chosen.differs[NAMES.index("torque_limit")].any():  # where one is reached, an arm gives way as a whole
-        chosen = refined(chosen)
+    chosen = softened(chosen)
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))

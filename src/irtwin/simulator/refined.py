@@ -9,8 +9,8 @@ import numpy as np
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.progress import tell_step
 from irtwin.simulator.choice import DifferingNumbers
-from irtwin.simulator.fit import FARTHEST, LIKELY, SMOOTH, STEP, Fit, Played
-from irtwin.simulator.servos import NAMES
+from irtwin.simulator.fit import LIKELY, SMOOTH, STEP, Fit, Played, no_farther
+from irtwin.simulator.servos import NAMES, SOFT
 
 _PASSES, _WORTH = 8, 0.05
 _NEAR = 0.2  # of the step of a difference quotient: what falls bends
@@ -26,34 +26,44 @@ def refined(chosen: DifferingNumbers) -> DifferingNumbers:
     than joints by themselves did.
     """
     fit, best, own = chosen.fit, chosen.fit.rolled(chosen.played.at), chosen.fit.servos.chart(chosen.fit.servos.numbers)
-    places = [(int(row), int(joint)) for row, joint in np.argwhere(chosen.differs) if row in SMOOTH]
-    none = np.zeros((len(fit.stretches), 0, 0)), np.zeros((len(fit.stretches), 0))
-    normal, each = none
-    while places:
-        best = _solved(fit, best, places)
-        normal, each = _equations(fit, best, places)
+    places = _places(chosen)
+    while True:
+        best, normal, each = _solved(fit, best, places)
         variance = np.diag(np.linalg.inv(normal.sum(axis=0)))
         off = np.array([(best.at - own)[place] for place in places])
         loss = off**2 / variance / 2 - np.log(len(NAMES)) - np.log(_of(LIKELY, places) ** 2 / variance) / 2
-        weakest = int(np.argmin(loss))
-        if loss[weakest] >= 0:
+        if not places or loss.min() >= 0:
             break
-        place = places.pop(weakest)
+        place = places.pop(int(np.argmin(loss)))
         best = fit.all_rolled([_moved(best.at, [place], [(own - best.at)[place]])])[0]
-        normal, each = none
     return _about(chosen, best, places, normal, each)
 
 
-def _solved(fit: Fit, best: Played, places: Sequence[Place]) -> Played:
+def evidence(chosen: DifferingNumbers) -> float:
+    """Return how bad numbers are by the whole model, with what those that differ could have been besides."""
+    fit, places = chosen.fit, _places(chosen)
+    best = fit.rolled(chosen.played.at)
+    likely = _of(LIKELY, places)
+    known = np.linalg.slogdet(_equations(fit, best, places)[0].sum(axis=0) * likely * likely[:, None])[1] / 2
+    return float(_cost(fit, best) + np.log(len(NAMES)) * chosen.differs.sum() + known)
+
+
+def _places(chosen: DifferingNumbers) -> list[Place]:
+    return [(int(row), int(joint)) for row, joint in np.argwhere(chosen.differs) if row in SMOOTH]
+
+
+def _solved(fit: Fit, best: Played, places: Sequence[Place]) -> tuple[Played, np.ndarray, np.ndarray]:
+    """Return numbers with some fitted, and the equations of a step from there."""
     for number in range(_PASSES):
         normal, each = _equations(fit, best, places)
         steps = [_step(normal.sum(axis=0), each.sum(axis=0), damping, places) for damping in _DAMPINGS]
         tried = fit.all_rolled([_moved(best.at, places, share * step) for step in steps for share in _SHARES])
-        before, best = _cost(fit, best), min((best, *tried), key=lambda one: _cost(fit, one))
+        better = min(tried, key=lambda one: _cost(fit, one))
         tell_step(f"  numbers by the whole model, pass {number + 1} of {_PASSES} at most")
-        if before - _cost(fit, best) < _WORTH:
-            break
-    return best
+        if _cost(fit, best) - _cost(fit, better) < _WORTH:
+            return best, normal, each
+        best = better
+    return best, *_equations(fit, best, places)
 
 
 def _cost(fit: Fit, one: Played) -> float:
@@ -75,7 +85,8 @@ def _about(
     spread = (ends[1] - ends[0]) / (2 * NORMAL)
     differs[list(SMOOTH)] = False
     for own, place in zip(np.sqrt(np.maximum(np.diag(between), np.diag(inverse))), places, strict=True):
-        differs[place], spread[place] = True, max(spread[place], own)
+        single = 0.0 if place[0] in SOFT else spread[place]  # a soft joint's play is the others', too
+        differs[place], spread[place] = True, max(single, own)
     spread = np.where(differs, spread, 0.0)
     fit = chosen.fit.about(best.at)
     played = fit.played(best.at)
@@ -97,10 +108,11 @@ def _equations(fit: Fit, best: Played, places: Sequence[Place]) -> tuple[np.ndar
     moved = fit.all_rolled([_moved(best.at, [place], [step]) for place, step in zip(places, steps, strict=True)])
     normal, right, count = [], [], len(fit.stretches)
     for place, left in enumerate(best.remainders):
-        columns = np.stack([left - one.remainders[place] for one in moved], axis=-1) / steps
+        columns = np.array([left - one.remainders[place] for one in moved]).reshape(-1, *left.shape)
+        columns /= steps[:, None, None, None]
         weight = fit.certainty / (len(left) * (best.squares[place] + fit.floor**2))
-        normal.append(np.einsum("tcnd,tcne,cn->de", columns, columns, weight, optimize=True))
-        right.append(np.einsum("tcnd,tcn,cn->d", columns, left, weight, optimize=True))
+        normal.append(np.einsum("dtcn,etcn,cn->de", columns, columns, weight, optimize=True))
+        right.append(np.einsum("dtcn,tcn,cn->d", columns, left, weight, optimize=True))
     return np.array(normal) + np.diag(likely**-2.0) / count, np.array(right) - _prior(fit, best, places) / count
 
 
@@ -110,7 +122,7 @@ def _prior(fit: Fit, best: Played, places: Sequence[Place]) -> np.ndarray:
 
 def _step(normal: np.ndarray, right: np.ndarray, damping: float, places: Sequence[Place]) -> np.ndarray:
     step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)
-    return np.asarray(step / max(1.0, np.abs(step / _of(FARTHEST, places)).max()))
+    return no_farther(step, [row for row, _ in places])
 
 
 def _moved(at: np.ndarray, places: Sequence[Place], step: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ _NEAR_ZERO = {"stiffness": 0.01, "damping": 0.1, "friction": 0.1, "armature": 0.
 _LIGHT = 0.01  # of the arm's mass: a payload near zero
 SOFT = (OF_JOINTS.index("compliance"), OF_JOINTS.index("link_compliance"))
 _SPRING, _SOFT = OF_JOINTS.index("spring"), list(SOFT)
-_SOFTEST = 2.0  # of the square of the frequency with which an arm swings on its servo, over that on the joint
+_SOFTEST = 4.0  # of the square of the frequency with which an arm swings on its servo, over that on the joint
 
 
 @dataclass(frozen=True)
