@@ -1,7 +1,7 @@
 """Each joint of a model played by itself, the others as they were measured: quick enough to fit numbers by.
 
 The equations are MuJoCo's of one joint: its servo within the force that it has, damping, and dry friction that gives
-way as its impedance says. A soft joint has a motor and a link. Bodies load the joint as the measured motion has it.
+way as its impedance says. Bodies load the joint as the measured motion has it. A soft joint is as good as rigid here.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from irtwin.signals.sampling import interval
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
-from irtwin.simulator.variant import DAMPED
 
 if TYPE_CHECKING:
     import mujoco
@@ -29,7 +28,6 @@ _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed 
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
 _AT_ONCE = 12_000_000  # positions that are held at a time
 _LONG = 4_000_000  # positions, from which a copy of this process plays half of them
-_STIFFEST = 1e-3  # of a swing that takes as long as a step, squared: a joint that is as good as rigid
 
 
 @dataclass(frozen=True)
@@ -50,15 +48,8 @@ class Alone:
 
     def play(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
         """Return, for each set of numbers (k, n) and each stretch, what the joints do at its samples, as `measured`."""
-        found: list[list[np.ndarray]] = [[] for _ in numbers]
-        soft = [bool(self.servos.compliance(one).any()) for one in numbers]
-        for kind in (False, True):  # a link behind a spring takes twice the time
-            places = [place for place, is_soft in enumerate(soft) if is_soft == kind]
-            some = [numbers[place] for place in places]
-            is_long = len(some) * self.load[0].size > _LONG and can_copy()
-            for place, moved in zip(places, shared(self._each, some) if is_long else self._each(some), strict=True):
-                found[place] = moved
-        return found
+        is_long = len(numbers) * self.load[0].size > _LONG and can_copy()
+        return shared(self._each, numbers) if is_long else self._each(numbers)
 
     def _each(self, numbers: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
         most = max(1, _AT_ONCE // (self.load[0].size * self.stretches[0].measured.shape[1]))
@@ -100,12 +91,11 @@ class Alone:
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         q, v = (np.broadcast_to(one, commanded.shape[1:]).copy() for one in self.begun)
         load, bodies = self._load(own[len(OF_JOINTS) :])
-        dynamics = (_Soft if servos.compliance(own).any() else _Rigid)(servos, own, load, bodies, step, q, v)
-        q = dynamics.motor
+        joints = _Joints(servos, own, load, bodies, step)
         lower, upper = self._stops()
         followed, below, banded, lags = q, -band, bool(band.any()), bool((share < 1).any())
         moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
-        moved[0, 0] = dynamics.measured(q)
+        moved[0, 0] = q
         for row in range(len(commanded)):
             followed = followed + share * (commanded[row] - followed) if lags else commanded[row]
             off = followed - q
@@ -116,10 +106,10 @@ class Alone:
             force -= joint * v
             if springs[1]:
                 force -= spring * (q - springs[0])
-            v = dynamics.speed(row, force, q, v)
+            v = joints.speed(row, force, v)
             before, q = q, np.minimum(np.maximum(q + step * v, lower), upper)
             v = (q - before) / step
-            moved[row + 1, 0] = dynamics.measured(q)
+            moved[row + 1, 0] = q
         moved[-1, 1:] = moved[-2, 1:]
         return moved
 
@@ -148,70 +138,22 @@ class Alone:
         return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
 
 
-class _Rigid:
-    """Joints whose links turn with their motors; all arrays (steps, v, p, n), of numbers (k, v, 1, n)."""
+class _Joints:
+    """Joints with their loads; all arrays (steps, v, p, n), of numbers (k, v, 1, n)."""
 
-    def __init__(
-        self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
-        q: np.ndarray, v: np.ndarray,
-    ):  # fmt: skip
+    def __init__(self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float):
         _, damping, self._most, _, self._armature, *_ = numbers
         self._softness, self._back = _dry(servos, numbers, step)
-        self.motor = q
         self._load, self._bodies, self._least = load, bodies, -self._most
         self._step, self._damping = step, step * damping
 
-    def speed(self, row: int, force: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def speed(self, row: int, force: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the speed after a step."""
         force -= self._load[row]
         inertia = self._bodies[row] + self._armature
         held = (force + self._back * inertia * v) / (1 + self._softness * inertia)
         force -= np.minimum(np.maximum(held, self._least), self._most)
         return np.asarray(v + self._step * force / (inertia + self._damping))
-
-    def measured(self, q: np.ndarray) -> np.ndarray:
-        """Return the positions that are measured where motors are at some."""
-        return q
-
-
-class _Soft(_Rigid):
-    """Joints whose links swing behind their motors, on a spring that is a little damped.
-
-    A step knows the speeds at its end of what swings too fast for it: that does not diverge, nor is it there to see.
-    """
-
-    def __init__(
-        self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float,
-        q: np.ndarray, v: np.ndarray,
-    ):  # fmt: skip
-        super().__init__(servos, numbers, load, bodies, step, q, v)
-        stiffness = 1 / np.maximum(servos.compliance(numbers), step**2 * _STIFFEST / servos.model.links)
-        slack = 2 * DAMPED * np.sqrt(stiffness * servos.model.links)
-        late = np.clip(4 * (step * np.sqrt(stiffness / np.maximum(bodies, 1e-9)) - 0.5), 0.0, 1.0)
-        self._stiffness, self._rotor = stiffness, self._armature + self._damping
-        self._pulled, self._pulls = step**2 * stiffness + step * slack, late * step**2 * stiffness + step * slack
-        self._whole = (self._rotor + self._pulled) * (bodies + self._pulls) - self._pulls * self._pulled
-        self._gives = (bodies + self._pulls) / self._whole
-        self._holds = 1 / (self._gives + self._softness)
-        twist, self._on_links = load[0] / stiffness, servos.on_links(numbers)
-        self.motor = np.where(self._on_links, q + twist, q)
-        self._link, self._turns = self.motor - twist, v
-
-    def speed(self, row: int, force: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the motor's speed after a step; the link's is kept."""
-        twist = self._step * self._stiffness * (q - self._link)
-        link = self._bodies[row] * self._turns + twist - self._step * self._load[row]
-        beside = self._pulls[row] * link / self._whole[row]
-        free = (self._rotor * v + self._step * force - twist) * self._gives[row] + beside
-        held = ((free - v) / self._step + self._back * v) * self._holds[row]
-        free -= self._step * self._gives[row] * np.minimum(np.maximum(held, self._least), self._most)
-        self._turns = (link + self._pulled * free) / (self._bodies[row] + self._pulls[row])
-        self._link = self._link + self._step * self._turns
-        return np.asarray(free)
-
-    def measured(self, q: np.ndarray) -> np.ndarray:
-        """Return the positions that are measured where motors are at some."""
-        return np.where(self._on_links, self._link, q)
 
 
 def _dry(servos: Servos, numbers: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

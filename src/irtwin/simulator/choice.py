@@ -15,8 +15,8 @@ import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Fit, Played, Slopes, StepEquations, marginal
-from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, PARTS, SOFT
+from irtwin.simulator.fit import BY_WHOLE, LIKELY, SHARED, SMOOTH, Fit, Played, Slopes, StepEquations, marginal
+from irtwin.simulator.servos import HOLDS, NAMES, PARTS, SOFT
 
 _HOLDING = NAMES.index("holding")
 _APART = np.isin(np.arange(len(NAMES)), (_HOLDING, *SOFT))[:, None]  # tried by themselves
@@ -178,7 +178,7 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(_FEW):
         fit = fit.about(at)
         best = fit.played(at)
-        begun = [_with(fit, best, differs, row) for row in range(len(OF_JOINTS))]
+        begun = [_with(fit, best, differs, row) for row in (*SMOOTH, _HOLDING)]
         frees = [more for _, more in begun]
         tried = list(zip(fit.all_solved(begun, _PASSES), frees, strict=True))
         evidence, *evidences = _evidences(fit, [(best, differs), *tried])
@@ -193,12 +193,9 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _with(fit: Fit, best: Played, differs: np.ndarray, row: int) -> tuple[Played, np.ndarray]:
-    """Return numbers to begin with where one more of each joint is to be fitted, and which differ then.
-
-    A soft joint has nothing else: beside other numbers it could be anything.
-    """
-    more, taken = differs.copy(), differs if row in SOFT else differs[list(SOFT)]
-    more[row] |= fit.servos.can_differ[row] & ~taken.any(axis=0)
+    """Return numbers to begin with where one more of each joint is to be fitted, and which differ then."""
+    more = differs.copy()
+    more[row] |= fit.servos.can_differ[row]
     begins = [best]
     for value in _BEGINS.get(NAMES[row], ()):
         at = best.at.copy()
@@ -363,4 +360,4 @@ def _equations(
     fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int, chosen: np.ndarray | slice = slice(None)
 ) -> StepEquations:
     """Return a joint's own numbers that differ and are smooth, and the normal equations of a step from them."""
-    return fit.equations(best.at, slopes, SMOOTH, [row for row in SMOOTH if differs[row, joint]], joint, chosen)
+    return fit.equations(best.at, slopes, BY_WHOLE, [row for row in BY_WHOLE if differs[row, joint]], joint, chosen)

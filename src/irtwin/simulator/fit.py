@@ -16,7 +16,9 @@ from irtwin.simulator.play import PlayedStretch, play
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, SOFT, Servos
 
 _HOLDING = NAMES.index("holding")
-SMOOTH = tuple(NAMES.index(name) for name in OF_JOINTS if name != "holding")  # rows of joints that least squares finds
+# rows of joints that least squares finds by single joints, and by the whole model
+SMOOTH = tuple(row for row in range(len(OF_JOINTS)) if row not in (_HOLDING, *SOFT))
+BY_WHOLE = (*SMOOTH, *SOFT)
 SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
 _LEAST, _LEAST_OF_TORQUE = 2e-4, 1e-3  # rad (m); share of a joint's torque
 _BEGUN, _LOOKS = 50.0, 3.0  # times that, and independent samples, before either is known

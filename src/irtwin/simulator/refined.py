@@ -9,8 +9,8 @@ import numpy as np
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.progress import tell_step
 from irtwin.simulator.choice import DifferingNumbers
-from irtwin.simulator.fit import LIKELY, SMOOTH, STEP, Fit, Played, no_farther
-from irtwin.simulator.servos import NAMES, SOFT
+from irtwin.simulator.fit import BY_WHOLE, LIKELY, STEP, Fit, Played, Slopes, no_farther
+from irtwin.simulator.servos import NAMES
 
 _PASSES, _WORTH = 8, 0.05
 _NEAR = 0.2  # of the step of a difference quotient: what falls bends
@@ -49,7 +49,7 @@ def evidence(chosen: DifferingNumbers) -> float:
 
 
 def _places(chosen: DifferingNumbers) -> list[Place]:
-    return [(int(row), int(joint)) for row, joint in np.argwhere(chosen.differs) if row in SMOOTH]
+    return [(int(row), int(joint)) for row, joint in np.argwhere(chosen.differs) if row in BY_WHOLE]
 
 
 def _solved(fit: Fit, best: Played, places: Sequence[Place]) -> tuple[Played, np.ndarray, np.ndarray]:
@@ -83,20 +83,19 @@ def _about(
     servos, differs = chosen.fit.servos, chosen.differs.copy()
     ends = servos.chart(chosen.interval)
     spread = (ends[1] - ends[0]) / (2 * NORMAL)
-    differs[list(SMOOTH)] = False
+    differs[list(BY_WHOLE)] = False
     for own, place in zip(np.sqrt(np.maximum(np.diag(between), np.diag(inverse))), places, strict=True):
-        single = 0.0 if place[0] in SOFT else spread[place]  # a soft joint's play is the others', too
-        differs[place], spread[place] = True, max(single, own)
+        differs[place], spread[place] = True, max(spread[place], own)
     spread = np.where(differs, spread, 0.0)
     fit = chosen.fit.about(best.at)
     played = fit.played(best.at)
-    slopes = fit.slopes(played)
-    slopes.normal[:], slopes.right[:] = 0.0, 0.0  # what single joints say is not what the whole does
+    shape = (count, differs.shape[1], len(BY_WHOLE))
+    slopes = Slopes(np.zeros((*shape, len(BY_WHOLE))), np.zeros(shape))
     for one, (row, joint) in enumerate(places):
-        slopes.right[:, joint, SMOOTH.index(row)] = each[:, one] + _prior(fit, best, places)[one] / count
+        slopes.right[:, joint, BY_WHOLE.index(row)] = each[:, one] + _prior(fit, best, places)[one] / count
         for other, (beside, at) in enumerate(places):
             if at == joint:
-                slopes.normal[:, joint, SMOOTH.index(row), SMOOTH.index(beside)] = normal[:, one, other]
+                slopes.normal[:, joint, BY_WHOLE.index(row), BY_WHOLE.index(beside)] = normal[:, one, other]
     interval = np.array([servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
     odds = np.where(differs, chosen.odds, -np.inf)
     return DifferingNumbers(fit, played, slopes, differs, odds, interval)

@@ -14,7 +14,7 @@ from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.refined import evidence, refined
 from irtwin.simulator.servos import NAMES, OF_JOINTS, SOFT
 
-_FEW = 3  # numbers of a joint that may stand for a soft one
+_FEW = 4  # numbers of a joint that may stand for a soft one
 _TRIED = (0.03, 0.1, 0.3, 1.0)  # of the chart: how often faster the link swings on its joint than on its servo, squared
 _LIMIT = NAMES.index("torque_limit")
 
@@ -22,21 +22,20 @@ _LIMIT = NAMES.index("torque_limit")
 def softened(chosen: DifferingNumbers) -> DifferingNumbers:
     """Return numbers with the soft joint that explains more than what its joint has otherwise, if any does.
 
-    Where a joint is soft, or reaches a limit of torque, numbers are fitted by the whole model.
+    There, and where a limit of torque differs, numbers are fitted by the whole model: an arm gives way as one.
     """
     tried = _softer(chosen)
     if tried is not None:
         better = refined(tried)
-        gain = evidence(chosen) - evidence(better)
-        if gain > 0:
+        if evidence(better) < evidence(chosen):
             return better
-    return refined(chosen) if chosen.differs[[_LIMIT, *SOFT]].any() else chosen
+    return refined(chosen) if chosen.differs[_LIMIT].any() else chosen
 
 
 def _softer(chosen: DifferingNumbers) -> DifferingNumbers | None:
     """Return the numbers with one joint soft that leave least, if they leave less than those that were chosen."""
     fit, own = chosen.fit, chosen.fit.servos.chart(chosen.fit.servos.numbers)
-    few = (chosen.differs.sum(axis=0) <= _FEW) | chosen.differs[list(SOFT)].any(axis=0)
+    few = chosen.differs.sum(axis=0) <= _FEW
     joints = np.flatnonzero(few & fit.servos.can_differ[list(SOFT)].any(axis=0))
     price, best, found = np.log(len(NAMES)), np.inf, None
     for joint in track(joints.tolist(), lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
