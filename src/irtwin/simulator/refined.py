@@ -12,7 +12,7 @@ from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.fit import BY_WHOLE, LIKELY, STEP, Fit, Played, Slopes, no_farther
 from irtwin.simulator.servos import NAMES
 
-_PASSES, _WORTH = 8, 0.05
+_PASSES, _WORTH = 8, 0.3
 _NEAR = 0.2  # of the step of a difference quotient: what falls bends
 _SHARES, _DAMPINGS = (1.0, 0.3), (0.0, 1.0)  # of a step, tried
 

@@ -15,7 +15,7 @@ from irtwin.simulator.refined import evidence, refined
 from irtwin.simulator.servos import NAMES, OF_JOINTS, SOFT
 
 _FEW = 4  # numbers of a joint that may stand for a soft one
-_TRIED = (0.03, 0.1, 0.3, 1.0)  # of the chart: how often faster the link swings on its joint than on its servo, squared
+_TRIED = (0.03, 0.1, 0.3, 1.0)  # of the chart: what is softer than such a number is better with it than without
 _LIMIT = NAMES.index("torque_limit")
 
 
@@ -35,7 +35,7 @@ def softened(chosen: DifferingNumbers) -> DifferingNumbers:
 def _softer(chosen: DifferingNumbers) -> DifferingNumbers | None:
     """Return the numbers with one joint soft that leave least, if they leave less than those that were chosen."""
     fit, own = chosen.fit, chosen.fit.servos.chart(chosen.fit.servos.numbers)
-    few = chosen.differs.sum(axis=0) <= _FEW
+    few = chosen.differs[: len(OF_JOINTS)].sum(axis=0) <= _FEW
     joints = np.flatnonzero(few & fit.servos.can_differ[list(SOFT)].any(axis=0))
     price, best, found = np.log(len(NAMES)), np.inf, None
     for joint in track(joints.tolist(), lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
