@@ -83,7 +83,7 @@ class Alone:
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at = servos.actuators
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
-        stiffness, damping, _, _, _, _, _, limit, band, spring, *_ = own[: len(OF_JOINTS)]
+        stiffness, damping, friction, _, armature, _, _, limit, band, spring, *_ = own[: len(OF_JOINTS)]
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
         springs = compiled.qpos_spring[servos.model.positions], bool(spring.any())
@@ -91,7 +91,7 @@ class Alone:
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
         q, v = (np.broadcast_to(one, commanded.shape[1:]).copy() for one in self.begun)
         load, bodies = self._load(own[len(OF_JOINTS) :])
-        joints = _Joints(servos, own, load, bodies, step)
+        soft, back = _dry(servos, own, step)
         lower, upper = self._stops()
         followed, below, banded, lags = q, -band, bool(band.any()), bool((share < 1).any())
         moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
@@ -103,10 +103,13 @@ class Alone:
                 off -= np.minimum(np.maximum(off, below), band)
             force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
             moved[row, 1:] = force
-            force -= joint * v
+            force -= joint * v + load[row]
             if springs[1]:
                 force -= spring * (q - springs[0])
-            v = joints.speed(row, force, v)
+            inertia = bodies[row] + armature
+            held = (force + back * inertia * v) / (1 + soft * inertia)
+            force -= np.minimum(np.maximum(held, -friction), friction)
+            v = v + step * force / (inertia + step * damping)
             before, q = q, np.minimum(np.maximum(q + step * v, lower), upper)
             v = (q - before) / step
             moved[row + 1, 0] = q
@@ -136,24 +139,6 @@ class Alone:
             ]
         )
         return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
-
-
-class _Joints:
-    """Joints with their loads; all arrays (steps, v, p, n), of numbers (k, v, 1, n)."""
-
-    def __init__(self, servos: Servos, numbers: np.ndarray, load: np.ndarray, bodies: np.ndarray, step: float):
-        _, damping, self._most, _, self._armature, *_ = numbers
-        self._softness, self._back = _dry(servos, numbers, step)
-        self._load, self._bodies, self._least = load, bodies, -self._most
-        self._step, self._damping = step, step * damping
-
-    def speed(self, row: int, force: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the speed after a step."""
-        force -= self._load[row]
-        inertia = self._bodies[row] + self._armature
-        held = (force + self._back * inertia * v) / (1 + self._softness * inertia)
-        force -= np.minimum(np.maximum(held, self._least), self._most)
-        return np.asarray(v + self._step * force / (inertia + self._damping))
 
 
 def _dry(servos: Servos, numbers: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,11 +11,13 @@ import numpy as np
 
 from irtwin.identification.progress import track
 from irtwin.simulator.choice import DifferingNumbers
+from irtwin.simulator.fit import Fit, Played
 from irtwin.simulator.refined import evidence, refined
 from irtwin.simulator.servos import NAMES, OF_JOINTS, SOFT
 
-_FEW = 4  # numbers of a joint that may stand for a soft one
-_TRIED = (0.03, 0.1, 0.3, 1.0)  # of the chart: what is softer than such a number is better with it than without
+_TRIED = (0.05, 0.2, 0.8)  # of the chart: what is softer than such a number is better with it than without
+_NEARER = ((0.5, 0.7, 1.4, 2.0), (0.85, 0.93, 1.08, 1.18))  # times the best of them
+_CLOSES = 0.2  # of what numbers of a joint close, from which a compliance in their place is looked for more closely
 _LIMIT = NAMES.index("torque_limit")
 
 
@@ -35,29 +37,43 @@ def softened(chosen: DifferingNumbers) -> DifferingNumbers:
 def _softer(chosen: DifferingNumbers) -> DifferingNumbers | None:
     """Return the numbers with one joint soft that leave least, if they leave less than those that were chosen."""
     fit, own = chosen.fit, chosen.fit.servos.chart(chosen.fit.servos.numbers)
-    few = chosen.differs[: len(OF_JOINTS)].sum(axis=0) <= _FEW
-    joints = np.flatnonzero(few & fit.servos.can_differ[list(SOFT)].any(axis=0))
-    price, best, found = np.log(len(NAMES)), np.inf, None
-    for joint in track(joints.tolist(), lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
+    joints = np.flatnonzero(fit.servos.can_differ[list(SOFT)].any(axis=0)).tolist()
+    rigid, price, found = fit.rolled(chosen.played.at), np.log(len(NAMES)), None
+    before = least = _cost(fit, rigid) + price * chosen.differs.sum()
+    for joint in track(joints, lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
         differs = chosen.differs.copy()
         differs[: len(OF_JOINTS), joint] = False
-        at = np.where(differs, chosen.played.at, own)
-        ways = [(row, value) for row in SOFT for value in _TRIED]
-        played = fit.all_rolled([_with(at, row, joint, value) for row, value in ways])
-        costs = [fit.cost(one).sum() + price * (differs.sum() + 1) for one in played]
-        at_best = int(np.argmin(costs))
-        if costs[at_best] < best:
-            differs[ways[at_best][0], joint] = True
-            best, found = costs[at_best], (played[at_best], differs)
-    before = fit.cost(fit.rolled(chosen.played.at)).sum() + price * chosen.differs.sum()
-    if found is None or best >= before:
+        best, row = _best(fit, np.where(differs, chosen.played.at, own), joint, _cost(fit, rigid))
+        cost = _cost(fit, best) + price * (differs.sum() + 1)
+        if cost < least:
+            differs[row, joint] = True
+            least, found = cost, (best, differs)
+    if found is None:
         return None
-    odds = np.where(found[1] & ~chosen.differs, before - best, chosen.odds)
+    odds = np.where(found[1] & ~chosen.differs, before - least, chosen.odds)
     ends = np.where(found[1] & chosen.differs, chosen.interval, fit.servos.of_chart(found[0].at))
     return replace(chosen, played=found[0], differs=found[1], odds=odds, interval=ends)
 
 
-def _with(at: np.ndarray, row: int, joint: int, value: float) -> np.ndarray:
-    found = at.copy()
-    found[row, joint] = value
-    return found
+def _best(fit: Fit, at: np.ndarray, joint: int, rigid: float) -> tuple[Played, int]:
+    """Return the best of numbers with a joint soft, and which row says so; `rigid`: what those that were chosen cost.
+
+    It is looked for more closely where any closes much of what they do.
+    """
+    best, found = fit.rolled(at), (SOFT[0], 0.0)
+    enough = _CLOSES * rigid + (1 - _CLOSES) * _cost(fit, best)
+    ways = [(row, value) for row in SOFT for value in _TRIED]
+    for factors in (*_NEARER, ()):
+        tried = [at.copy() for _ in ways]
+        for one, (row, value) in zip(tried, ways, strict=True):
+            one[row, joint] = value
+        pairs = zip((best, *fit.all_rolled(tried)), (found, *ways), strict=True)
+        best, found = min(pairs, key=lambda pair: _cost(fit, pair[0]))
+        if _cost(fit, best) >= enough:
+            break
+        ways = [(found[0], found[1] * factor) for factor in factors]
+    return best, found[0]
+
+
+def _cost(fit: Fit, one: Played) -> float:
+    return float(fit.cost(one).sum())
