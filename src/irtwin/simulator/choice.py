@@ -144,7 +144,7 @@ def _without(fit: Fit, best: Played, part: np.ndarray, free: np.ndarray) -> Play
 def _odds(fit: Fit, found: tuple[Played, np.ndarray], other: tuple[Played, np.ndarray]) -> float:
     """Return the odds, natural logarithms, of numbers with a part to those without; each with what is free (k, n)."""
     worth = np.log(len(NAMES)) + _known(fit, *found) - _known(fit, *other)
-    return float(fit.cost(other[0]).sum() - fit.cost(found[0]).sum() - worth)
+    return float(fit.total(other[0]) - fit.total(found[0]) - worth)
 
 
 def _given_back(fit: Fit, best: Played) -> tuple[Fit, Played, np.ndarray]:
@@ -298,19 +298,21 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
     of stiffness, damping and friction together.
     """
     spread = np.zeros(differs.shape)
-    count = len(fit.stretches)
     for joint in range(differs.shape[1]):
         rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-        inverse = np.linalg.inv(normal)
         each = slopes.right[:, joint][:, [SMOOTH.index(row) for row in rows]]
-        between = inverse @ (each.T @ each) @ inverse * count / max(count - len(rows), 1)
         doubt = _doubt(fit, best, slopes, differs, joint)
-        spread[rows, joint] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)) + doubt)
+        spread[rows, joint] = np.sqrt(variance(normal, each, len(rows)) + doubt)
     rows, normal, each = _of_robot(fit, best, differs)
-    inverse = np.linalg.inv(normal)
-    between = inverse @ (each.T @ each) @ inverse * count / max(count - 1, 1)
-    spread[rows] = np.sqrt(np.maximum(np.diag(between), np.diag(inverse)))[:, None]
+    spread[rows] = np.sqrt(variance(normal, each, 1))[:, None]
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
+
+
+def variance(normal: np.ndarray, each: np.ndarray, count: int) -> np.ndarray:
+    """Return the variance (D,) of `count` numbers, by their equations and by how right sides (p, D) differ."""
+    inverse = np.linalg.inv(normal)
+    between = inverse @ (each.T @ each) @ inverse * len(each) / max(len(each) - count, 1)
+    return np.asarray(np.maximum(np.diag(between), np.diag(inverse)))
 
 
 def _known(fit: Fit, best: Played, free: np.ndarray) -> float:

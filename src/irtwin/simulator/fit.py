@@ -179,6 +179,10 @@ class Fit:
         """Return how bad numbers are, (n,), as a logarithm of probability: what is left, and how far they are."""
         return np.asarray(self.misfit(one) + (self.away(one.at) ** 2).sum(axis=0) / 2)
 
+    def total(self, one: Played) -> float:
+        """Return how bad numbers of all joints are."""
+        return float(self.cost(one).sum())
+
     def misfit(self, one: Played) -> np.ndarray:
         """Return what is left as a logarithm of probability, (n,)."""
         return np.asarray((self.certainty / 2 * np.log1p(one.squares / self.floor**2)).sum(axis=(0, 1)))

@@ -165,7 +165,7 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
         step[3:] = np.clip(step[3:], -0.2, 0.2)
         ways = [_stepped(push, share * step) for share in (1.0, 0.3)]
         tried = _played(fit, best, place, ways)
-        costs = [float(fit.cost(one).sum()) for one in (here, *tried)]
+        costs = [fit.total(one) for one in (here, *tried)]
         at = int(np.argmin(costs))
         push, here = ((push, *ways)[at], (here, *tried)[at])
         tell_step(f"  a push of {np.linalg.norm(push.force):.3g} N from {push.start:.3g} to {push.stop:.3g} s")
@@ -175,7 +175,7 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
     variance = np.diag(np.linalg.inv(normal)).copy()
     runs = sum(one.time[-1] for one in fit.stretches) / _BIN
     worth = np.log(runs**2 / 2) + np.log(_LIKELY**2 / variance[:3]).sum() / 2 + np.log(len(NAMES))
-    gain = float((fit.cost(best) - fit.cost(here)).sum())
+    gain = fit.total(best) - fit.total(here)
     odds = gain - float(push.force @ push.force) / _LIKELY**2 / 2 - float(worth)
     variance[:3] += (_ROUGH * np.linalg.norm(push.force)) ** 2 / 3
     return FoundPush(push, odds, np.sqrt(variance)), here

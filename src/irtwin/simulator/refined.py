@@ -8,7 +8,7 @@ import numpy as np
 
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.progress import tell_step
-from irtwin.simulator.choice import DifferingNumbers
+from irtwin.simulator.choice import DifferingNumbers, variance
 from irtwin.simulator.fit import BY_WHOLE, LIKELY, STEP, Fit, Played, Slopes, no_farther
 from irtwin.simulator.servos import NAMES
 
@@ -29,9 +29,9 @@ def refined(chosen: DifferingNumbers) -> DifferingNumbers:
     places = _places(chosen)
     while True:
         best, normal, each = _solved(fit, best, places)
-        variance = np.diag(np.linalg.inv(normal.sum(axis=0)))
+        doubt = np.diag(np.linalg.inv(normal.sum(axis=0)))
         off = np.array([(best.at - own)[place] for place in places])
-        loss = off**2 / variance / 2 - np.log(len(NAMES)) - np.log(_of(LIKELY, places) ** 2 / variance) / 2
+        loss = off**2 / doubt / 2 - np.log(len(NAMES)) - np.log(_of(LIKELY, places) ** 2 / doubt) / 2
         if not places or loss.min() >= 0:
             break
         place = places.pop(int(np.argmin(loss)))
@@ -45,7 +45,7 @@ def evidence(chosen: DifferingNumbers) -> float:
     best = fit.rolled(chosen.played.at)
     likely = _of(LIKELY, places)
     known = np.linalg.slogdet(_equations(fit, best, places)[0].sum(axis=0) * likely * likely[:, None])[1] / 2
-    return float(_cost(fit, best) + np.log(len(NAMES)) * chosen.differs.sum() + known)
+    return fit.total(best) + float(np.log(len(NAMES)) * chosen.differs.sum() + known)
 
 
 def _places(chosen: DifferingNumbers) -> list[Place]:
@@ -58,16 +58,12 @@ def _solved(fit: Fit, best: Played, places: Sequence[Place]) -> tuple[Played, np
         normal, each = _equations(fit, best, places)
         steps = [_step(normal.sum(axis=0), each.sum(axis=0), damping, places) for damping in _DAMPINGS]
         tried = fit.all_rolled([_moved(best.at, places, share * step) for step in steps for share in _SHARES])
-        better = min(tried, key=lambda one: _cost(fit, one))
+        better = min(tried, key=fit.total)
         tell_step(f"  numbers by the whole model, pass {number + 1} of {_PASSES} at most")
-        if _cost(fit, best) - _cost(fit, better) < _WORTH:
+        if fit.total(best) - fit.total(better) < _WORTH:
             return best, normal, each
         best = better
     return best, *_equations(fit, best, places)
-
-
-def _cost(fit: Fit, one: Played) -> float:
-    return float(fit.cost(one).sum())
 
 
 def _of(rows: np.ndarray, places: Sequence[Place]) -> np.ndarray:
@@ -78,13 +74,12 @@ def _about(
     chosen: DifferingNumbers, best: Played, places: Sequence[Place], normal: np.ndarray, each: np.ndarray
 ) -> DifferingNumbers:
     """Return the numbers, of which some differ, with what these equations say of them."""
-    inverse, count = np.linalg.inv(normal.sum(axis=0)), len(each)
-    between = inverse @ (each.T @ each) @ inverse * count / max(count - len(places), 1)
+    count = len(each)
     servos, differs = chosen.fit.servos, chosen.differs.copy()
     ends = servos.chart(chosen.interval)
     spread = (ends[1] - ends[0]) / (2 * NORMAL)
     differs[list(BY_WHOLE)] = False
-    for own, place in zip(np.sqrt(np.maximum(np.diag(between), np.diag(inverse))), places, strict=True):
+    for own, place in zip(np.sqrt(variance(normal.sum(axis=0), each, len(places))), places, strict=True):
         differs[place], spread[place] = True, max(spread[place], own)
     spread = np.where(differs, spread, 0.0)
     fit = chosen.fit.about(best.at)

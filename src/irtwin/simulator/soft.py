@@ -39,12 +39,12 @@ def _softer(chosen: DifferingNumbers) -> DifferingNumbers | None:
     fit, own = chosen.fit, chosen.fit.servos.chart(chosen.fit.servos.numbers)
     joints = np.flatnonzero(fit.servos.can_differ[list(SOFT)].any(axis=0)).tolist()
     rigid, price, found = fit.rolled(chosen.played.at), np.log(len(NAMES)), None
-    before = least = _cost(fit, rigid) + price * chosen.differs.sum()
+    before = least = fit.total(rigid) + price * chosen.differs.sum()
     for joint in track(joints, lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
         differs = chosen.differs.copy()
         differs[: len(OF_JOINTS), joint] = False
-        best, row = _best(fit, np.where(differs, chosen.played.at, own), joint, _cost(fit, rigid))
-        cost = _cost(fit, best) + price * (differs.sum() + 1)
+        best, row = _best(fit, np.where(differs, chosen.played.at, own), joint, fit.total(rigid))
+        cost = fit.total(best) + price * (differs.sum() + 1)
         if cost < least:
             differs[row, joint] = True
             least, found = cost, (best, differs)
@@ -61,19 +61,15 @@ def _best(fit: Fit, at: np.ndarray, joint: int, rigid: float) -> tuple[Played, i
     It is looked for more closely where any closes much of what they do.
     """
     best, found = fit.rolled(at), (SOFT[0], 0.0)
-    enough = _CLOSES * rigid + (1 - _CLOSES) * _cost(fit, best)
+    enough = _CLOSES * rigid + (1 - _CLOSES) * fit.total(best)
     ways = [(row, value) for row in SOFT for value in _TRIED]
     for factors in (*_NEARER, ()):
         tried = [at.copy() for _ in ways]
         for one, (row, value) in zip(tried, ways, strict=True):
             one[row, joint] = value
         pairs = zip((best, *fit.all_rolled(tried)), (found, *ways), strict=True)
-        best, found = min(pairs, key=lambda pair: _cost(fit, pair[0]))
-        if _cost(fit, best) >= enough:
+        best, found = min(pairs, key=lambda pair: fit.total(pair[0]))
+        if fit.total(best) >= enough:
             break
         ways = [(found[0], found[1] * factor) for factor in factors]
     return best, found[0]
-
-
-def _cost(fit: Fit, one: Played) -> float:
-    return float(fit.cost(one).sum())
