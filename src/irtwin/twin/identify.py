@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +10,11 @@ import scipy
 
 from irtwin.document.odd_stretch import OddStretch
 from irtwin.effects.catalogue import BASELINE
-from irtwin.effects.effect import NORMAL, Coefficients, Effect, JointEffect
+from irtwin.effects.effect import NORMAL, Coefficients, Effect
 from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Block, part_read
+from irtwin.identification.accumulate import Block
 from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
 from irtwin.identification.consistent_bodies import spreads, with_consistent_bodies
 from irtwin.identification.estimators import Estimate, combine
@@ -36,10 +36,10 @@ from irtwin.identification.two_processes import one_blas_thread
 from irtwin.identification.uncertainty import half_widths, normal_covariance
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion, pauses
+from irtwin.twin.shapes import shaped_for_power, shaped_for_torque
 from irtwin.twin.twin import BaseParameter, Parameter, Twin
 
 Found = tuple[Terms, Estimate]
-_LOOKS = 8  # at shapes between two that were tried
 
 
 @one_blas_thread()
@@ -77,20 +77,14 @@ def identify(
     change: float | None = None
     odd: tuple[OddStretch, ...] = ()
     if with_torque:
-        stack = _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, with_torque, reduced)[1])
+        stack = shaped_for_torque(stack, open_shapes, with_torque, reduced)
         blocks, torque = fit_torque(stack, with_torque, reduced)
         counting = [block.weighted(own) for block, own in zip(blocks, torque.weights, strict=True)]
         odd = odd_stretches(blocks, torque.weights, robot.joint_names)
         powered = bool(with_power) and not stack.fixed.all()
         if powered:
             values = torque.values
-            every = part_read(with_power)
-            stack = _shaped(
-                stack,
-                open_shapes,
-                "power",
-                lambda trial: fit_power(trial, with_power, values, every, switching=True)[1],
-            )
+            stack = shaped_for_power(stack, open_shapes, with_power, values)
             if any(effect.carries_torque for effect in stack.effects):
                 known = blocks if len(with_torque) == len(measured) else None
                 torque = fit_both(stack, measured, values, known)
@@ -161,54 +155,6 @@ def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
     carried = any(effect.carries_torque for effect in whole.effects)
     seen |= {effect.id for effect, _ in whole.torque_terms if torque or (carried and effect.channel == "torque")}
     return whole.with_effects([effect for effect in whole.effects if effect.id in seen])
-
-
-def _shaped(stack: Stack, open_shapes: set[str], signal: str, fit: Callable[[Stack], Estimate]) -> Stack:
-    """Give each effect of the signal, whose shape is open, the one that leaves least of what was measured."""
-    effects = list(stack.effects)
-    for effect in stack.effects:
-        shapes = effect.candidates(stack.robot)
-        if effect.id not in open_shapes or effect.signal != signal or len(shapes) < 2:
-            continue
-        place = effects.index(effect)
-        before, after = effects[:place], effects[place + 1 :]
-
-        def left(shape: Effect, before: list[Effect] = before, after: list[Effect] = after) -> np.ndarray:
-            return fit(stack.with_effects([*before, shape, *after])).noise
-
-        best = _best(shapes, np.array([left(shape) for shape in shapes]), stack.robot)
-        if not isinstance(effect, JointEffect):
-            best = [_between(best[0], shapes, lambda shape: float(np.log(left(shape)).sum()))]
-        effects = [*before, *best, *after]
-    return stack.with_effects(effects)
-
-
-def _between(best: Effect, shapes: Sequence[Effect], left: Callable[[Effect], float]) -> Effect:
-    """Return the shape that leaves least between the best of those tried and its neighbours, number by number."""
-    for name in best.ranges:
-        tried = sorted({float(shape.shape[name]) for shape in shapes})
-        at = tried.index(best.shape[name])
-        ends = tried[max(at - 1, 0)], tried[min(at + 1, len(tried) - 1)]
-
-        def of_number(value: float, best: Effect = best, name: str = name) -> float:
-            return left(best.variants(**{name: (float(value),)})[0])
-
-        found = scipy.optimize.minimize_scalar(of_number, bounds=ends, method="bounded", options={"maxiter": _LOOKS})
-        if found.fun < left(best):
-            (best,) = best.variants(**{name: (float(found.x),)})
-    return best
-
-
-def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Effect]:
-    """Return the best of shapes by what each leaves in g equations, (shapes, g): joint by joint where it acts so."""
-    if not isinstance(shapes[0], JointEffect) or noise.shape[1] != len(robot.joints):
-        return [shapes[int(np.argmin(np.log(noise).sum(axis=1)))]]
-    chosen: dict[int, list[str]] = {}
-    for joint, best in zip(robot.joint_names, np.argmin(noise, axis=0).tolist(), strict=True):
-        chosen.setdefault(best, []).append(joint)
-    if len(chosen) == 1:
-        return [shapes[next(iter(chosen))]]
-    return [shapes[best].on(*joints) for best, joints in chosen.items()]
 
 
 def _parameters(stack: Stack, terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:

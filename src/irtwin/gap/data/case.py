@@ -26,6 +26,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+from irtwin.twin.shapes import shaped
 from irtwin.twin.torque_scale import of_sensor
 from irtwin.twin.twin import Twin
 
@@ -173,7 +174,9 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
         _stated(data_set),
         cutoff,
     )
-    return case.with_friction_near_zero()
+    case = case.with_friction_near_zero()
+    held_against = case.others if case.against == "reference" else case.seen
+    return replace(case, effects=shaped(case.robot, held_against, case.effects))
 
 
 def _turned(before: Joint, joint: Joint) -> Joint:
