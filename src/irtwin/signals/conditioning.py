@@ -34,15 +34,15 @@ def condition(
     cutoff: float | None = None,
     time: np.ndarray | None = None,
     *,
-    states_cutoff: float | None = None,
+    states_cutoff: float | np.ndarray | None = None,
 ) -> Motion:
     """Return the run's signals at an even rate (the sampling's), low-pass filtered without phase shift.
 
     Speeds and accelerations are derivatives of the filtered positions; speeds that were logged are taken instead
     where they agree with these. `cutoff` in Hz; None chooses it by `choose_cutoff`; `states_cutoff` is another one for
-    positions, speeds and accelerations. `time`: even times, (N,) s within the run, to be returned instead of all of it.
-    Raises InputError on a cutoff that is no positive number, or on a run of fewer than 20 samples or, unless `time` is
-    given, with a hole in time.
+    positions, speeds and accelerations, of all joints or of each, (n,). `time`: even times, (N,) s within the run, to
+    be returned instead of all of it. Raises InputError on a cutoff that is no positive number, or on a run of fewer
+    than 20 samples or, unless `time` is given, with a hole in time.
     """
     signals = run.signals
     if len(signals.time) < FEWEST:
@@ -54,12 +54,15 @@ def condition(
     time = _even_time(run) if time is None else time
     rate = 1 / (time[1] - time[0])
 
-    def clean(values: np.ndarray, cutoff: float, order: int = 1) -> np.ndarray:
-        return low_pass(scipy.interpolate.make_interp_spline(signals.time, values, k=order)(time), rate, cutoff)
+    def clean(values: np.ndarray, cutoff: float | np.ndarray, order: int = 1) -> np.ndarray:
+        even = scipy.interpolate.make_interp_spline(signals.time, values, k=order)(time)
+        if isinstance(cutoff, float):
+            return low_pass(even, rate, cutoff)
+        return np.column_stack([low_pass(one, rate, own) for one, own in zip(even.T, cutoff, strict=True)])
 
-    cutoffs = dict.fromkeys(_STATES, states_cutoff or cutoff)
+    cutoffs = dict.fromkeys(_STATES, float(cutoff) if states_cutoff is None else states_cutoff)
     logged = {name: it for name, it in signals.logged().items() if name not in REQUIRED}
-    measured: dict[str, Any] = {name: clean(it, cutoffs.get(name, cutoff)) for name, it in logged.items()}
+    measured: dict[str, Any] = {name: clean(it, cutoffs.get(name, float(cutoff))) for name, it in logged.items()}
     q = clean(signals.q, cutoffs["q"], order=3)
     dq = _agreeing(measured.pop("dq", None), differentiate(q, rate))
     ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate))
@@ -81,9 +84,24 @@ def condition_for_fit(run: Run, robot: Robot, cutoff: float) -> Motion:
     """Return the run's signals as `condition` does, its states filtered more widely.
 
     What a fit computes of states passes the filter of the measurement, as the measurement does; states that had passed
-    it before would pass it twice, and what they lose there looks like an elastic joint.
+    it before would pass it twice, and what they lose there looks like an elastic joint. They pass no more than their
+    encoder resolves: by noise of its steps a joint that hardly moves would seem to turn back and forth.
     """
-    return condition(run, robot, cutoff, states_cutoff=_STATES_WIDER * cutoff)
+    return condition(run, robot, cutoff, states_cutoff=np.clip(_resolved(run, cutoff), cutoff, _STATES_WIDER * cutoff))
+
+
+def _resolved(run: Run, cutoff: float) -> np.ndarray:
+    """Return up to which frequency (n,), Hz, each joint's speed stands out from the noise of its encoder's steps.
+
+    That is where it agrees, or is standstill. Positions between two steps are off by white noise of a twelfth of the
+    step's square, of whose derivative (2 pi)^2 2 f^3 / (3 rate) times as much lies below a frequency f.
+    """
+    time = _even_time(run)
+    rate = 1 / (time[1] - time[0])
+    speed = rate * np.diff(low_pass(interpolated(run.signals.time, run.signals.q, time), rate, cutoff), axis=0)
+    least = np.maximum(_AGREEMENT * np.sqrt(np.mean(speed**2, axis=0)), STANDSTILL)
+    steps = np.array([max(_step(positions), _SAME) for positions in run.signals.q.T])
+    return np.asarray(np.cbrt(18 * rate * (least / (2 * np.pi * steps)) ** 2))
 
 
 def choose_cutoff(runs: Iterable[Run]) -> float:
