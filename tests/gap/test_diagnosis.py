@@ -75,6 +75,12 @@ def test_no_gap_is_found_where_there_is_none(seed):
     assert diagnosis.floor.source == "repeats"
 
 
+def test_the_shape_of_an_effect_that_the_data_set_names_is_no_gap():
+    sticks = on_joint(1, lambda one: 6 * np.sign(one.dq[:, 1]) * np.exp(-((one.dq[:, 1] / 0.2) ** 2)))
+    effects = (*WITH_LOSS, "stribeck_friction")
+    assert diagnose(data_set(runs(change=sticks), effects=effects)).verdict == "no_gap"
+
+
 def test_what_two_runs_differ_by_in_the_mean_is_not_blamed_on_an_effect():
     apart = []
     for seed, pose, offset in ((0, -0.8, 2.0), (1, 0.8, -2.0)):  # a tilted base would differ by pose too

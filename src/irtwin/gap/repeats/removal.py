@@ -69,11 +69,12 @@ def removed(
 def _waves(
     case: Case, effect: Effect, disturbances: Sequence[Disturbance], left: Mapping[str, np.ndarray]
 ) -> list[Removed]:
-    """Return the waves of one joint's lines, fitted to what the twin leaves of each run."""
+    """Return the waves of one joint's lines, fitted to what the twin leaves of each run, where it leaves anything."""
     joint = case.robot.index(str(disturbances[0].joint))
     fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [one.shape.frequency for one in disturbances])
-            for m in case.with_torque}  # fmt: skip
-    seen = [fit for run, fit in fits.items() if run in case.observed]
+            for m in case.with_torque if np.isfinite(left[m.run][:, joint]).any()}  # fmt: skip
+    if not (seen := [fit for run, fit in fits.items() if run in case.observed]):
+        return []
     taken = []
     for k, one in enumerate(disturbances):
         fitted = replace(effect, f=one.shape.frequency, joints=(str(one.joint),))  # type: ignore[call-arg]

@@ -1,0 +1,53 @@
+"""Shapes of effects that are named by id alone, as motions show them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from tests.synthetic import arm, measure, swing
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Effect
+from irtwin.effects.friction import StribeckFriction
+from irtwin.twin.shapes import shaped
+
+ROBOT = arm(3)
+
+
+def sticking(seed, speed=0.1, exponent=2.0):
+    """A motion in which all joints stick by 5 N m more about zero speed."""
+    motion = measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed)
+    more = 5.0 * np.sign(motion.dq) * np.exp(-((np.abs(motion.dq) / speed) ** exponent))
+    return replace(motion, torque=motion.torque + more, power=None)
+
+
+def of_stribeck(effects):
+    return [one for one in effects if isinstance(one, Effect) and one.id == "stribeck_friction"]
+
+
+def test_an_effect_that_is_named_gets_the_shape_that_the_motions_show():
+    effects = shaped(ROBOT, [sticking(1), sticking(2)], [*BASELINE, "stribeck_friction"])
+    assert set(BASELINE) <= set(effects)
+    assert {(one.vs, one.d) for one in of_stribeck(effects)} == {(0.1, 2.0)}
+
+
+def test_what_is_given_in_a_shape_keeps_it():
+    given = [*BASELINE, StribeckFriction(vs=0.02, d=1.0)]
+    assert shaped(ROBOT, [sticking(1)], given) == tuple(given)
+
+
+def test_motions_without_torque_leave_shapes_open():
+    silent = replace(sticking(1), torque=None, current=None)
+    assert shaped(ROBOT, [silent], ["stribeck_friction"]) == ("stribeck_friction",)
+
+
+def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
+    def curved(seed):
+        motion = sticking(seed, speed=0.1)
+        return replace(motion, torque=motion.torque + 3.0 * np.sign(motion.dq) * np.abs(motion.dq) ** 3)
+
+    named = [*BASELINE, "nonlinear_viscous_friction", "stribeck_friction"]
+    for effects in (named, [*BASELINE, *named[:-3:-1]]):
+        found = shaped(ROBOT, [curved(1), curved(2)], effects)
+        assert {(one.vs, one.d) for one in of_stribeck(found)} == {(0.1, 2.0)}
