@@ -37,6 +37,13 @@ def test_joints_and_links_are_read():
     assert robot.links[1].mass == 2.5
 
 
+def test_a_prefix_that_nobody_declared_is_read_over():
+    """As in packages of models: <limit drake:acceleration="2.5" .../> without xmlns:drake."""
+    text = ARM.replace('<limit lower="-2"', '<limit drake:acceleration="2.5" lower="-2"')
+    robot = parse_urdf(text.replace('<link name="tool"/>', '<link name="tool"/><drake:proximity/>'))
+    assert robot.joints[1].lower == -2.0
+
+
 def test_kinematics_of_a_planar_elbow():
     robot = parse_urdf(ARM)
     assert flange(robot) == "tool"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
@@ -21,6 +22,7 @@ _LARGEST = 20_000_000  # bytes
 _MOST_LINKS = 5000
 _DEEPEST = 500  # links, base to flange: Pinocchio goes down the tree by recursion, and 5000 take the whole stack
 _MOST_JOINTS = 100  # that move
+_PREFIX = re.compile(r"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_][\w.-]*\s*[=\s/>]")  # of an element or an attribute
 
 
 def read_urdf(path: Path | str) -> Robot:
@@ -33,6 +35,7 @@ def read_urdf(path: Path | str) -> Robot:
 
 def parse_urdf(text: str, source: str = "URDF") -> Robot:
     """Make a robot of URDF text; `source` names it in messages. Meshes are never opened. Raises InputError."""
+    text = _declared(text)
     root = _parse(text, source)
     links = _links(root, source)
     held = _held(root, source)
@@ -44,6 +47,12 @@ def parse_urdf(text: str, source: str = "URDF") -> Robot:
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{source}: Pinocchio cannot build this robot: {first_line(error)}") from error
     return replace(robot, joints=tuple(joints[name] for name in order))
+
+
+def _declared(text: str) -> str:
+    """Declare the prefixes that a URDF uses only (drake:acceleration): readers of URDF know no namespaces."""
+    lacking = sorted(set(_PREFIX.findall(text)) - {"xml", "xmlns", *re.findall(r"xmlns:([\w.-]+)", text)})
+    return re.sub(r"<robot\b", "<robot" + "".join(f' xmlns:{one}="{one}"' for one in lacking), text, count=1)
 
 
 def _parse(text: str, source: str) -> Element:
