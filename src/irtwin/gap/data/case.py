@@ -163,17 +163,8 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     robot, known, _ = torque_from_current(begun.robot, list(given.values()))
     motions = dict(zip(given, known, strict=True))
     admit(data_set, motions, thresholds.data.shortest)
-    case = Case(
-        robot,
-        begun.effects,
-        data_set.runs,
-        motions,
-        (begun.robot, given),
-        thresholds,
-        begun.prior,
-        _stated(data_set),
-        cutoff,
-    )
+    known_of = begun.prior, _stated(data_set)
+    case = Case(robot, begun.effects, data_set.runs, motions, (begun.robot, given), thresholds, *known_of, cutoff)
     case = case.with_friction_near_zero()
     held_against = case.others if case.against == "reference" else case.seen
     return replace(case, effects=shaped(case.robot, held_against, case.effects))
