@@ -66,6 +66,17 @@ def test_other_masses_a_balancer_a_zero_that_is_off_and_a_sign_are_of_this_robot
     assert said(spoilt(healthy(), one("torque", 2, np.negative))) == []  # of this robot, too
 
 
+def test_a_load_further_out_that_hangs_as_it_should_speaks_for_those_before() -> None:
+    """What the second joint shows by itself is a load that hangs elsewhere; the third's torque is right."""
+
+    def change(signals):  # type: ignore[no-untyped-def]
+        torque = signals.torque.copy()
+        torque[:, 1] += 2 * np.ptp(torque[:, 1]) * np.sin(signals.q[:, 1] + signals.q[:, 2] + 1.0)
+        return replace(signals, torque=torque)
+
+    assert said(spoilt(healthy(), change)) == []
+
+
 def test_what_gravity_does_not_turn_says_nothing() -> None:
     still = spoilt(healthy(), lambda signals: replace(signals, q=np.zeros_like(signals.q)))
     assert said(still) == []

@@ -38,14 +38,23 @@ class _Load:
         """By how much at least."""
         return abs(self.turned) - _SURE * self.deviation
 
+    @property
+    def at_most(self) -> float:
+        """By how much at most."""
+        return abs(self.turned) + _SURE * self.deviation
+
 
 def gravity_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
-    """Return the clearest of the joints that gravity turns as no load of this robot would."""
+    """Return the clearest of the joints that gravity turns as no load of this robot would.
+
+    What a load is turned by, those further out are turned by, too: one that surely is not speaks for all before it.
+    """
     rows = rows_of(robot, moving, FEW_ROWS)
     if rows is None:
         return []
     loads = list(_loads(robot, rows, moving.joints))
-    turned = [load for load in loads if load.surely > _TURNED]
+    right = max((load.joint for load in loads if load.at_most < _TURNED), default=-1)
+    turned = [load for load in loads if load.surely > _TURNED and load.joint > right]
     if len(turned) < len(loads) and all(abs(load.turned) > np.pi - _TURNED for load in turned):
         return []  # none, or the sign of one torque
     return [_finding(max(turned, key=lambda load: load.surely), robot, moving)] if turned else []
