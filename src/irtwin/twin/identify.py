@@ -77,7 +77,10 @@ def identify(
     change: float | None = None
     odd: tuple[OddStretch, ...] = ()
     if with_torque:
-        stack = shaped_for_torque(stack, open_shapes, with_torque, reduced)
+        found_shapes = shaped_for_torque(stack, open_shapes, with_torque, reduced).effects
+        if found_shapes != stack.effects:  # all shapes at once had explained a turn of friction, too
+            robot, reduced = with_friction_near_zero(robot, with_torque, found_shapes)
+            stack = Stack(robot, found_shapes, prior)
         blocks, torque = fit_torque(stack, with_torque, reduced)
         counting = [block.weighted(own) for block, own in zip(blocks, torque.weights, strict=True)]
         odd = odd_stretches(blocks, torque.weights, robot.joint_names)
