@@ -1,12 +1,13 @@
-"""`python -m energy_twin.savings [--seeds N...] [--only WORD]`: savings that are said, and those when it is executed.
+"""`python -m energy_twin.savings [--seeds N...] [--only WORD] [--base]`: savings said, and those when it is executed.
 
-Runs that took no part in the fit are timed anew, in a quarter more time and with pauses that may shrink.
+Runs that took no part in the fit are timed anew, in a quarter more time and with pauses that may shrink; or, by
+`--base`, the flange goes the same way with the robot's base elsewhere.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,16 +20,23 @@ from irtwin.gap.choice import identified
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.validation import split
 from irtwin.planning.cycle import CycleTimes
+from irtwin.planning.placement import better_placement
 from irtwin.planning.programme import programme_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill, stretches
 from irtwin.twin.price import Figure, with_standing
+from irtwin.twin.twin import Twin
 
 LONGER, PAUSE = 1.25, 0.1
 
+# a saving as it is said, the motion without it, and with it
+Proposal = tuple[Figure, Motion, Motion]
 
-def savings(case: Case) -> Iterator[tuple[str, Figure, float, float]]:
-    """Yield each held-out run with moves from rest to rest: its saving as said and as executed, and its energy, J."""
+
+def savings(
+    case: Case, propose: Callable[[Twin, Motion], Proposal | None]
+) -> Iterator[tuple[str, Figure, float, float]]:
+    """Yield each held-out run that something is proposed for: its saving as said and as executed, and its energy, J."""
     robot = case.data_set.robot
     cutoff = cutoff_for(robot, case.data_set.runs, None).hz
     parts = split([condition(run, robot, cutoff) for run in case.data_set.runs])
@@ -36,14 +44,28 @@ def savings(case: Case) -> Iterator[tuple[str, Figure, float, float]]:
     runs = tuple(run for run in case.data_set.runs if run.name in fitted)
     twin = identified(replace(case.data_set, runs=runs, cutoff=cutoff), parts.fit)
     for motion in parts.held_out:
-        try:
-            programme = programme_of(motion, case.name)
-        except InputError:
+        if (proposal := propose(twin, motion)) is None:
             continue
-        cycle = LONGER * float(programme.seconds.sum())
-        new = CycleTimes(twin, programme, PAUSE).in_time(cycle)
-        before, after = (_energy(case, one) for one in (with_standing(motion, cycle), new.motion))
-        yield motion.run, new.saved, before - after, before
+        saved, without, with_it = proposal
+        before, after = (_energy(case, one) for one in (without, with_it))
+        yield motion.run, saved, before - after, before
+
+
+def timed_anew(twin: Twin, motion: Motion) -> Proposal | None:
+    """Return what other times of a programme's moves save; None where the motion has none from rest to rest."""
+    try:
+        programme = programme_of(motion, motion.run)
+    except InputError:
+        return None
+    cycle = LONGER * float(programme.seconds.sum())
+    new = CycleTimes(twin, programme, PAUSE).in_time(cycle)
+    return new.saved, with_standing(motion, cycle), new.motion
+
+
+def moved_base(twin: Twin, motion: Motion) -> Proposal | None:
+    """Return what a better place of the base saves; None where there is none."""
+    placed = better_placement(twin, motion)
+    return None if placed is None else (placed.saved, motion, placed.motion)
 
 
 def _energy(case: Case, motion: Motion) -> float:
@@ -60,11 +82,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m energy_twin.savings", description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--only", default="", help="cases whose name has this word")
+    parser.add_argument("--base", action="store_true", help="the base elsewhere, in place of other times")
     arguments = parser.parse_args()
+    propose = moved_base if arguments.base else timed_anew
     print("| case | run | takes, J | saves: said | executed |\n| --- | --- | --- | --- | --- |")
     held = []
     for case in cases(arguments.seeds, arguments.only):
-        for run, said, executed, taken in savings(case):
+        for run, said, executed, taken in savings(case, propose):
             held.append(said.half_width is not None and abs(said.value - executed) <= said.half_width)
             print(f"| {case.name} | {run} | {taken:.0f} | {said} | {executed:.1f} |", flush=True)
     print(f"\n{sum(held)} of {len(held)} within the interval")

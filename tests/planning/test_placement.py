@@ -18,22 +18,23 @@ def swing(amplitude: float, joints: int = 6, seconds: float = 2.0) -> Motion:
     time = np.linspace(0.0, seconds, 101)
     turn = 2 * np.pi * time / seconds
     weights = amplitude * np.linspace(1.0, 0.4, joints)
-    middle = np.resize([0.3, -0.6, 0.9, 0.4, 0.7, -0.2], joints)
+    middle = np.resize([0.3, -0.6, 0.9, 0.4, 0.7, -0.2, 0.5], joints)
     q = middle + (1 - np.cos(turn))[:, None] / 2 * weights
     dq = np.sin(turn)[:, None] * weights * np.pi / seconds
     ddq = np.cos(turn)[:, None] * weights * 2 * (np.pi / seconds) ** 2
     return Motion(time, q, dq, ddq, run="weld")
 
 
-def test_the_flange_keeps_its_way_and_the_energy_falls() -> None:
-    known, was = twin(joints=6), swing(0.4)
+@pytest.mark.parametrize("joints", [6, 7])  # an arm of seven has many ways to follow
+def test_the_flange_keeps_its_way_and_the_energy_falls(joints: int) -> None:
+    known, was = twin(joints=joints), swing(0.4, joints=joints)
     found = better_placement(known, was)
     assert found is not None
     assert 0 < np.abs(found.shift).max() <= FARTHEST
     way, moved = placements(known.robot, was.q), placements(known.robot, found.motion.q)
     np.testing.assert_allclose(moved[:, :3, 3] + found.shift, way[:, :3, 3], atol=2e-3)
     np.testing.assert_allclose(moved[:, :3, :3], way[:, :3, :3], atol=5e-3)
-    assert found.saved.value == pytest.approx(known.energy(was) - known.energy(found.motion), rel=0.05)
+    assert found.saved.value == pytest.approx(known.energy(was) - known.energy(found.motion), rel=1e-3)
 
 
 def test_an_arm_that_cannot_follow_from_elsewhere_stays() -> None:

@@ -38,8 +38,6 @@ def better_placement(twin: Twin, motion: Motion) -> Placement | None:
     position, speed and torque. None where none is expected to save anything. What stands around is not known.
     """
     way = _Way(twin, motion)
-    if (was := way.from_base(np.zeros(3))) is None:
-        return None
 
     def energy(shift: np.ndarray) -> float:
         tell_step("  places of the base")
@@ -53,7 +51,7 @@ def better_placement(twin: Twin, motion: Motion) -> Placement | None:
     moved = way.from_base(best.x)
     if moved is None:
         return None
-    saved = saving(twin, moved, was)
+    saved = saving(twin, moved, way.smooth)
     return Placement(best.x, moved, saved) if saved.value > 0 else None
 
 
@@ -65,15 +63,18 @@ class _Way:
         self._twin, self._motion = twin, motion
         every = max(1, round(motion.rate / _RATE))
         self._knots = np.unique(np.append(np.arange(0, len(motion.time), every), len(motion.time) - 1))
-        self._poses = placements(twin.robot, motion.q[self._knots])
+        self._q = motion.q[self._knots]
+        self._poses = placements(twin.robot, self._q)
+        self.smooth = self._smooth(self._q)  # the motion itself, as smooth as it is from elsewhere
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in twin.robot.joints]).T
 
     def from_base(self, shift: np.ndarray) -> Motion | None:
         """Return the motion that makes the way from a base moved by `shift` (3,) m; None where the arm cannot."""
-        q, rows = self._motion.q[0], list[np.ndarray]()
-        for pose in self._poses:
+        q, rows = self._q[0], list[np.ndarray]()
+        # joints step as they did, so that an arm of seven joints keeps to its way of going among many
+        for pose, step in zip(self._poses, np.diff(self._q, axis=0, prepend=self._q[:1]), strict=True):
             target = pin.SE3(pose[:3, :3], pose[:3, 3] - shift)
-            found, meters, radians = nearest(self._twin.robot, target, q, self._lower, self._upper)
+            found, meters, radians = nearest(self._twin.robot, target, q + step, self._lower, self._upper)
             if max(meters, radians) > _REACHED or (rows and np.abs(found - q).max() > _JUMP):
                 return None
             q = found
