@@ -13,17 +13,18 @@ from irtwin.report.energy.flows import Flows, flows
 EFFECTS = ("coulomb_friction", "copper_loss", "mechanical_power", "standby_power")
 
 
-def row(joint, effect, energy):
-    return {"joint": joint, "effect": f"https://w3id.org/irtwin#{effect}", "label": None, "energy_j": energy}
+def row(joint, effect, energy, lower=None, upper=None):
+    effect = f"https://w3id.org/irtwin#{effect}"
+    return {"joint": joint, "effect": effect, "label": None, "energy_j": energy, "lower_j": lower, "upper_j": upper}
 
 
 ROWS = [
     row("joint_1", "coulomb_friction", 600.0),
     row("joint_1", "mechanical_power", -100.0),
-    row("joint_2", "copper_loss", 300.0),
+    row("joint_2", "copper_loss", 300.0, 288.0, 312.0),
     row("joint_2", "coulomb_friction", 1.0),
     row("joint_2", "iron_loss", 1.0),
-    row(None, "standby_power", 200.0),
+    row(None, "standby_power", 200.0, 90.0, 310.0),
 ]
 
 
@@ -48,6 +49,13 @@ def test_ribbons_say_from_where_to_where_and_how_much():
     words = [ribbon.words.replace("\N{NO-BREAK SPACE}", " ") for ribbon in flows(ROWS).ribbons]
     assert "joint_1 to coulomb friction: 0.167 Wh" in words
     assert not [one for one in words if one.startswith("joint_1 to mechanical power")]
+
+
+def test_ribbons_say_how_sure_they_are_and_are_pale_where_half_of_it_may_not_be():
+    ribbons = {one.words.replace("\N{NO-BREAK SPACE}", " "): one.unsure for one in flows(ROWS).ribbons}
+    assert ribbons["joint_2 to copper loss: 0.0833 Wh, between 0.0800 Wh and 0.0867 Wh"] is False
+    assert ribbons["whole robot to standby power: 0.0556 Wh, between 0.0250 Wh and 0.0861 Wh"] is True
+    assert ribbons["joint_1 to coulomb friction: 0.167 Wh"] is False
 
 
 def test_a_joint_may_be_called_like_a_node():

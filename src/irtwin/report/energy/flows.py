@@ -14,6 +14,7 @@ from typing import ClassVar
 from irtwin.report import wording
 from irtwin.report.colours import PALETTE, effect_colour
 from irtwin.report.energy.figures import ROBOT_WIDE
+from irtwin.report.energy.tables import is_unsure
 from irtwin.report.questions import Row, effect_name
 
 _COLUMNS = (0, 210, 380, 740)  # left edges: sources, bus, joints, effects
@@ -37,11 +38,12 @@ class Node:
 
 @dataclass(frozen=True)
 class Ribbon:
-    """What flows from one node to another, as an SVG path, in words."""
+    """What flows from one node to another, as an SVG path, in words; `unsure` where half of it may not."""
 
     path: str
     words: str
     colour: str
+    unsure: bool
 
 
 @dataclass(frozen=True)
@@ -56,16 +58,18 @@ class Flows:
 
 
 Links = Mapping[tuple[str, str], float]
+Intervals = Mapping[tuple[str, str], tuple[float | None, float | None]]  # of 95 %; none of what is drawn together
 
 
 def flows(rows: Sequence[Row]) -> Flows | None:
     """Return the diagram of `energy_per_joint_and_effect`'s rows; None where no energy is taken."""
     taken: dict[tuple[str, str], float] = defaultdict(float)
     colours: dict[str, str] = {}
+    intervals = {_ends(row): (row["lower_j"], row["upper_j"]) for row in rows}
     back = 0.0
     for row in rows:
         if row["energy_j"] > 0:
-            taken[row["joint"] or ROBOT_WIDE, effect_name(row)] += row["energy_j"]
+            taken[_ends(row)] += row["energy_j"]
             colours[effect_name(row)] = effect_colour(wording.local_name(row["effect"]))
         else:
             back -= row["energy_j"]
@@ -77,8 +81,13 @@ def flows(rows: Sequence[Row]) -> Flows | None:
     links = (sources, {(_BUS, place): value for place, value in places.items()}, taken)
     columns = _sums(sources, 0), {_BUS: total}, places, dict(sorted(effects.items(), key=lambda one: -one[1]))
     nodes = _placed(columns, total, colours)
-    ribbons = [one for number, some in enumerate(links) for one in _ribbons(some, nodes[number], nodes[number + 1])]
+    ends = zip(links, nodes, nodes[1:], strict=False)
+    ribbons = [one for some, starts, stops in ends for one in _ribbons(some, starts, stops, intervals)]
     return Flows(tuple(node for column in nodes for node in column.values()), tuple(ribbons))
+
+
+def _ends(row: Row) -> tuple[str, str]:
+    return row["joint"] or ROBOT_WIDE, effect_name(row)
 
 
 def _without_crumbs(taken: Links, least: float) -> dict[tuple[str, str], float]:
@@ -110,7 +119,7 @@ def _placed(columns: Sequence[Mapping[str, float]], total: float, colours: Mappi
     return placed
 
 
-def _ribbons(links: Links, starts: Mapping[str, Node], ends: Mapping[str, Node]) -> list[Ribbon]:
+def _ribbons(links: Links, starts: Mapping[str, Node], ends: Mapping[str, Node], intervals: Intervals) -> list[Ribbon]:
     """Return the ribbons of links between two columns, stacked at both ends in the order of the nodes."""
     used: dict[tuple[str, bool], float] = defaultdict(float)
     scale = sum(node.height for node in starts.values()) / sum(links.values())
@@ -120,9 +129,13 @@ def _ribbons(links: Links, starts: Mapping[str, Node], ends: Mapping[str, Node])
         left, right = one.y + used[start, True], other.y + used[end, False]
         used[start, True] += height
         used[end, False] += height
-        words = f"{start} to {end}: {wording.energy(links[start, end])}"
+        words, unsure = f"{start} to {end}: {wording.energy(links[start, end])}", False
+        lower, upper = intervals.get((start, end), (None, None))
+        if lower is not None and upper is not None:
+            words += f", between {wording.energy(lower)} and {wording.energy(upper)}"
+            unsure = is_unsure(links[start, end], lower, upper)
         colour = one.colour if other.colour == _PLAIN else other.colour
-        ribbons.append(Ribbon(_path(one.x + Flows.bar, left, other.x, right, height), words, colour))
+        ribbons.append(Ribbon(_path(one.x + Flows.bar, left, other.x, right, height), words, colour, unsure))
     return ribbons
 
 
