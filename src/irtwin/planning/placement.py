@@ -48,7 +48,7 @@ def better_placement(twin: Twin, motion: Motion) -> Placement | None:
     options = {"initial_simplex": first, "maxfev": _TRIED, "xatol": _ENOUGH, "fatol": np.inf}
     with np.errstate(invalid="ignore"):  # two places that cannot be are infinitely far from neither
         best = scipy.optimize.minimize(energy, np.zeros(3), method="Nelder-Mead", options=options)
-    moved = way.from_base(best.x)
+    moved = way.from_base(best.x) if np.any(best.x) else None
     if moved is None:
         return None
     saved = saving(twin, moved, way.smooth)
