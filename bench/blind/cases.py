@@ -25,13 +25,13 @@ from blind.catalogue import LOCAL, POWER, REGIMES, SLIGHT, TORQUE, UNKNOWN_EFFEC
 from blind.motions import exciting, work
 from blind.projection import STRIDE, Basis, low_pass
 from irtwin.demo.plant.arm import PlantPayload
-from irtwin.demo.plant.friction import LAWS, NearZero
 from irtwin.demo.plant.machine import Machine, build
 from plant.drawings import read_drawings
 from plant.effects import POWER as POWER_EFFECTS
 from plant.effects import SENSED, TRANSMISSION, Effect
 from plant.fleet import Fleet, Traces
 from plant.logger import coloured, power, torque, winding_rise
+from plant.near_zero import LAWS, NearZero
 
 ROBOTS = ("pall4", "elbow6", "slim7")
 SEEDS = {

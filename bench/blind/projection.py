@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from irtwin.demo.plant.arm import Arm
-from irtwin.demo.plant.friction import NearZero
+from plant.near_zero import NearZero
 
 BAND = 10.0  # Hz, above it a twin's filter leaves little
 STRIDE = 4

@@ -8,7 +8,7 @@ from blind.projection import Basis
 from closed_loop.machine import Machine
 from closed_loop.simulation import Trace
 from irtwin.demo.plant.arm import Arm, PlantPayload
-from irtwin.demo.plant.friction import NearZero
+from plant.near_zero import NearZero
 
 COARSE = 0.008  # s, between the samples that are fitted
 

@@ -13,10 +13,11 @@ import numpy as np
 
 from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.machine import Drawings, build
-from irtwin.demo.plant.motion import PlantMotion, check, fourier, programme
+from irtwin.demo.plant.motion import PlantMotion, check, programme
 from irtwin.demo.plant.simulate import PlantRecording, simulate
 from irtwin.demo.plant.thermal import Thermal
 from plant.drawings import read_drawings
+from plant.fourier import fourier
 
 FOLDER = Path(__file__).parent
 CAMPAIGNS = FOLDER / "campaigns"

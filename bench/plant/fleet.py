@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from irtwin.demo.plant.arm import PlantPayload
-from irtwin.demo.plant.friction import NearZero
 from irtwin.demo.plant.machine import Machine
 from irtwin.demo.plant.motion import PlantMotion
 from plant.effects import LEVEL, PASSIVE, Effect, State
+from plant.near_zero import NearZero
 
 _ONLY_FRICTION = int(
     mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_EQUALITY

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from irtwin.demo.plant.machine import Drawings
-from irtwin.demo.plant.motion import PlantMotion, check, fourier, programme
+from irtwin.demo.plant.motion import PlantMotion, check, programme
+from plant.fourier import fourier
 
 STEP = 1e-3
 
