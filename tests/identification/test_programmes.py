@@ -59,6 +59,13 @@ def test_joints_that_are_not_asked_for_stand_still(of_joint_2):
     assert set(ladder.settings.speeds) == {"joint_2"}
 
 
+def test_joints_are_as_warm_as_the_robot_was_last_unless_they_are_to_be_warmed(motions):
+    warm = [replace(one, temperature=np.full(one.q.shape, 20.0 + 10 * k)) for k, one in enumerate(motions)]
+    for one in programmes(ROBOT, [], warm, ASKED):
+        told = [np.unique(motion.temperature).tolist() for motion in one.motions]
+        assert told == ([[25.0], [45.0]] if one.kind == "warm_up" else [[30.0]] * len(one.motions))
+
+
 def test_speeds_of_sliding_joints_are_in_metres(motions):
     assert "m/s" in next(iter(programmes(arm(2, slides=(1,)), ["joint_2"], motions))).text
 

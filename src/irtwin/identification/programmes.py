@@ -130,7 +130,7 @@ class _Yard:
         self.reach = np.minimum(self.reach, _TURN / 2) * self.moved
         self.speed, self.acceleration = _RESERVE * self.limits.speed, _RESERVE * self.limits.acceleration
         last = seen[-1]
-        self.cutoff = last.cutoff
+        self.cutoff, self._last = last.cutoff, last
         self.rate = min(last.rate, _RATE * last.cutoff) if last.cutoff else min(last.rate, 100.0)
         walls = Walls(robot, self.limits, None)
         every = max(1, len(q) // _CHECKED)
@@ -184,7 +184,12 @@ class _Yard:
         for start, stop, speed, acceleration in moves:
             parts += [_move(start, stop, speed, acceleration, self.rate), (stop + rest, rest, rest)]
         q, dq, ddq = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return Motion(np.arange(len(q)) / self.rate, q, dq, ddq, run="planned", cutoff=self.cutoff)
+        return self.planned(np.arange(len(q)) / self.rate, q, dq, ddq)
+
+    def planned(self, time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> Motion:
+        """Return a motion of joints that are as warm as the robot was last, where that is known."""
+        warm = None if self._last.temperature is None else np.tile(self._last.temperature[-1], (len(q), 1))
+        return Motion(time, q, dq, ddq, run="planned", cutoff=self.cutoff, temperature=warm)
 
     def programme(self, kind: str, text: str, motion: Motion, **settings: Any) -> ExperimentProgramme:
         """Return the programme of one motion about the pose."""
@@ -332,14 +337,14 @@ def _exciting(robot: Robot, yard: _Yard) -> ExperimentProgramme | None:
         tell_step(f"  exciting motion, step {iteration}")
 
     try:
-        time, q, dq, ddq = excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step).sample(yard.rate)
+        made = excite(robot, _EXCITING, iterations=_ITERATIONS, progress=step).sample(yard.rate)
     except InputError:
         return None
     return ExperimentProgramme(
         "exciting_motion",
         f"an exciting motion of all joints, {_EXCITING:g} s",
         robot.joint_names,
-        (Motion(time, q, dq, ddq, run="planned", cutoff=yard.cutoff),),
+        (yard.planned(*made),),
         settings=Settings(command=f"irtwin robot excite URDF --seconds {_EXCITING:g} --out motion.csv"),
     )
 
