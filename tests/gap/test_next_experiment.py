@@ -176,6 +176,12 @@ def test_what_no_motion_so_far_brings_about_is_shown_by_one_that_does(motions, p
     assert question.separation_now < said.separation_that_is_enough < question.expected_separation
 
 
+def test_what_neither_a_motion_nor_a_hand_shows_is_not_asked_for(motions, plain_programmes):
+    still = [replace(m, q=m.q * [0, 1], dq=m.dq * [0, 1], ddq=m.ddq * [0, 1]) for m in motions]
+    still = [replace(measure(ROBOT, m, noise=1e3, seed=k), run=m.run) for k, m in enumerate(still)]
+    assert next_experiment(ROBOT, [channel_of(still, ["joint_coupling"])], ["joint_coupling"], still, DEFAULT) is None
+
+
 def test_what_the_data_would_show_is_not_asked_for(motions):
     channel = channel_of(motions, ["joint_coupling"])
     assert next_experiment(ROBOT, [channel], ["joint_coupling"], motions, DEFAULT) is None

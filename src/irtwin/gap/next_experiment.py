@@ -117,12 +117,15 @@ def next_experiment(
     weighed = _answerable(weighed, enough)
     chosen, questions = _best(weighed, enough)
     by_hand = tuple(effect.manual_test for effect in effects if effect.manual_test)
+    motions = (chosen.text,) if chosen else by_hand
+    if not motions and not any(one.rivals for one in asked):
+        return None  # what nothing would show is among what is not testable; that rivals cannot be told apart is news
     said = Experiment(
         purpose="; ".join(f"tell {one.effect} from {', '.join(one.rivals)}" for one in asked if one.rivals)
         or f"show {', '.join(names)}",
         effects=names,
         joints=joints,
-        motions=(chosen.text,) if chosen else by_hand,
+        motions=motions,
         expected_separation=min(one.expected_separation for one in questions) if chosen else None,
         separation_now=_rounded(min(now for one in asked for now in one.now.values())),
         separation_that_is_enough=_rounded(enough),
