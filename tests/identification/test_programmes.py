@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from tests.synthetic import arm, swing
 
@@ -64,6 +65,29 @@ def test_joints_are_as_warm_as_the_robot_was_last_unless_they_are_to_be_warmed(m
     for one in programmes(ROBOT, [], warm, ASKED):
         told = [np.unique(motion.temperature).tolist() for motion in one.motions]
         assert told == ([[25.0], [45.0]] if one.kind == "warm_up" else [[30.0]] * len(one.motions))
+
+
+def test_drives_that_are_weak_are_asked_for_gentler_moves(motions):
+    slow = [replace(one, q=0.01 * one.q, dq=0.01 * one.dq, ddq=0.01 * one.ddq) for one in motions]
+
+    def greatest(robot):
+        made = next(one for one in programmes(robot, [], slow) if one.kind == "acceleration_steps")
+        (motion,) = made.motions
+        states = zip(motion.q, motion.dq, motion.ddq, strict=True)
+        data = robot.model.createData()
+        return np.abs([pin.rnea(robot.model, data, *state) for state in states]).max(axis=0)
+
+    strong = greatest(ROBOT)
+    held = np.abs([pin.computeGeneralizedGravity(ROBOT.model, ROBOT.model.createData(), q) for q in slow[0].q]).max(
+        axis=0
+    )
+    limits = held + 0.6 * (strong - held)
+    weak = replace(
+        ROBOT,
+        joints=tuple(replace(joint, effort=float(most)) for joint, most in zip(ROBOT.joints, limits, strict=True)),
+    )
+    assert (greatest(weak) <= 1.01 * limits).all()
+    assert (strong > limits).any()
 
 
 def test_speeds_of_sliding_joints_are_in_metres(motions):

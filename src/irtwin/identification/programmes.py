@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from irtwin.document import experiment
 from irtwin.document.experiment import Settings
@@ -36,7 +37,7 @@ _COLD, _WARM = 25.0, 45.0  # degC
 _PAYLOAD_SHARE = 1 / 8  # of the arm's mass: what arms of their class carry at least
 _CENTRE = (0.0, 0.0, 0.05)  # m, of the load, from the flange
 _SHRINK, _TRIES = 0.7, 6
-_CHECKED = 200  # poses on the way
+_CHECKED = 200  # samples on the way
 LONGEST = 600.0  # s of one programme
 _MOST_SAMPLES = 100_000  # of one programme
 _FEWEST_SAMPLES = 12  # of a motion; a quintic spline takes six
@@ -135,24 +136,44 @@ class _Yard:
         walls = Walls(robot, self.limits, None)
         every = max(1, len(q) // _CHECKED)
         self._walls = walls if walls.clearance(q[::every]).min(initial=1.0) > 0 else None  # else the floor is elsewhere
+        effort = np.array([joint.effort if joint.effort > 0 else np.inf for joint in robot.joints])
+        self._most = np.maximum(effort, self._torque(seen))
 
     def clear(self, build: Callable[[_Yard], ExperimentProgramme]) -> ExperimentProgramme | None:
         """Return the programme about the pose, smaller where it would touch the floor or last too long.
 
-        None where no such one is clear.
+        Gentler where the described bodies would need more torque than joints have, or than was seen. None where no such
+        one is clear.
         """
-        whole = self.reach
-        for _ in range(_TRIES):
-            try:
-                made = build(self)
-            except _TooLong:
-                made = None
-            if made is not None and self._above_floor(made):
-                self.reach = whole
-                return made
-            self.reach = _SHRINK * self.reach
-        self.reach = whole
-        return None
+        whole = self.reach, self.acceleration
+        try:
+            for _ in range(_TRIES):
+                made = self._built(build)
+                if made is None or not self._above_floor(made):
+                    self.reach = _SHRINK * self.reach
+                elif (self._torque(made.motions) > self._most).any():
+                    self.acceleration = _SHRINK * self.acceleration
+                else:
+                    return made
+            return None
+        finally:
+            self.reach, self.acceleration = whole
+
+    def _built(self, build: Callable[[_Yard], ExperimentProgramme]) -> ExperimentProgramme | None:
+        try:
+            return build(self)
+        except _TooLong:
+            return None
+
+    def _torque(self, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the greatest torque of each joint, (n,), that the described bodies need at some samples."""
+        model, data = self.robot.model, self.robot.model.createData()
+        torque = [
+            pin.rnea(model, data, motion.q[row], motion.dq[row], motion.ddq[row])
+            for motion in motions
+            for row in range(0, len(motion.time), max(1, len(motion.time) // _CHECKED))
+        ]
+        return np.asarray(np.abs(torque).max(axis=0))
 
     def within(self, seconds: float) -> bool:
         """Return whether a programme may last so long: neither too many samples nor too few to differentiate."""
