@@ -16,14 +16,14 @@ from irtwin.identification.run_scatter import with_run_scatter
 ROBOT = arm(3)
 
 
-def deviations(runs: int, scatter: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def deviations(runs: int, scatter: float, effects=BASELINE) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Deviations by name, as fitted and with the scatter, of runs whose dry friction is off by a share of its own."""
     rng, motions = np.random.default_rng(0), []
     for seed in range(runs):
         motion = measure(ROBOT, swing(ROBOT, seed, seconds=8.0), noise=0.2, seed=seed)
         own = scatter * rng.standard_normal(3) * truth(ROBOT)["Fc"] * np.sign(motion.dq)
         motions.append(replace(motion, torque=motion.torque + own))
-    stack = Stack(ROBOT, BASELINE)
+    stack = Stack(ROBOT, effects)
     blocks, found = fit_torque(stack, motions)
     wider = with_run_scatter(stack, blocks, found)
     names = np.array([term.name for _, term in stack.torque_terms])
@@ -42,6 +42,12 @@ def test_what_does_not_differ_stays_as_it_is():
     assert all((found[name][0] == found[name][1]).all() for name in ("m", "Ia", "Ixx"))
     fitted, wider = deviations(12, 0.0)["Fc"]
     assert (wider < 3 * fitted).all()
+
+
+def test_what_bodies_make_up_for_does_not_differ_from_run_to_run():
+    """A load friction that drives as much as it brakes is a scale of all bodies, which no run tells."""
+    fitted, wider = deviations(12, 0.1, (*BASELINE, "load_dependent_friction"))["mu"]
+    assert (wider < 1.1 * fitted).all()
 
 
 def test_few_runs_tell_nothing_of_it():
