@@ -142,3 +142,12 @@ def test_speeds_of_a_joint_that_hardly_moves_are_not_those_of_its_encoder_s_step
     true = 0.03 * swing(ROBOT, 4).dq[:, 0]
     assert relative(found.dq[inner, 0], true[inner]) < 0.4 * relative(wide.dq[inner, 0], true[inner])
     assert np.array_equal(found.dq[:, 1:], wide.dq[:, 1:])
+
+
+def test_a_joint_that_only_moves_fast_keeps_its_band():
+    """Its positions lie on no grid: what is least between two of them is how far it goes between samples."""
+    motion = swing(ROBOT, 4)
+    steady = 0.5 * motion.time + 1e-4 * np.random.default_rng(0).standard_normal(len(motion.time))
+    run = as_run(replace(motion, q=np.column_stack([steady] * 3)))
+    found, wide = condition_for_fit(run, ROBOT, 10.0), condition(run, ROBOT, 10.0, states_cutoff=30.0)
+    assert np.array_equal(found.dq, wide.dq)

@@ -25,6 +25,7 @@ _STATES = ("q", "dq", "ddq")
 _STATES_WIDER = 3.0  # what is below the cutoff then passes unchanged
 _AGREEMENT = 0.1  # logged speeds are taken where they differ by less than this from those of the positions
 _SAME = 1e-9  # rad or m: positions that differ by less are one
+_NEXT = 5.5  # steps of an encoder: positions that are closer show its grid
 STANDSTILL = 1e-3  # rad/s: below, the sign of a speed is that of its noise
 
 
@@ -145,9 +146,16 @@ def _standing(q: np.ndarray, logged: np.ndarray, rate: float) -> np.ndarray:
 
 
 def _step(positions: np.ndarray) -> float:
-    """Return by how much two positions (N,) differ that are not the same, at least; 0 where all are the same."""
+    """Return by how much two positions (N,) differ that are not the same, at least; 0 where all are the same.
+
+    So it is where they lie on no grid of such steps: a joint that only ever moves fast does not show its encoder.
+    """
     steps = np.diff(np.unique(positions))
-    return float(np.min(steps[steps > _SAME], initial=np.inf)) if np.any(steps > _SAME) else 0.0
+    if not len(steps := steps[steps > _SAME]):
+        return 0.0
+    least = float(steps.min())
+    near = steps[steps < _NEXT * least] / least
+    return least if np.mean(np.abs(near - np.round(near)) < 0.1) > 0.9 else 0.0
 
 
 def _even_time(run: Run) -> np.ndarray:
