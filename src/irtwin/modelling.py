@@ -123,9 +123,10 @@ def sound(data_set: DataSet, announce: Announce) -> DataSet:
     for line in data_set.repairs:
         announce(f"  {line}")
     check_result = checked(data_set)
-    for line in dict.fromkeys(finding.say for finding in check_result.findings):
+    found = tuple(dict.fromkeys(finding.say for finding in check_result.findings))
+    for line in found:
         announce(f"  {line}")
-    return check_result.data_set
+    return replace(check_result.data_set, repairs=(*data_set.repairs, *found))
 
 
 def clocked(announce: Announce) -> Announce:

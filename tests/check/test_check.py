@@ -18,6 +18,7 @@ from irtwin.check import arrangement
 from irtwin.check.check import check, checked
 from irtwin.check.rigid_body import RigidBodyRows
 from irtwin.errors import InputError
+from irtwin.modelling import sound
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, read_data_set
@@ -156,6 +157,9 @@ def test_a_sign_is_mended_and_a_dead_channel_stops():
     torque = healthy().runs[0].signals.torque
     mended = checked(spoilt(healthy(), one("torque", 2, np.negative))).data_set
     np.testing.assert_array_equal(mended.runs[0].signals.torque, torque)
+    said: list[str] = []
+    (kept,) = sound(spoilt(healthy(), one("torque", 2, np.negative)), said.append).repairs
+    assert kept == said[0].strip() and kept.startswith("tau_joint_3 has the wrong sign")
     with pytest.raises(InputError, match="tau_joint_3 is 0 throughout, though the robot moves; connect what measures"):
         checked(spoilt(healthy(), one("torque", 2, np.zeros_like)))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from tests import gap_cases
 
@@ -23,6 +25,18 @@ def test_the_filter_is_said_where_it_is_known():
     (said,) = summary.filtered(gap_cases.document("attributed"))
     assert said == "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the widest motion)."
     assert summary.filtered(gap_cases.document("ambiguous")) == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["tau_a2 has the wrong sign"], "tau_a2 has the wrong sign."),
+        (list("abcde"), "a; b; c; and 2 more, which `irtwin check` lists."),
+    ],
+)
+def test_what_was_done_with_the_logs_is_said(lines, said):
+    document = replace(gap_cases.document("ambiguous"), mended="\n".join(lines))
+    assert summary.filtered(document) == [f"Of the logs, when they were read: {said}"]
 
 
 def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():

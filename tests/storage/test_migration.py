@@ -182,11 +182,13 @@ def test_a_workspace_of_0_2_loses_what_is_told_no_more(tmp_path: Path) -> None:
         connection.execute(text("CREATE TABLE gap_closeable (activity_id VARCHAR, closed FLOAT)"))
         for table in (third.TABLE, fourth.JOINTS, fourth.TABLE):
             connection.execute(text(f"DROP TABLE {table}"))
+        connection.execute(text("ALTER TABLE gap_diagnosis DROP COLUMN mended"))
         connection.execute(text(f"UPDATE alembic_version SET version_num = '{second.down_revision}'"))
     with Workspace(tmp_path) as place:
         assert not inspect(place.engine).has_table("gap_closeable")
         made = inspect(place.engine)
         assert all(made.has_table(table) for table in (third.TABLE, fourth.JOINTS, fourth.TABLE))
+        assert "mended" in {column["name"] for column in made.get_columns("gap_diagnosis")}
         with place.engine.connect() as connection:
             assert migration.revision(connection) == migration.newest()
 

@@ -413,6 +413,7 @@ class Document:
     be true would close it; runs of one motion differ by what no effect explains; or no cause that matters is likely.
     `simulator`: the model that the runs were held against. Where their commands were played through it, `horizons`: how
     its tracking error grows. `odd_stretches`: those of which the twin with its causes leaves most, if there are any.
+    `mended`: what was wrong with the logs, or left out of them, when they were read, in lines.
     """
 
     verdict: Verdict = told("has_Verdict")
@@ -432,6 +433,7 @@ class Document:
     simulator: str | None = told("Simulator_Model", column="simulator_model", default=None)
     horizons: tuple[Horizon, ...] | None = told(default=None)
     odd_stretches: tuple[OddStretch, ...] | None = told(default=None)
+    mended: str | None = told("Mended_In_Logs", column="mended", default=None)
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

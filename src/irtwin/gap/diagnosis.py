@@ -83,6 +83,7 @@ class Diagnosis:
     scale: FittedTorqueScale | None = None  # of torque, where it was measured
     cutoff: Cutoff | None = None  # of the filter that all runs passed
     simulator: Simulator | None = None
+    mended: tuple[str, ...] = ()  # what was done with the logs as they were read
 
     @property
     def verdict(self) -> str:
@@ -140,6 +141,7 @@ class Diagnosis:
             cutoff=self.cutoff,
             simulator=None if self.simulator is None else self.simulator.name,
             odd_stretches=(self.twin and self.twin.odd_stretches) or None,
+            mended="\n".join(self.mended) or None,
         )
 
     @property
@@ -270,6 +272,7 @@ def diagnose(
         scale=scale,
         cutoff=case.cutoff,
         simulator=simulator,
+        mended=data_set.repairs,
     )
 
 

@@ -88,7 +88,10 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     closed = parts(chosen, numbers, families, {name: one.push for name, one in named.items()})
     horizons = restarted(own, runs, numbers, _of(pushes))
     return Playing(
-        writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
+        replace(
+            writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
+            mended="\n".join(data_set.repairs) or None,
+        ),
         writing.curves(data_set.robot, names, before, after),
         chosen,
     )

@@ -12,6 +12,7 @@ from irtwin.report.gap.verdict import closes, differing, misses, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
+_MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
 _STEPS = 3  # motions to log that are told
 
@@ -120,9 +121,12 @@ def horizons(diagnosis: Document) -> AnswerTable:
 
 
 def filtered(diagnosis: Document) -> list[str]:
-    """Return a line on the filter that all runs passed; none where nobody said it."""
-    cutoff = diagnosis.cutoff
-    return [f"Signals were low-pass filtered at {cutoff.hz:.{_DIGITS}g} Hz ({cutoff.why})."] if cutoff else []
+    """Return a line on the filter that all runs passed, and one on what was done with logs as they were read."""
+    cutoff, mended = diagnosis.cutoff, (diagnosis.mended or "").splitlines()
+    lines = [f"Signals were low-pass filtered at {cutoff.hz:.{_DIGITS}g} Hz ({cutoff.why})."] if cutoff else []
+    if len(mended) > _MENDED:
+        mended[_MENDED:] = [f"and {len(mended) - _MENDED} more, which `irtwin check` lists"]
+    return [*lines, *([f"Of the logs, when they were read: {'; '.join(mended)}."] if mended else [])]
 
 
 def causes(diagnosis: Document) -> AnswerTable:

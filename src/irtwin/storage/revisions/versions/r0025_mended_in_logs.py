@@ -1,0 +1,13 @@
+"""A diagnosis keeps what was wrong with the logs that it read."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0025"
+down_revision = "0024"
+TABLES = "64bbcdfd248c5290"  # of all columns, see tests/storage/test_migration.py
+
+
+def upgrade() -> None:
+    """Add its column."""
+    op.add_column("gap_diagnosis", sa.Column("mended", sa.String()))
