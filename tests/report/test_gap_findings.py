@@ -146,7 +146,7 @@ def test_what_closes_nothing_is_no_gap_and_named_nowhere() -> None:
     assert said("no_gap", finding("environment", **LITTLE)) == (
         "There is no gap that matters: 1 finding closes less than 0.1 % of the gap in torque."
     )
-    assert said("no_gap") == "There is no gap: the twin explains the data down to the noise floor, reversals aside."
+    assert said("no_gap") == "There is no gap: away from reversals the twin explains the data down to the noise floor."
 
 
 def test_without_a_noise_floor_nobody_says_that_the_twin_reaches_it() -> None:

@@ -15,7 +15,7 @@ from irtwin.report.gap.summary import line, refused
         (
             "no_gap",
             None,
-            "no_gap: There is no gap: the twin explains the data down to the noise floor, reversals aside.",
+            "no_gap: There is no gap: away from reversals the twin explains the data down to the noise floor.",
         ),
         (
             "unexplained",

@@ -48,7 +48,10 @@ def verdict_of(page: str) -> str:
 @pytest.mark.parametrize(
     ("verdict", "said"),
     [
-        ("no_gap", "There is no gap: the twin explains the data down to the noise floor, reversals aside."),
+        (
+            "no_gap",
+            "There is no gap: away from reversals the twin explains the data down to the noise floor.",
+        ),
         (
             "ambiguous",
             "Friction of joint_a3 differs from the twin’s (52 % sure): Stribeck friction (52 %) or nonlinear viscous"

@@ -132,7 +132,7 @@ def sentence(
             )
         if not findings:
             agrees = "simulator agrees with the robot" if against == "simulated" else "twin explains the data"
-            return f"There is no gap: the {agrees} down to the noise floor, reversals aside."
+            return f"There is no gap: away from reversals the {agrees} down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
     rest = [one for one in findings if one not in told]
