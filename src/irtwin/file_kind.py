@@ -14,7 +14,7 @@ from irtwin.bring.recording import BAGS, SHEETS
 from irtwin.errors import InputError
 from irtwin.input_file import check_file
 from irtwin.storage.database import Workspace
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import read_toml
 
 _TEXTS = (".csv", ".tsv", ".txt")
 _LOGS = (*_TEXTS, ".parquet", *SHEETS, *BAGS)

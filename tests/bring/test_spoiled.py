@@ -92,7 +92,7 @@ TWELVE = {
         exchanged, "swap (cure first): tau_joint_a2 <-> tau_joint_a3", "tau_joint_a2 <-> tau_joint_a3 stand in each"
     ),
     "a misspelt key": Spoiled(
-        same, "", "payload_mas is no key of the log format; did you mean payload_mass?", toml="payload_mas = 3.0"
+        same, "", "payload_mas is not known; did you mean payload_mass?", toml="payload_mas = 3.0"
     ),
 }  # fmt: skip
 

@@ -155,7 +155,7 @@ def test_what_is_wrong_in_the_table_of_topics_is_told(tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     write(tmp_path / "runs" / "one", states(Q, effort=TORQUE), numbers("/power", POWER))
     for line, message in {
-        'joint_state = "/a"': r"\[topics\] joint_state is no key of the log format; did you mean joint_states",
+        'joint_state = "/a"': r"\[topics\] joint_state is not known; did you mean joint_states",
         "power = 3": r"\[topics\] power should be text, not 3",
         'power = "/watts"': r"/watts of \[topics\] holds no numbers; there are /power",
         'joint_states = "/a"': r"/a of \[topics\] holds no joint states; there are /joint_states",

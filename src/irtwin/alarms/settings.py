@@ -22,13 +22,11 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Container, Mapping
-from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from irtwin.errors import InputError
-from irtwin.signals.toml_file import TomlTable, shown
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import TomlTable, read_toml, shown
 
 if TYPE_CHECKING:
     from irtwin.alarms.mqtt import Broker
@@ -70,7 +68,7 @@ def asks(file: Path) -> list[str]:
 def _tables(file: Path) -> list[tuple[str, TomlTable]]:
     """Return the table of each receiver of a file, with its kind."""
     document = read_toml(file)
-    _check(file, "", document, tuple(_KEYS))
+    TomlTable(file, "", document).check_keys(tuple(_KEYS))
     asked = []
     for kind, keys in _KEYS.items():
         tables = document.get(kind, [])
@@ -78,7 +76,7 @@ def _tables(file: Path) -> list[tuple[str, TomlTable]]:
             raise InputError(f"{file}: {kind} should be tables; write [[{kind}]] above its keys")
         for number, values in enumerate(tables, start=1):
             table = TomlTable(file, f"{kind} {number}:", values)
-            _check(file, table.name, values, keys)
+            table.check_keys(keys)
             asked.append((kind, table))
     if not asked:
         raise InputError(
@@ -96,21 +94,21 @@ def _asked(kind: str, table: TomlTable) -> str:
 
 
 def _broker(kind: str, table: TomlTable, environment: Mapping[str, str]) -> Broker:
-    host, topic = (_needed(table, key) for key in ("host", _PLACES[kind]))
+    host, topic = (table.needed(key) for key in ("host", _PLACES[kind]))
     if kind == "sparkplug" and [bool(part) for part in topic.split("/")] != [True, True]:
-        raise InputError(f"{table.file}: {table.name} node should be GROUP/NODE, not {shown(topic)}")
+        raise table.fault("node", f"should be GROUP/NODE, not {shown(topic)}")
     if any(sign in topic for sign in "+#\0") or len(topic.encode()) > 65535:
-        raise InputError(f"{table.file}: {table.name} {_PLACES[kind]} should be that of one place, without + and #")
+        raise table.fault(_PLACES[kind], "should be that of one place, without + and #")
     tls = table.values.get("tls", False)
     if not isinstance(tls, bool):
-        raise InputError(f"{table.file}: {table.name} tls should be true or false, not {shown(tls)}")
+        raise table.fault("tls", f"should be true or false, not {shown(tls)}")
     port = table.values.get("port", 8883 if tls else 1883)
     if isinstance(port, bool) or not isinstance(port, int) or not 0 < port < 65536:
-        raise InputError(f"{table.file}: {table.name} port should be a whole number of 1 to 65535, not {shown(port)}")
+        raise table.fault("port", f"should be a whole number of 1 to 65535, not {shown(port)}")
     user, password = table.text("user"), _secret(table, "password_env", environment)
     if password is not None and user is None:
-        raise InputError(f"{table.file}: {table.name} password_env goes with user")
-    timeout = _timeout(table)
+        raise table.fault("password_env", "goes with user")
+    timeout = table.number("timeout_s", least=_SHORTEST) or _TIMEOUT
     from irtwin.alarms.mqtt import Broker  # an extra
 
     return Broker(host, port, topic, user, password, tls, timeout)
@@ -122,30 +120,12 @@ def _secret(table: TomlTable, key: str, environment: Mapping[str, str]) -> str |
     if name is None:
         return None
     if not _VARIABLE.fullmatch(name) or name in _OWN:
-        raise InputError(
-            f"{table.file}: {table.name} {key}: {shown(name)[1:-1]} is not read; give the secret in a variable of its "
-            "own whose name begins with IRTWIN_, as IRTWIN_MQTT_PASSWORD"
+        raise table.fault(
+            f"{key}:",
+            f"{shown(name)[1:-1]} is not read; give the secret in a variable of its own whose name begins with "
+            "IRTWIN_, as IRTWIN_MQTT_PASSWORD",
         )
     value = environment.get(name, "").strip()
     if not (value and value.isascii() and value.isprintable()):
-        raise InputError(f"{table.file}: {table.name} {key}: the environment has no usable {shown(name)[1:-1]}")
+        raise table.fault(f"{key}:", f"the environment has no usable {shown(name)[1:-1]}")
     return value
-
-
-def _timeout(table: TomlTable) -> float:
-    return table.number("timeout_s", least=_SHORTEST) or _TIMEOUT
-
-
-def _needed(table: TomlTable, key: str) -> str:
-    text = table.text(key)
-    if text is None:
-        raise InputError(f"{table.file}: {table.name} {key} is missing")
-    return text
-
-
-def _check(file: Path, name: str, values: Mapping[str, Any], known: tuple[str, ...]) -> None:
-    for key in values:
-        if key not in known:
-            near = get_close_matches(key, known, 1)
-            hint = f"did you mean {near[0]}?" if near else f"it may have {', '.join(known)}"
-            raise InputError(f"{file}: {f'{name} {shown(key)[1:-1]}'.strip()} is not known; {hint}")

@@ -18,7 +18,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.sources.catalogue import registered, source_of
 from irtwin.signals.sources.parquet_file import is_text, open_parquet, read_columns
 from irtwin.signals.sources.source import check_names, check_values
-from irtwin.signals.toml_file import BAG_FOLDER
+from irtwin.toml_file import BAG_FOLDER
 
 BAGS = (".bag", ".mcap", ".db3")
 SHEETS = (".xlsx", ".xlsm")

@@ -32,9 +32,8 @@ from typing import Any
 from irtwin.errors import InputError
 from irtwin.live.joint_stream import STREAMED, State, state_of
 from irtwin.robot.description import Robot
-from irtwin.signals.toml_file import TomlTable, shown
 from irtwin.signals.unit import Unit, unit_of
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import TomlTable, read_toml, shown
 
 try:
     from asyncua import Client, Node, ua

@@ -13,7 +13,7 @@ from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, Row, from_table
 from irtwin.robot.denavit_hartenberg import ChainTable as DhTable
 from irtwin.robot.description import Robot
-from irtwin.signals.toml_file import TomlTable, shown
+from irtwin.toml_file import TomlTable, shown
 
 DH_KEYS = ("convention", "base", "tool", "row")
 ROW_KEYS = (
@@ -34,7 +34,7 @@ def robot_of_table(name: str, robot: TomlTable) -> Robot:
     convention = table.text("convention")
     if convention not in CONVENTIONS:
         given = "is missing" if convention is None else f'= "{convention}"'
-        raise InputError(f"{robot.file}: [robot.dh] convention {given}; use {' or '.join(CONVENTIONS)} (Craig's)")
+        raise table.fault("convention", f"{given}; use {' or '.join(CONVENTIONS)} (Craig's)")
     rows = values.get("row")
     if not isinstance(rows, list) or not rows:
         raise InputError(f"{robot.file}: [[robot.dh.row]] is missing; give one for each joint, base to flange")
@@ -55,7 +55,7 @@ def _row(robot: TomlTable, number: int, values: Any) -> Row:
     table.check_keys(ROW_KEYS)
     kind = table.text("type", "revolute") or ""
     if kind not in _TYPES:
-        raise InputError(f'{table.file}: {table.name} type = "{kind}"; use {", ".join(_TYPES)}')
+        raise table.fault("type", f'= "{kind}"; use {", ".join(_TYPES)}')
     lower, upper = _limits(table, kind)
     row = Row(
         a=_within(table, "a"),
@@ -73,7 +73,7 @@ def _row(robot: TomlTable, number: int, values: Any) -> Row:
     about = "kg m^2: xx, yy, zz, xy, xz, yz about the centre of mass"
     inertia = table.numbers("inertia", 6, f"6 numbers ({about})")
     if mass is None and (com or inertia):
-        raise InputError(f"{table.file}: {table.name} mass is missing; com and inertia say nothing without it")
+        raise table.fault("mass", "is missing; com and inertia say nothing without it")
     if inertia and min(inertia[:3]) < 0:
         raise InputError(f"{table.file}: {table.name} inertia: a moment of inertia cannot be negative")
     if mass is not None:
@@ -88,11 +88,11 @@ def _limits(table: TomlTable, kind: str) -> tuple[float, float]:
             raise InputError(f"{table.file}: {table.name}: a continuous joint has no lower or upper limit; remove it")
         return -math.inf, math.inf
     if (lower is None) != (upper is None):
-        raise InputError(f"{table.file}: {table.name} {'lower' if lower is None else 'upper'} is missing")
+        raise table.fault("lower" if lower is None else "upper", "is missing")
     if lower is None or upper is None:
         return -math.inf, math.inf
     if lower > upper:
-        raise InputError(f"{table.file}: {table.name} lower = {lower:g} lies above upper = {upper:g}")
+        raise table.fault("lower", f"= {lower:g} lies above upper = {upper:g}")
     return lower, upper
 
 
@@ -102,7 +102,7 @@ def _within(table: TomlTable, key: str) -> float:
     angle = key in ("alpha", "theta")
     greatest, unit = (4 * math.pi, "rad") if angle else (_FARTHEST, "m")
     if abs(value) > greatest:
-        raise InputError(f"{table.file}: {table.name} {key} = {value:g} {unit} is beyond {greatest:.3g} {unit}")
+        raise table.fault(key, f"= {value:g} {unit} is beyond {greatest:.3g} {unit}")
     return value
 
 

@@ -18,8 +18,7 @@ from irtwin.signals.finding import LogFinding
 from irtwin.signals.samples import read_signals
 from irtwin.signals.sampling import as_sampled, checked_cutoff, holes
 from irtwin.signals.sources.bag_source import number_topics
-from irtwin.signals.toml_file import TomlTable, shown, take
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import TomlTable, read_toml, shown, take
 
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
 ROLES = ("observed", "reference", "simulated", PLANNED)
@@ -127,7 +126,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
     power_at = table.text("power_at")
     if power_at is not None and power_at not in _POWER_AT:
-        raise InputError(f'{file}: [robot] power_at = "{power_at}"; use {" or ".join(_POWER_AT)}')
+        raise table.fault("power_at", f'= "{power_at}"; use {" or ".join(_POWER_AT)}')
     TomlTable(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
     twin = _optional(file, document, "twin", TWIN_KEYS)
@@ -257,9 +256,7 @@ def read_robot(source: Path) -> Robot:
 
 
 def _robot(folder: Path, table: TomlTable) -> Robot:
-    name = table.text("name")
-    if name is None:
-        raise InputError(f"{table.file}: [robot] name is missing")
+    name = table.needed("name")
     if "joints" in table.values:
         return _metered(name, table)
     if "dh" in table.values and "urdf" in table.values:
@@ -330,7 +327,7 @@ def _runs(
         path = table.path("file", folder)
         role = table.text("role", "observed") or ""
         if role not in ROLES:
-            raise InputError(f'{file}: {table.name} role = "{role}"; use {", ".join(ROLES)}')
+            raise table.fault("role", f'= "{role}"; use {", ".join(ROLES)}')
         signals, dropped = read_signals(
             path, robot, repair=repair, measured=role != PLANNED, commanded=commanded, topics=topics
         )
@@ -371,9 +368,7 @@ def _made(table: TomlTable, role: str) -> dict[str, Any]:
         if count is not None and (
             isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= _MOST_MADE
         ):
-            raise InputError(
-                f"{table.file}: {table.name} {key} should be a whole number of 1 or more, not {shown(count)}"
-            )
+            raise table.fault(key, f"should be a whole number of 1 or more, not {shown(count)}")
         made[key] = count
     given = [key for key, value in made.items() if value is not None]
     if given and role == PLANNED:
@@ -384,9 +379,7 @@ def _made(table: TomlTable, role: str) -> dict[str, Any]:
 def _torque_scale(table: TomlTable) -> float | None:
     share = table.number("torque_scale_uncertainty", least=0.0)
     if share is not None and share >= 1:
-        raise InputError(
-            f"{table.file}: [robot] torque_scale_uncertainty should be a share below 1, not {share:g}; 0.1 is 10 %"
-        )
+        raise table.fault("torque_scale_uncertainty", f"should be a share below 1, not {share:g}; 0.1 is 10 %")
     return share
 
 
@@ -434,11 +427,9 @@ def _started(table: TomlTable) -> datetime | None:
     if isinstance(value, date) and not isinstance(value, datetime):
         value = datetime(value.year, value.month, value.day)
     if not isinstance(value, datetime):
-        raise InputError(f"{table.file}: {table.name} started should be a TOML date and time, not {shown(value)}")
+        raise table.fault("started", f"should be a TOML date and time, not {shown(value)}")
     if not _EARLIEST <= value.year <= _LATEST:
-        raise InputError(
-            f"{table.file}: {table.name} started must be in the years {_EARLIEST} to {_LATEST}, not {value}"
-        )
+        raise table.fault("started", f"must be in the years {_EARLIEST} to {_LATEST}, not {value}")
     return value if value.tzinfo else value.replace(tzinfo=UTC)
 
 

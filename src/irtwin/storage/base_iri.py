@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from irtwin.errors import InputError
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import read_toml
 
 DEFAULT = "https://w3id.org/irtwin/id/"
 KEY = "base_iri"  # of plant.toml

@@ -9,7 +9,7 @@ import pytest
 from irtwin.errors import InputError
 from irtwin.storage.base_iri import said
 from irtwin.storage.tariff import read_tariff
-from irtwin.toml_text import read_toml
+from irtwin.toml_file import read_toml
 
 
 def test_what_is_toml_is_returned(tmp_path: Path) -> None:
