@@ -23,6 +23,7 @@ from irtwin.knowledge.store.no_network import leave_network
 from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.limits import limit_memory
 from irtwin.location import Location
+from irtwin.serve.protocol import SERVER_FAILS
 from irtwin.storage.database import Workspace
 
 if TYPE_CHECKING:  # they take seconds to import, which an update of a graph without a database can spare
@@ -30,7 +31,6 @@ if TYPE_CHECKING:  # they take seconds to import, which an update of a graph wit
     from irtwin.knowledge.asserted.statements import Assertion
     from irtwin.modelling import Announce
 
-_SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 _BUSY = "another process is writing the graph: try again later"
 
 
@@ -146,7 +146,7 @@ def _opened(location: Location) -> Iterator[tuple[Workspace | None, KnowledgeGra
 
 def _of_server(error: ServerFault) -> dict[str, object]:
     print(f"irtwin: {error}", file=sys.stderr)
-    return {"status": 502, "message": _SERVER_FAILS, "headers": {}}
+    return {"status": 502, "message": SERVER_FAILS, "headers": {}}
 
 
 def _answer(answer: dict[str, object]) -> None:

@@ -189,9 +189,7 @@ def _motions(twin: Twin, run: Run) -> list[Motion]:
 
 def write_expectation(expected: Expectation, out: Path) -> None:
     """Write torque and power of a motion as Parquet."""
-    buffer = io.BytesIO()
-    pa.parquet.write_table(expected.table, buffer)
-    write(out, buffer.getvalue())
+    _write_parquet(expected.table, out)
 
 
 def write_model(twin: Twin, form: str, out: Path) -> list[str]:
@@ -259,6 +257,10 @@ def write_motion(motion: Motion, robot: Robot, out: Path) -> None:
     if ending == ".csv":
         write(out, csv_text(signals, joints).encode())
         return
+    _write_parquet(pa.table(columns_of(signals, joints)), out)
+
+
+def _write_parquet(table: pa.Table, out: Path) -> None:
     buffer = io.BytesIO()
-    pa.parquet.write_table(pa.table(columns_of(signals, joints)), buffer)
+    pa.parquet.write_table(table, buffer)
     write(out, buffer.getvalue())

@@ -16,7 +16,7 @@ from pathlib import Path
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
-from irtwin.storage.files import write
+from irtwin.storage.files import locked, write
 
 _MOST_BYTES = 100_000_000
 _Given = dict[str, dict[str, object]]  # of each place: the folder's number there, and the names that are trusted
@@ -76,11 +76,7 @@ def _change(change: Callable[[_Given], _Given]) -> None:
     file = _file()
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        lock = os.open(file.parent, os.O_RDONLY)
     except OSError as error:
         raise InputError(f"{file.parent}: cannot be made ({error.strerror}); set XDG_CONFIG_HOME") from None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # another command may change it too
+    with locked(file.parent, fcntl.LOCK_EX):  # another command may change it too
         write(file, json.dumps(change(_read()), indent=1).encode())
-    finally:
-        os.close(lock)

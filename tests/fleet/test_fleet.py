@@ -1,6 +1,7 @@
 """Many data sets by one command: data sets in, results by batch, and what was set aside."""
 
 import itertools
+import sys
 import threading
 import time
 from pathlib import Path
@@ -8,11 +9,14 @@ from pathlib import Path
 import pytest
 from tests import data_sets, small_robots
 
+from irtwin.errors import InputError
 from irtwin.fleet import fleet
+from irtwin.fleet.batch import Batch, key
 from irtwin.fleet.fleet import batches_of
 
 pytestmark = pytest.mark.slow
 
+DIES = (sys.executable, "-m", "tests.fleet.worker_that_dies")
 BASE = "https://plant.example/energy/"
 
 
@@ -99,3 +103,39 @@ def test_a_folder_of_data_sets_alone_is_told_how_all_are_taken(robots: Path) -> 
         said.status == 2
         and f"{robots}: holds data sets, and is none itself; name one, or take all by --out" in said.err
     )
+
+
+def batches(folder: Path, *members: tuple[str, ...]) -> list[Batch]:
+    for name in (name for names in members for name in names):
+        (folder / name).mkdir()
+        (folder / name / "dataset.toml").write_text(name)
+    return [
+        Batch.create(folder / "out" / f"b{k}", "diagnose", [str(folder / name) for name in names])
+        for k, names in enumerate(members)
+    ]
+
+
+def test_a_process_that_dies_costs_the_data_set_that_it_died_of(tmp_path: Path) -> None:
+    (batch,) = batches(tmp_path, ("a", "large", "b"))
+    fleet.work_through([batch], 2, lambda batch: None, DIES)
+    assert [record.state if record else "" for record in batch.records()] == ["done", "failed", "done"]
+
+
+def test_a_process_that_never_begins_is_not_tried_for_ever(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="its process ended with status 7 and left no record"):
+        fleet.work_through(
+            batches(tmp_path, ("a",)), 1, lambda batch: None, (sys.executable, "-c", "raise SystemExit(7)")
+        )
+
+
+@pytest.mark.parametrize("name", ["records", "lock", "records/a"])
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(name: str, tmp_path: Path, capfd) -> None:
+    (batch,) = batches(tmp_path, ("a",))
+    place = batch.folder / name.replace("/a", f"/{key(batch.sets.data_sets[0])}.json/x")
+    if name == "records":
+        place.write_text("a file in its place")
+    else:
+        place.mkdir(parents=True)
+    with pytest.raises(InputError, match="cannot be written"):
+        fleet.work_through([batch], 1, lambda batch: None)
+    assert capfd.readouterr().err == ""

@@ -80,7 +80,7 @@ def test_a_cost_is_explained_down_to_the_tariff(graph: KnowledgeGraph) -> None:
 
 def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:
     (tmp_path / "plant.toml").write_text("price_per_kwh = -1\n", encoding="utf-8")
-    with pytest.raises(InputError, match="price_per_kwh is a number of 0 or more, not -1"):
+    with pytest.raises(InputError, match="price_per_kwh should be a number of at least 0, not -1"):
         KnowledgeGraph(workspace=tmp_path).load_ontology()
 
 

@@ -89,3 +89,14 @@ def test_of_many_motions_to_log_the_rest_is_counted():
     said["next_experiment"]["motions"] = [f"motion {k}" for k in range(5)]
     lines = summary.next_steps(Document.from_json(said))
     assert lines[2:] == ["To log next: motion 2", "2 more to log are in the report (--report)"]
+
+
+def test_each_parameter_is_told_once_with_what_it_means():
+    assert summary.meanings(gap_cases.document("attributed")) == [
+        "Fs of stribeck friction: Friction above Coulomb's at standstill.",
+        "d of stribeck friction: Stribeck exponent.",
+    ]
+
+
+def test_where_nothing_is_to_blame_nothing_is_explained():
+    assert summary.meanings(gap_cases.document("no_gap")) == []

@@ -5,13 +5,13 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
-from sqlalchemy import select, text
+from sqlalchemy import inspect, select, text
 from sqlalchemy.exc import IntegrityError
 from tests import rows
 
 from irtwin.errors import InputError
-from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Activity, ActivityUse, Base, Run, RunEnergy, RunState, Series, Twin
+from irtwin.storage.database import Workspace, in_memory
+from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Run, RunEnergy, RunState, Series, Twin
 
 WORK = f"{rows.ROBOT}.work"
 TWIN, OTHER = f"{rows.ROBOT}.t1", f"{rows.ROBOT}.t2"
@@ -245,3 +245,17 @@ def test_a_workspace_that_links_elsewhere_is_refused(tmp_path: Path, name: str) 
     with pytest.raises(InputError, match=f"the path '{name}' leads outside the workspace"):
         Workspace(tmp_path / "place")
     assert [file.name for file in mine.iterdir()] == ["letter.html"]
+
+
+def test_a_database_in_memory_has_the_tables_of_a_workspace_and_the_rows_that_were_given(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as workspace, in_memory([*rows.joints(), rows.robot()]) as engine:
+        kept = set(inspect(workspace.engine).get_table_names())
+        assert set(inspect(engine).get_table_names()) == kept - {"alembic_version"}
+        with engine.connect() as connection:
+            assert list(connection.scalars(select(Joint.name))) == ["joint_a1", "joint_a2"]
+
+
+def test_each_in_memory_is_a_database_of_its_own() -> None:
+    for _ in range(2):
+        with in_memory([rows.robot()]) as engine, engine.connect() as connection:
+            assert not list(connection.scalars(select(Joint.name)))

@@ -52,7 +52,7 @@ def tell(
             signal.signal(number, lambda *_: done.set())
         names = ["standard output", *(broker.name for broker in (*of_alarms, *of_robots))]
         announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in alarms)} active now")
-        topics, nodes = _topics(of_alarms, announce), _edge_nodes(of_robots, announce)
+        topics, nodes = _connected(of_alarms, of_robots, announce)
         try:
             follow(partial(_alarms, location, robot, nodes), told, partial(_write, topics), done, announce, sparql)
         finally:
@@ -62,20 +62,15 @@ def tell(
                 topic.close()
 
 
-def _topics(brokers: Sequence[Broker], announce: Callable[[str], None]) -> list[AlarmTopic]:
-    if not brokers:
-        return []
+def _connected(
+    of_alarms: Sequence[Broker], of_robots: Sequence[Broker], announce: Callable[[str], None]
+) -> tuple[list[AlarmTopic], list[EdgeNode]]:
+    if not (of_alarms or of_robots):
+        return [], []
     from irtwin.alarms.mqtt import AlarmTopic  # an extra
+    from irtwin.alarms.sparkplug import EdgeNode
 
-    return [AlarmTopic(broker, announce) for broker in brokers]
-
-
-def _edge_nodes(brokers: Sequence[Broker], announce: Callable[[str], None]) -> list[EdgeNode]:
-    if not brokers:
-        return []
-    from irtwin.alarms.sparkplug import EdgeNode  # an extra
-
-    return [EdgeNode(broker, announce) for broker in brokers]
+    return [AlarmTopic(one, announce) for one in of_alarms], [EdgeNode(one, announce) for one in of_robots]
 
 
 def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Broker], list[Broker]]:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.sampling import interval
 from irtwin.signals.unit import Unit, units
 
@@ -196,8 +196,7 @@ def _bodies(robot: Robot, motion: MeasuredRun) -> np.ndarray:
     """Return the torques of the description's bodies at a few samples, (M, n)."""
     speed, acceleration = motion.derivative(1), motion.derivative(2)
     rows = np.linspace(0, len(motion.time) - 1, min(_EVALUATED, len(motion.time))).astype(int)
-    data = robot.model.createData()
-    return np.array([pin.rnea(robot.model, data, motion.q[row], speed[row], acceleration[row]) for row in rows])
+    return inverse_dynamics(robot.model, motion.q[rows], speed[rows], acceleration[rows])
 
 
 def _done(robot: Robot, motion: MeasuredRun) -> np.ndarray:

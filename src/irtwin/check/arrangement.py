@@ -16,9 +16,8 @@ import numpy as np
 import pinocchio as pin
 import scipy
 
-from irtwin.check.built_otherwise import turned_axes
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import FEW_ROWS, MOST_JOINTS, RigidBodyRows, rows_of
+from irtwin.check.rigid_body import FEW_ROWS, MOST_JOINTS, RigidBodyRows, rows_of, turned_axes
 from irtwin.check.whole_body import Held, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS

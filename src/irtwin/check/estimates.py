@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from irtwin.check.built_otherwise import tilted
 from irtwin.check.moving import Moving
-from irtwin.check.rigid_body import MANY_ROWS, MOST_JOINTS, RigidBodyRows, rows_of
+from irtwin.check.rigid_body import MANY_ROWS, MOST_JOINTS, RigidBodyRows, rows_of, tilted
 from irtwin.check.torque import scale_findings
 from irtwin.check.whole_body import Fitted, WholeBody
 from irtwin.robot.description import Robot

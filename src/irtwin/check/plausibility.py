@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.check.moving import Moving
 from irtwin.robot.description import Joint, Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
@@ -116,6 +116,5 @@ def _done(robot: Robot, motion: Motion) -> np.ndarray:
     """Return the power that the joints put into the motion, W (N,); by the URDF's bodies where no torque was logged."""
     torque = motion.torque
     if torque is None:
-        data, states = robot.model.createData(), zip(motion.q, motion.dq, motion.ddq, strict=True)
-        torque = np.array([pin.rnea(robot.model, data, *state) for state in states])
+        torque = inverse_dynamics(robot.model, motion.q, motion.dq, motion.ddq)
     return np.asarray(np.maximum(np.sum(torque * motion.dq, axis=1), 0.0))

@@ -1,7 +1,8 @@
-"""How far the rigid body and friction explain each torque, whatever the robot's parameters are."""
+"""How far the rigid body and friction explain each torque, whatever the robot's parameters are, however it is built."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ import pinocchio as pin
 from irtwin.check.moving import Moving
 from irtwin.robot.body_regressor import body_regressor
 from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import joint_motions
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.motion import Motion
 
 FEW_ROWS, MANY_ROWS = 900, 1500  # over all runs, of which a fault is looked for
@@ -32,8 +35,7 @@ class RigidBodyRows:
 
     def nominal(self) -> np.ndarray:
         """Return the torque by the URDF's bodies, (N, n)."""
-        data, states = self.model.createData(), zip(self.q, self.dq, self.ddq, strict=True)
-        return np.array([pin.rnea(self.model, data, *state) for state in states])
+        return inverse_dynamics(self.model, self.q, self.dq, self.ddq)
 
     def columns(self) -> np.ndarray:
         """Return what bodies and, at each joint for itself, rotor and friction add to the torques, (N, n, 14 n)."""
@@ -99,6 +101,30 @@ def _alike(motions: list[Motion]) -> list[Motion]:
 
 def _at(times: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(times, time, column) for column in values.T])
+
+
+def tilted(model: pin.Model, by: tuple[float, float, float]) -> pin.Model:
+    """Return the model with its base turned by a small vector (3,), rad."""
+    copied = model.copy()
+    copied.gravity.linear = model.gravity.linear + np.cross(by, model.gravity.linear)
+    return copied
+
+
+def turned_axes(model: pin.Model) -> Iterator[tuple[int, pin.Model]]:
+    """Yield each joint, from 0, with the model in which its axis is turned by a quarter, about either normal of it.
+
+    At zero all links stay where they are.
+    """
+    for joint, motion in enumerate(joint_motions(model), start=1):
+        axis = motion[:3] + motion[3:]  # a joint slides or turns
+        normal = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        for about in (normal, np.cross(axis, normal)):
+            turn = pin.SE3(pin.AngleAxis(np.pi / 2, about / np.linalg.norm(about)).matrix(), np.zeros(3))
+            copied = model.copy()
+            copied.jointPlacements[joint] = model.jointPlacements[joint] * turn
+            for child in model.children[joint]:
+                copied.jointPlacements[child] = turn.inverse() * model.jointPlacements[child]
+            yield joint - 1, copied
 
 
 def friction(speed: np.ndarray) -> np.ndarray:

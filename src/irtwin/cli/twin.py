@@ -238,7 +238,6 @@ def diagnose(
     """
     from irtwin.diagnosing import diagnose as judge
     from irtwin.report.gap import summary
-    from irtwin.report.gap.meanings import meanings
     from irtwin.report.terminal import show
     from irtwin.simulator.differences import not_held
 
@@ -275,7 +274,7 @@ def diagnose(
             click.echo()
             show(table, counted=False)
     kept = summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else []
-    for said in meanings(diagnosis.document):
+    for said in summary.meanings(diagnosis.document):
         click.echo(said)
     for some in filter(None, (kept, summary.next_steps(diagnosis.document))):
         click.echo("\n" + "\n".join(some))

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
 from irtwin.errors import InputError
-from irtwin.fleet.batch import DONE, FAILED, REFUSED, Batch, Record
+from irtwin.fleet.batch import DONE, FAILED, REFUSED, STOPPED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
-from irtwin.fleet.schedule import work_through
 from irtwin.storage import base_iri
 from irtwin.storage.files import inside
 
 _NAME = "batch_{:04d}"
+_WORKER = (sys.executable, "-m", "irtwin.fleet")
 _EVERY = 5.0  # s between two lines of how far a fleet is
 
 
@@ -59,6 +62,38 @@ def work(
     return status_of(batches)
 
 
+def work_through(
+    batches: Sequence[Batch], workers: int, tell: Callable[[Batch], None], command: Sequence[str] = _WORKER
+) -> None:
+    """Work on batches on this machine, `workers` at once; `tell` is called as each ends. `command`: as `in_process`."""
+    with ThreadPoolExecutor(workers) as pool:  # each thread waits for a process
+        own = {pool.submit(in_process, str(batch.folder), command): batch for batch in batches}
+        for future in as_completed(own):
+            future.result()
+            tell(own[future])
+
+
+def in_process(folder: str, command: Sequence[str] = _WORKER) -> None:
+    """Work through a batch in a process of its own, begun again where it dies; a store is bound to one thread.
+
+    Each death counts against the data set that it died of. Raises InputError where a process dies without a record,
+    or stops as the batch's folder cannot be written.
+    """
+    batch = Batch(Path(folder))
+    before = list(batch.records())
+    while (done := subprocess.run([*command, folder], stderr=subprocess.PIPE, text=True, check=False)).returncode != 0:
+        if done.returncode == STOPPED:
+            raise InputError(done.stderr.strip())
+        sys.stderr.write(done.stderr)
+        after = list(batch.records())
+        if after == before:
+            raise InputError(
+                f"{folder}: its process ended with status {done.returncode} and left no record; see what it wrote"
+            )
+        before = after
+    sys.stderr.write(done.stderr)
+
+
 @contextmanager
 def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
     """Call a function each five seconds while the block runs, and more seldom where it takes long itself."""
@@ -80,14 +115,7 @@ def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
         teller.join()
 
 
-def _plan(
-    places: Sequence[str],
-    folder: Path,
-    kind: str,
-    size: int,
-    workers: int,
-    base: str | None,
-) -> None:
+def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int, base: str | None) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
     there = batches_of(folder)
     if there and {one.sets.kind for one in there} != {kind}:
@@ -115,17 +143,12 @@ def status_of(batches: Sequence[Batch]) -> FleetStatus:
     """Count what became of the data sets of some batches."""
     counts: Counter[str] = Counter()
     aside = []
-    for record in _records(batches):
+    for record in (record for one in batches for record in one.records()):
         state = record.state if record is not None and record.final else "left"
         counts[state] += 1
         if record is not None and state in (REFUSED, FAILED):
             aside.append(record)
     return FleetStatus(counts, tuple(aside))
-
-
-def _records(batches: Sequence[Batch]) -> Iterator[Record | None]:
-    for one in batches:
-        yield from one.records()
 
 
 def _line(counts: Counter[str]) -> str:

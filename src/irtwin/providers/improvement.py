@@ -12,7 +12,6 @@ from datetime import UTC, datetime
 
 from sqlalchemy import func, select
 
-from irtwin.document.experiment import Experiment
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
@@ -49,11 +48,10 @@ class Round:
 
 @dataclass(frozen=True)
 class Improved:
-    """The rounds, whether the twin is within the limit on every run, and what a diagnosis would measure next."""
+    """The rounds, and whether the twin is within the limit on every run."""
 
     rounds: tuple[Round, ...]
     within: bool
-    experiment: Experiment | None
 
 
 @dataclass
@@ -88,7 +86,6 @@ def improve(
     loop.try_out(_SAME, lambda: replace(fit(twin.effects), choices=twin.choices), parts)
     if not loop.within and fitted.effects is None:
         loop.try_out(_CHOSEN, lambda: identified(fitted, parts.fit), parts)
-    experiment = None
     if not loop.within:
         announce("  looking for effects that the twin lacks")
         try:
@@ -96,12 +93,11 @@ def improve(
         except InputError as error:
             announce(f"  these runs do not say: {error}")
         else:
-            experiment = diagnosis.experiment
             effects = None if diagnosis.twin is None else diagnosis.twin.effects
             if effects is not None and effects != loop.best.twin.effects:
                 loop.try_out(_DIAGNOSED, lambda: fit(effects), parts)
     _keep_twin(workspace, robot_id, known, loop.best)
-    return Improved(tuple(loop.rounds), loop.within, experiment)
+    return Improved(tuple(loop.rounds), loop.within)
 
 
 @dataclass

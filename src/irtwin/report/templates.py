@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import jinja2
-from jinja2.bccache import Bucket
 from jinja2.sandbox import SandboxedEnvironment
 from markupsafe import Markup
 
@@ -18,23 +18,6 @@ from irtwin.report.questions import effect_name
 from irtwin.resources import MOST_BYTES, Resources
 
 
-class _CompiledTemplates(jinja2.BytecodeCache):
-    """Templates compiled in this process; one whose text changed is compiled again."""
-
-    def __init__(self) -> None:
-        self.kept: dict[str, bytes] = {}  # of each template, as bytes that tell which text it is of
-
-    def load_bytecode(self, bucket: Bucket) -> None:
-        if bucket.key in self.kept:
-            bucket.bytecode_from_string(self.kept[bucket.key])
-
-    def dump_bytecode(self, bucket: Bucket) -> None:
-        self.kept[bucket.key] = bucket.bytecode_to_string()
-
-
-_COMPILED = _CompiledTemplates()
-
-
 def written(resources: Resources, template: str, **values: Any) -> str:
     """Return the page that a template makes of values. InputError where an extension is why it cannot be made."""
     if any(file.is_extension for file in resources.of("reports", ".html.jinja")):
@@ -42,8 +25,9 @@ def written(resources: Resources, template: str, **values: Any) -> str:
     return environment(resources).get_template(template).render(**values)
 
 
+@lru_cache(maxsize=8)
 def environment(resources: Resources) -> jinja2.Environment:
-    """Return the templates of reports, with the filters that pages use.
+    """Return the templates of reports, each compiled once, with the filters that pages use; who adds any overlays it.
 
     They run in a sandbox, as a workspace from elsewhere may bring some.
     """
@@ -58,7 +42,6 @@ def environment(resources: Resources) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        bytecode_cache=_COMPILED,
     )
     words = (
         wording.number, wording.quantity, wording.percent, wording.share, wording.energy, wording.duration,

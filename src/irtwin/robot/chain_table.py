@@ -69,11 +69,7 @@ def _chain(robot: Robot, tip: str) -> tuple[list[int], np.ndarray]:
     model, data = robot.model, robot.model.createData()
     frame = link_frame(robot, tip)
     pin.framesForwardKinematics(model, data, np.zeros(model.nq))
-    chain: list[int] = []
-    joint = model.frames[frame].parentJoint
-    while joint > 0:
-        chain.insert(0, joint)
-        joint = model.parents[joint]
+    chain = list(model.supports[model.frames[frame].parentJoint])[1:]  # but for the base
     if not chain:
         raise InputError(f'{robot.name}: no joint moves the link "{tip}"; name a link further out')
     return chain, np.array(data.oMf[frame].homogeneous)

@@ -37,6 +37,12 @@ def build_model(urdf: str) -> pin.Model:
     return pin.buildModelFromXML(tostring(root, encoding="unicode"))
 
 
+def inverse_dynamics(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+    """Return (N, n) the torque that moves a model's bodies so, N m or N; q, dq, ddq: (N, n)."""
+    data = model.createData()
+    return np.array([pin.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
+
+
 def mean_inertia(model: pin.Model) -> np.ndarray:
     """Return (n,) the inertia that each joint moves while the others hold: the mean over poses that fill their ranges.
 

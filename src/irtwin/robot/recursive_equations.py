@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.robot.description import Robot
 from irtwin.robot.equations import deviation_of, latex_names, library, symbols_of
+from irtwin.robot.kinematics import joint_motions
 
 _DUST = 1e-12  # of metres, radians and kg: what rounding leaves
 _DIGITS = 6  # of a coefficient that is shown
@@ -91,6 +91,7 @@ class _Recursion:
     def __init__(self, robot: Robot):
         """Take the robot's tree."""
         self._sympy, self._model = library(), robot.model
+        self._motions = joint_motions(robot.model)
         self._q, self._dq, self._ddq = symbols_of(len(robot.joints))
         self.steps: list[tuple[Any, Any]] = []
 
@@ -140,8 +141,7 @@ class _Recursion:
 
     def _frame(self, joint: int) -> _Frame:
         model, q = self._model, self._q[joint - 1]
-        jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-        linear, angular = np.split(np.reshape(jacobian, (6, -1))[:, joint - 1], 2)
+        linear, angular = np.split(self._motions[joint - 1], 2)
         fixed = model.jointPlacements[joint]
         shift = self._vector(fixed.translation)
         if np.linalg.norm(linear) > np.linalg.norm(angular):

@@ -100,13 +100,8 @@ def _check_folder(folder: Path, name: str) -> None:
 
 def _chain(robot: Robot) -> list[str]:
     """Return the moving joints from the base to the flange."""
-    model = robot.model
-    at = flange_frame(robot).parentJoint
-    links: list[str] = []
-    while at > 0:
-        links.append(model.names[at])
-        at = model.parents[at]
-    return links[::-1]
+    carriers = robot.model.supports[flange_frame(robot).parentJoint]
+    return [robot.model.names[joint] for joint in carriers if joint]
 
 
 def _unchecked(model: CollisionModel) -> list[str]:

@@ -21,10 +21,9 @@ from irtwin.providers.mesh_files import meshes_of_graph
 from irtwin.providers.names import robot_iri
 from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.serve.page import FOLDER, POLICY
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import SERVER_FAILS, Refusal
 from irtwin.serve.samples import Page, Samples
 from irtwin.serve.shares import client
-from irtwin.serve.worker import SERVER_FAILS
 from irtwin.virtual.robot_data import robot_data
 
 _MOST_ROBOTS = 64  # that are remembered as drawn

@@ -25,11 +25,10 @@ from irtwin.knowledge.store.sparql_server import ServerFault
 from irtwin.limits import limit_memory, limit_processor_time
 from irtwin.location import Location
 from irtwin.serve import negotiation
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import SERVER_FAILS, Refusal
 from irtwin.storage import windows  # noqa: F401  # before the memory is limited, not with the first query for samples
 
 FRAME = struct.Struct(">cI")
-SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 _MOST_KEPT = 1 << 16  # bytes of an answer that is kept
 _PIECE = 1 << 20  # bytes; a failure before the first piece is full can still be told as such
 

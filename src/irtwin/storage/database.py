@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, Table, exists, func, select, update
+from sqlalchemy import URL, Engine, Table, exists, func, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -413,6 +413,20 @@ class Workspace:
             with self._writing() as session:
                 Base.metadata.drop_all(session.connection(), other)
                 Base.metadata.create_all(session.connection(), list(tables))
+
+
+@contextmanager
+def in_memory(rows: Iterable[Base]) -> Iterator[Engine]:
+    """Give a database with all tables of a workspace that holds these rows alone; it is gone afterwards."""
+    package_tables()
+    opened = engine.open_engine("sqlite://")
+    try:
+        with engine.writing(opened) as session:
+            Base.metadata.create_all(session.connection())
+            insert_rows(session, rows)
+        yield opened
+    finally:
+        opened.dispose()
 
 
 def _told(run: Run) -> str:

@@ -59,6 +59,6 @@ def _misses(judged: Row, answers: Answers) -> str:
 
 
 def _best(rows: Sequence[Row], parts: Sequence[tuple[str, str]]) -> Row | None:
-    by_part = {row["part"]: row for row in rows}
     """Return the row of the first part that there is, with the data it was judged on in words, `on`."""
+    by_part = {row["part"]: row for row in rows}
     return next(({**by_part[part], "on": on} for part, on in parts if part in by_part), None)

@@ -32,8 +32,8 @@ from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot
 from irtwin.robot.meshes import Mesh
 from irtwin.signals.log import DataSet
+from irtwin.storage.database import in_memory
 from irtwin.storage.files import write
-from irtwin.storage.in_memory import in_memory
 from irtwin.virtual.apart import apart_html
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
 from irtwin.document.document import Cause, Document, Finding, pooled
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
+from irtwin.knowledge.vocabulary import EFFECT
 from irtwin.report.gap import findings
 from irtwin.report.gap.verdict import closes, differing, misses, where
 from irtwin.report.wording import listed
@@ -15,6 +17,9 @@ _DIGITS = 3  # significant ones: more than any interval leaves sure
 _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
 _STEPS = 3  # motions to log that are told
+_MEANINGS = """SELECT ?effect ?name ?meaning {
+    ?effect irt:has_Effect_Parameter ?parameter . ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
+}"""
 
 
 def line(diagnosis: Document, against: str | None) -> str:
@@ -164,6 +169,21 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
                 "unit": "" if one.unit == "1" else one.unit,
             }
             first = dict.fromkeys(first)  # said once
+
+
+def meanings(diagnosis: Document) -> list[str]:
+    """Return what each parameter of the causes that matter means, in the ontology's words, as far as it has any."""
+    told = {  # each once, and of a vector's parts ("f_x") the whole
+        (cause.effect, one.name.partition("_")[0]): None for cause in diagnosis.mattering for one in cause.parameters
+    }
+    if not told:
+        return []
+    with KnowledgeGraph() as graph:
+        graph.load_ontology()
+        said = {(row["effect"].removeprefix(EFFECT), row["name"]): row["meaning"] for row in graph.query(_MEANINGS)}
+    return [
+        f"{name} of {effect.replace('_', ' ')}: {said[effect, name]}" for effect, name in told if (effect, name) in said
+    ]
 
 
 def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:

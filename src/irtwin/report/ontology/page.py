@@ -106,9 +106,8 @@ def _stem(file: Resource) -> str:
 def page(modules: list[Module]) -> str:
     """Return the page."""
     known = {term.iri: term for module in modules for group in module.terms.values() for term in group}
-    templates = environment(shipped())
-    templates.filters["link"] = lambda iri: _link(iri, known)
-    templates.filters["short"] = short
+    templates = environment(shipped()).overlay()
+    templates.filters = templates.filters | {"link": lambda iri: _link(iri, known), "short": short}
     return templates.get_template("ontology/page.html.jinja").render(
         modules=modules,
         kinds=KINDS,

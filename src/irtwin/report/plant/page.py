@@ -71,12 +71,11 @@ def compile_templates(base: str) -> None:
 
 @cache
 def _templates(base: str) -> jinja2.Environment:
-    templates = environment(resources.shipped())
-    templates.loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
-    templates.filters |= {
-        function.__name__: partial(function, base=base) for function in (links.page_of, links.individual, links.tail)
-    }
-    templates.filters |= {"kwh": kwh, "spaced": _spaced, "pages": pages, "on_page": on_page}
+    loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
+    templates = environment(resources.shipped()).overlay(loader=loader)
+    of_base = {one.__name__: partial(one, base=base) for one in (links.page_of, links.individual, links.tail)}
+    own = {"kwh": kwh, "spaced": _spaced, "pages": pages, "on_page": on_page}
+    templates.filters = templates.filters | of_base | own
     return templates
 
 
