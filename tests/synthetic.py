@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.robot.description import Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import Run
@@ -69,9 +69,7 @@ def truth(robot: Robot) -> dict[str, np.ndarray]:
 
 def rigid_torque(robot: Robot, motion: Motion) -> np.ndarray:
     """Inverse dynamics by recursive Newton-Euler, (N, n)."""
-    data = robot.model.createData()
-    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
-    return np.array([pin.rnea(robot.model, data, *state) for state in states])
+    return inverse_dynamics(robot.model, motion.q, motion.dq, motion.ddq)
 
 
 def measure(robot: Robot, motion: Motion, noise: float = 0.0, constant: float = 8.0, seed: int = 0) -> Motion:

@@ -10,13 +10,14 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
-from tests.flange import flange_position
 from tests.synthetic import arm, rigid_torque, swing, truth, with_constants
 
 from irtwin.effects import compliance, disturbance, drive, friction, load, local, sensing, supply, transmission
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.effect import Effect, Predicted
 from irtwin.effects.stack import Stack
+from irtwin.robot.kinematics import placements
+from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.urdf import parse_urdf
 from irtwin.twin.files import load as load_twin
 from irtwin.twin.files import to_json
@@ -125,9 +126,8 @@ def tilted(state, x=0.05, y=-0.03):
     model = ROBOT.model.copy()
     turn = pin.rpy.rpyToMatrix(x, y, 0.0)
     model.gravity.linear = turn @ model.gravity.linear
-    data = model.createData()
-    states = zip(state.motion.q, state.motion.dq, state.motion.ddq, strict=True)
-    return np.array([pin.rnea(model, data, *each) for each in states]) - state.rigid
+    motion = state.motion
+    return inverse_dynamics(model, motion.q, motion.dq, motion.ddq) - state.rigid
 
 
 def ball(state):
@@ -143,7 +143,7 @@ def push(state, force=(30.0, -20.0, 40.0)):
     """A force at the flange from second 4 to 9, through the slope of the flange's place."""
     q, step = state.motion.q, 1e-6
     slopes = [
-        (flange_position(ROBOT, q + step * e) - flange_position(ROBOT, q - step * e)) / (2 * step) for e in np.eye(3)
+        (placements(ROBOT, q + step * e) - placements(ROBOT, q - step * e))[:, :3, 3] / (2 * step) for e in np.eye(3)
     ]
     during = (state.motion.time >= 4) & (state.motion.time <= 9) & (state.motion.run == "swing_1")
     return np.column_stack([slope @ np.array(force) for slope in slopes]) * during[:, None]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 from tests.fuzz.drawn_robots import RobotPlan, joint_names, robots, urdf
 
 from irtwin.errors import InputError
+from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.urdf import parse_urdf
 
 
@@ -138,8 +138,7 @@ def _torque(robot: str, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.nd
         return np.zeros_like(q)
     if model.nv != q.shape[1]:
         return np.zeros_like(q)
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
+    return inverse_dynamics(model, q, dq, ddq)
 
 
 _CHANNELS = ("zero", "constant", "random", "huge", "tiny", "one dead", "last only")

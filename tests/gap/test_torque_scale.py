@@ -14,6 +14,7 @@ from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.finding import quantities
 from irtwin.robot.kinematics import flange
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
 from irtwin.twin.torque_scale import torque_scale
@@ -30,9 +31,7 @@ def loaded_torque(motion, mass):
     frame = model.frames[model.getFrameId(flange(ROBOT), pin.FrameType.BODY)]
     load = frame.placement.act(pin.Inertia(mass, np.array([0.02, 0.0, 0.1]), 1e-3 * mass * np.eye(3)))
     model.inertias[frame.parentJoint] = model.inertias[frame.parentJoint] + load
-    data = model.createData()
-    states = zip(motion.q, motion.dq, motion.ddq, strict=True)
-    return np.array([pin.rnea(model, data, *state) for state in states]) - rigid_torque(ROBOT, motion)
+    return inverse_dynamics(model, motion.q, motion.dq, motion.ddq) - rigid_torque(ROBOT, motion)
 
 
 def logged(gain, *, power):

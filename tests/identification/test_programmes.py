@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from tests.synthetic import arm, swing
+from tests.synthetic import arm, rigid_torque, swing
 
 from irtwin.document.form import to_json
 from irtwin.effects.catalogue import catalogue
@@ -73,9 +73,7 @@ def test_drives_that_are_weak_are_asked_for_gentler_moves(motions):
     def greatest(robot):
         made = next(one for one in programmes(robot, [], slow) if one.kind == "acceleration_steps")
         (motion,) = made.motions
-        states = zip(motion.q, motion.dq, motion.ddq, strict=True)
-        data = robot.model.createData()
-        return np.abs([pin.rnea(robot.model, data, *state) for state in states]).max(axis=0)
+        return np.abs(rigid_torque(robot, motion)).max(axis=0)
 
     strong = greatest(ROBOT)
     held = np.abs([pin.computeGeneralizedGravity(ROBOT.model, ROBOT.model.createData(), q) for q in slow[0].q]).max(

@@ -15,9 +15,10 @@ from tests.planning.boxes import arm, folded, twin_of
 
 from irtwin.errors import InputError
 from irtwin.planning.plan import Plan, Task, nominal_twin, plan
-from irtwin.planning.poses import Pose, flange_placement, read_target
+from irtwin.planning.poses import Pose, read_target
 from irtwin.planning.timing import MotionLimits
 from irtwin.robot.collision import CollisionModel, Obstacle
+from irtwin.robot.kinematics import placements
 from irtwin.twin.files import load, to_json
 
 pytestmark = pytest.mark.slow
@@ -65,11 +66,11 @@ def test_torque_limits_bind():
 
 def test_the_flange_goes_along_a_line():
     start = np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
-    goal = flange_placement(SIX, start)
+    goal = pin.SE3(placements(SIX, start[None])[0])
     goal.translation = goal.translation + np.array([0.05, 0.2, -0.1])
     angles = tuple(pin.rpy.matrixToRpy(goal.rotation))
     made = plan(nominal_twin(SIX), Task(start, Pose(tuple(goal.translation), angles), line=True))
-    places = np.array([flange_placement(SIX, q).translation for q in made.motion.q])
+    places = placements(SIX, made.motion.q)[:, :3, 3]
     along = (goal.translation - places[0]) / np.linalg.norm(goal.translation - places[0])
     away = (places - places[0]) - np.outer((places - places[0]) @ along, along)
     assert np.linalg.norm(away, axis=1).max() < 1e-4
@@ -151,13 +152,13 @@ def test_least_energy_costs_no_more_than_the_slowed_motion(folder):
 @pytest.mark.nightly
 def test_least_energy_along_a_line_changes_its_timing_alone():
     twin, start = twin_of(SIX), np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
-    goal = flange_placement(SIX, start)
+    goal = pin.SE3(placements(SIX, start[None])[0])
     goal.translation = goal.translation + np.array([0.05, 0.2, -0.1])
     task = Task(start, Pose(tuple(goal.translation), tuple(pin.rpy.matrixToRpy(goal.rotation))), line=True, seconds=1.0)
     slowed, least = plan(twin, task), plan(twin, replace(task, least_energy=True))
     assert least.price.energy.value < 0.999 * slowed.price.energy.value
     assert least.seconds == pytest.approx(slowed.seconds)
-    places = np.array([flange_placement(twin.robot, q).translation for q in least.motion.q])
+    places = placements(twin.robot, least.motion.q)[:, :3, 3]
     along = (goal.translation - places[0]) / np.linalg.norm(goal.translation - places[0])
     way = (places - places[0]) @ along
     assert np.linalg.norm(places - places[0] - np.outer(way, along), axis=1).max() < 1e-4

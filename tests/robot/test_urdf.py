@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from tests.flange import flange_position
 
 from irtwin.errors import InputError
-from irtwin.robot.kinematics import flange, link_placements
+from irtwin.robot.kinematics import flange, link_placements, placements
 from irtwin.robot.urdf import parse_urdf, read_urdf
 
 ARM = """<?xml version="1.0"?>
@@ -48,7 +47,7 @@ def test_kinematics_of_a_planar_elbow():
     robot = parse_urdf(ARM)
     assert flange(robot) == "tool"
     q = np.array([[0.0, 0.0], [np.pi / 2, 0.0], [0.0, -np.pi / 2]])
-    assert np.allclose(flange_position(robot, q), [[1.5, 0, 0], [0, 1.5, 0], [1, 0, 0.5]], atol=1e-12)
+    assert np.allclose(placements(robot, q)[:, :3, 3], [[1.5, 0, 0], [0, 1.5, 0], [1, 0, 0.5]], atol=1e-12)
     assert np.allclose(link_placements(robot, q[1])["fore"][:3, 3], [0, 1, 0], atol=1e-12)
 
 

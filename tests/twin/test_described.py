@@ -18,6 +18,7 @@ from irtwin.effects.rigid_body import model_of
 from irtwin.errors import InputError
 from irtwin.planning.plan import nominal_twin
 from irtwin.robot.mjcf_text import mjcf_text
+from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.sdf_text import sdf_text
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
@@ -47,8 +48,7 @@ def states(twin: Twin) -> Motion:
 
 
 def torque(model: pin.Model, motion: Motion) -> np.ndarray:
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(motion.q, motion.dq, motion.ddq, strict=True)])
+    return inverse_dynamics(model, motion.q, motion.dq, motion.ddq)
 
 
 @pytest.mark.parametrize("slides", [(), (1,)])

@@ -10,9 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.data_sets import irtwin, write
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, measure, rigid_torque, swing
 
 from irtwin.effects.rigid_body import flange_frame
+from irtwin.robot.model import inverse_dynamics
 from irtwin.twin.files import to_json
 from irtwin.twin.identify import identify
 
@@ -27,9 +28,7 @@ def loaded(motion):
     model = robot.model.copy()
     load = pin.Inertia(MASS, frame.placement.act(np.array(COM)), np.zeros((3, 3)))
     model.inertias[frame.parentJoint] += load
-    data, bare = model.createData(), robot.model.createData()
-    states = list(zip(motion.q, motion.dq, motion.ddq, strict=True))
-    added = np.array([pin.rnea(model, data, *s) - pin.rnea(robot.model, bare, *s) for s in states])
+    added = inverse_dynamics(model, motion.q, motion.dq, motion.ddq) - rigid_torque(robot, motion)
     shown = measure(robot, motion)
     return replace(shown, torque=shown.torque + added, payload_mass=MASS, payload_com=COM)
 

@@ -11,9 +11,11 @@ import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
-from irtwin.planning.poses import flange_placement, follow
+from irtwin.planning.poses import follow
 from irtwin.robot.collision import STEP, CollisionModel
 from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import placements
+from irtwin.signals.sampling import interpolated
 
 LONGEST_SEARCH = 10.0  # s
 _SHORTCUTS = 60
@@ -44,7 +46,7 @@ def line_path(robot: Robot, collisions: CollisionModel, start: np.ndarray, goal:
     or leads into a collision, and says where.
     """
     limits = JointLimits.of(robot)
-    first, last = flange_placement(robot, start), flange_placement(robot, goal)
+    first, last = (pin.SE3(pose) for pose in placements(robot, np.array([start, goal])))
     length = float(np.linalg.norm(last.translation - first.translation))
     turn = pin.log3(first.rotation.T @ last.rotation)
     count = max(10, int(np.ceil(length / _LINE)), int(np.ceil(np.linalg.norm(turn) / _TURN)))
@@ -66,6 +68,11 @@ def line_path(robot: Robot, collisions: CollisionModel, start: np.ndarray, goal:
 def clear_between(collisions: CollisionModel, start: np.ndarray, goal: np.ndarray) -> bool:
     """Return whether nothing touches on the straight way in joint space, checked every STEP of the fastest point."""
     return collisions.first_meeting(np.array([0.0, 1.0]), np.array([start, goal]))[0] is None
+
+
+def way_along(corners: np.ndarray) -> np.ndarray:
+    """Return how far each corner (k, n) lies along the straight lines between them, (k,)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
 
 
 def _search(
@@ -117,13 +124,12 @@ def _shortened(collisions: CollisionModel, corners: np.ndarray) -> np.ndarray:
     """Return the path with random shortcuts between points of it (Geraerts and Overmars, 2007)."""
     random = np.random.default_rng(_SEED)
     for _ in range(_SHORTCUTS):
-        lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-        way = np.concatenate([[0.0], np.cumsum(lengths)])
+        way = way_along(corners)
         a, b = np.sort(random.uniform(0, way[-1], 2))
         first, last = np.searchsorted(way, [a, b])
         if first == last:
             continue
-        ends = [np.array([np.interp(at, way, joint) for joint in corners.T]) for at in (a, b)]
+        ends = interpolated(way, corners, np.array([a, b]))
         if clear_between(collisions, *ends):
             corners = np.array([*corners[:first], *ends, *corners[last:]])
             keep = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > 1e-9])

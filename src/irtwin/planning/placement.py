@@ -84,13 +84,9 @@ class _Way:
 
     def _smooth(self, q: np.ndarray) -> Motion:
         """Return the motion through positions at the poses, (M, n)."""
-        motion = self._motion
-        spline = scipy.interpolate.CubicSpline(motion.time[self._knots], q)
-        q, dq, ddq = (spline(motion.time, order) for order in range(3))
-        return Motion(
-            motion.time, q, dq, ddq,
-            run=motion.run, payload_mass=motion.payload_mass, payload_com=motion.payload_com,
-        )  # fmt: skip
+        time = self._motion.time
+        spline = scipy.interpolate.CubicSpline(time[self._knots], q)
+        return self._motion.moved(time, *(spline(time, order) for order in range(3)))
 
     def _allowed(self, moved: Motion) -> bool:
         """Return whether joints keep to their limits of speed and torque, or to what they do today."""

@@ -13,7 +13,6 @@ from irtwin.identification.motion_limits import JointLimits
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.inverse_kinematics import nearest
-from irtwin.robot.kinematics import flange
 
 _STARTS = 60  # random joint positions from which a pose is sought
 _ANGLE = 0.3  # m/rad: how a wrong direction weighs beside a wrong place
@@ -73,13 +72,6 @@ def joints_for(
     pair = collisions.meeting(solutions[0])
     assert pair is not None
     raise InputError(f"{what} is in collision: {pair[0]} touches {pair[1]}; choose another one")
-
-
-def flange_placement(robot: Robot, q: np.ndarray) -> pin.SE3:
-    """Return the flange's transform in the base frame at the joint positions `q`: (n,)."""
-    model, data = robot.model, robot.model.createData()
-    pin.forwardKinematics(model, data, q)
-    return pin.updateFramePlacement(model, data, model.getFrameId(flange(robot), pin.FrameType.BODY))
 
 
 def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits) -> tuple[np.ndarray, float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.signals.motion import BRIEF, Motion, standstill
+from irtwin.signals.sampling import interpolated
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,9 @@ class SectionedMotion:
         while (gone := factors[own] == 0.0).any():  # the last sample may lie at the end of what is left out
             own[gone] -= 1
         at = old[own] + (time - new[own]) / factors[own]
-        q, dq, ddq = (
-            np.column_stack([np.interp(at, self.motion.time, column) for column in values.T])
-            for values in (self.motion.q, self.motion.dq, self.motion.ddq)
-        )
-        pace = factors[own][:, None]
-        return Motion(
-            time, q, dq / pace, ddq / pace**2,
-            run=self.motion.run, payload_mass=self.motion.payload_mass, payload_com=self.motion.payload_com,
-        )  # fmt: skip
+        motion, pace = self.motion, factors[own][:, None]
+        q, dq, ddq = (interpolated(motion.time, values, at) for values in (motion.q, motion.dq, motion.ddq))
+        return motion.moved(time, q, dq / pace, ddq / pace**2)
 
 
 def programme_of(motion: Motion, place: str) -> SectionedMotion:

@@ -11,6 +11,7 @@ import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
+from irtwin.planning.path import way_along
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import BRIEF, Motion, standstill, stretches
 
@@ -97,7 +98,7 @@ WRITERS = {".script": urscript, ".src": krl}
 
 def _between(q: np.ndarray, first: int, last: int) -> list[int]:
     """Return the samples between two at which a way of straight lines has to turn (Douglas and Peucker, 1973)."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q[first : last + 1], axis=0), axis=1))])
+    way = way_along(q[first : last + 1])
     share = way / max(way[-1], 1e-12)
     off = np.abs(q[first : last + 1] - (q[first] + share[:, None] * (q[last] - q[first]))).max(axis=1)
     worst = first + int(np.argmax(off))

@@ -11,7 +11,9 @@ import scipy
 
 from irtwin.errors import InputError
 from irtwin.identification.motion_limits import JointLimits
+from irtwin.planning.path import way_along
 from irtwin.robot.description import Robot
+from irtwin.signals.sampling import interpolated
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
@@ -94,11 +96,11 @@ def rounded(corners: np.ndarray, is_clear: Callable[[np.ndarray], bool]) -> BSpl
 
     `is_clear` judges dense points (N, n) of it. With ever shorter pieces it comes as near to the corners as need be.
     """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    way = way_along(corners)
     pieces = _PIECES
     while True:
         at = np.linspace(0, way[-1], pieces + 1)
-        path = _clamped(np.array([np.interp(at, way, joint) for joint in corners.T]).T)
+        path = _clamped(interpolated(way, corners, at))
         if pieces > _MOST_PIECES or is_clear(path(np.linspace(0, 1, 400))):
             return path
         pieces = pieces * 3 // 2
@@ -106,7 +108,7 @@ def rounded(corners: np.ndarray, is_clear: Callable[[np.ndarray], bool]) -> BSpl
 
 def through(poses: np.ndarray) -> BSpline:
     """Return the smooth path through near poses (k, n)."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(poses, axis=0), axis=1))])
+    way = way_along(poses)
     return scipy.interpolate.make_interp_spline(way / way[-1], poses, k=5)
 
 

@@ -80,7 +80,4 @@ def _held(motion: Motion, sample: int, seconds: float) -> Motion:
     count = max(2, round(seconds * motion.rate) + 1)
     q = np.repeat(motion.q[sample : sample + 1], count, axis=0)
     still = np.zeros_like(q)
-    return Motion(
-        np.linspace(0.0, seconds, count), q, still, still,
-        run=motion.run, payload_mass=motion.payload_mass, payload_com=motion.payload_com,
-    )  # fmt: skip
+    return motion.moved(np.linspace(0.0, seconds, count), q, still, still)

@@ -49,6 +49,10 @@ class Motion(Signals):
         """Return samples start..stop (exclusive) as a motion of the same run."""
         return replace(self.rows(slice(start, stop)), whole=self.whole or self, start=self.start + start)
 
+    def moved(self, time: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> Motion:
+        """Return another motion, (M,) and (M, n) each, of the same run and payload; nothing of it was measured."""
+        return Motion(time, q, dq, ddq, run=self.run, payload_mass=self.payload_mass, payload_com=self.payload_com)
+
 
 def standstill(motion: Motion) -> np.ndarray:
     """Return where no joint moves, (N,) bool."""

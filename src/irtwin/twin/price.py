@@ -116,15 +116,8 @@ def with_standing(motion: Motion, seconds: float) -> Motion:
     last = max(np.flatnonzero(standstill(motion)), default=count - 1)
     rows = np.insert(np.arange(count), last, np.full(more, last))
     moves = np.insert(np.ones(count), last, np.zeros(more))[:, None]
-    return Motion(
-        motion.time[0] + np.arange(count + more) / motion.rate,
-        motion.q[rows],
-        motion.dq[rows] * moves,
-        motion.ddq[rows] * moves,
-        run=motion.run,
-        payload_mass=motion.payload_mass,
-        payload_com=motion.payload_com,
-    )
+    time = motion.time[0] + np.arange(count + more) / motion.rate
+    return motion.moved(time, motion.q[rows], motion.dq[rows] * moves, motion.ddq[rows] * moves)
 
 
 def _left(twin: Twin, parts: Sequence[tuple[Motion, np.ndarray]]) -> list[float]:
