@@ -34,7 +34,7 @@ class Broker:
         return f"MQTT broker at {self.host}:{self.port}"
 
 
-class Connection:
+class BrokerConnection:
     """A connection to a broker; nobody waits for it. A fault is announced once, and again after it was over."""
 
     def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
@@ -84,7 +84,7 @@ class Connection:
         self._fault = fault
 
 
-class AlarmTopic(Connection):
+class AlarmTopic(BrokerConnection):
     """Publishes messages on a broker's topic; what waits while the broker is down is kept, and told when it is back."""
 
     def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from itertools import count
 from typing import Any
 
-from irtwin.alarms.mqtt import Broker, Connection
+from irtwin.alarms.mqtt import Broker, BrokerConnection
 
 METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
@@ -26,7 +26,7 @@ Metric = tuple[str, int, Any]  # name, type, value; None: not known
 Row = Mapping[str, Any]
 
 
-class EdgeNode(Connection):
+class EdgeNode(BrokerConnection):
     """Tells a broker of robots. Who sends its commands is answered by new births: nothing else can be commanded."""
 
     def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:

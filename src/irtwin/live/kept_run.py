@@ -6,21 +6,22 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from irtwin.errors import InputError
 from irtwin.live import live_run
-from irtwin.live.live_run import Tables, Values
 from irtwin.providers import live_energy
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
-from irtwin.storage.journal import DamagedJournal, Header, Rows, left_behind, read_journal
-from irtwin.storage.rows import values
+from irtwin.storage.journal import DamagedJournal, Header, left_behind, read_journal
+from irtwin.storage.rows import Tables, Values, values
 from irtwin.storage.schema import Activity, Base, Run, RunEnergy, relation_to
 
 Announce = Callable[[str], None]
 
 
-def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announce: Announce) -> Tables:
+def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, announce: Announce) -> Tables:
     """Put a run into the database, unless it is there; return its rows.
 
     counts: what its live_state says beside. Its energy is worked out from all samples once more, so it is the same
@@ -44,7 +45,7 @@ def keep(place: Workspace, header: Header, samples: Rows, counts: Values, announ
     return tables
 
 
-def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, Header, Rows]]:
+def left_by_a_crash(folder: Path, announce: Announce) -> list[tuple[InsidePath, Header, np.ndarray]]:
     """Return the journals of runs that a crash ended; what cannot be read is put aside and announced."""
     left = []
     for path in left_behind(folder):
@@ -97,7 +98,7 @@ def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | N
         return None
 
 
-def _measured(header: Header, samples: Rows) -> Tables:
+def _measured(header: Header, samples: np.ndarray) -> Tables:
     energy = LiveEnergy(header.run_id, header.robot_id, live_run.joints_of(header.columns), None, kind=header.kind)
     energy.feed(dict(zip(header.columns, samples.T, strict=True)), last=True)
     return energy_tables(energy, header, float(samples[0, 0]))

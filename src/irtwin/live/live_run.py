@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import chain
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -17,11 +16,10 @@ from irtwin.providers.live_energy import watching
 from irtwin.providers.names import run_iri
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.signals.motion import STILL_SHARE, STILL_SPEED
-from irtwin.storage.journal import Header, Rows
+from irtwin.storage.journal import Header
+from irtwin.storage.rows import Tables, Values
 from irtwin.storage.schema import LIVE, moment_of
 
-Values = dict[str, Any]
-Tables = dict[str, list[Values]]  # table -> rows, by column
 _COM = tuple(f"payload_com_{axis}_m" for axis in "xyz")
 
 
@@ -48,7 +46,7 @@ def joints_of(columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(name.removeprefix(prefix) for name in columns if name.startswith(prefix))
 
 
-def journal_rows(states: Sequence[State]) -> Rows:
+def journal_rows(states: Sequence[State]) -> np.ndarray:
     """Return states as rows of a journal, (N, columns)."""
     return np.array([(state.time, *chain.from_iterable(state.values)) for state in states])
 
@@ -95,7 +93,7 @@ def rows(
     }
 
 
-def closed_rows(header: Header, samples: Rows, live: Values) -> tuple[Tables, pa.Table]:
+def closed_rows(header: Header, samples: np.ndarray, live: Values) -> tuple[Tables, pa.Table]:
     """Return the rows of a run that is over, and its series: a channel that was never said is left out."""
     joints = joints_of(header.columns)
     columns = dict(zip(header.columns, samples.T, strict=True))
@@ -146,13 +144,13 @@ def together(*parts: Tables) -> Tables:
     return tables
 
 
-def _speeds(signals: Signals) -> Rows:
+def _speeds(signals: Signals) -> np.ndarray:
     """Return the speeds that were said, else those by which positions differ, (N, n); NaN at the first then."""
     steps = np.diff(signals.q, axis=0, prepend=np.nan) / np.diff(signals.time, prepend=np.nan)[:, None]
     return steps if signals.dq is None else np.where(np.isnan(signals.dq), steps, signals.dq)
 
 
-def _last(signals: Signals, field: str) -> Rows:
+def _last(signals: Signals, field: str) -> np.ndarray:
     """Return a channel's last values, (n,); NaN where it was never said."""
     values = getattr(signals, field)
     return np.full(signals.q.shape[1], np.nan) if values is None else values[-1]

@@ -15,6 +15,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Self
 
+import numpy as np
 from pyoxigraph import Quad
 
 from irtwin.errors import InputError
@@ -30,7 +31,8 @@ from irtwin.live.watched_run import WatchedRun
 from irtwin.providers.planner import renew
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
-from irtwin.storage.journal import Header, Rows, read_journal
+from irtwin.storage.journal import Header, read_journal
+from irtwin.storage.rows import Values
 from irtwin.storage.schema import LIVE, LIVE_RUN
 
 BATCH = 0.1  # s between two writes to the journals: what a crash loses at most
@@ -354,7 +356,7 @@ class LiveTwin:
             self._refresh()
 
     def _close(
-        self, path: InsidePath, header: Header, samples: Rows, counts: live_run.Values, shown: set[Quad] | None
+        self, path: InsidePath, header: Header, samples: np.ndarray, counts: Values, shown: set[Quad] | None
     ) -> None:
         """Make a run of a journal, in the database and in the graph, and drop the journal."""
         if len(samples):

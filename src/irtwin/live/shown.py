@@ -18,9 +18,10 @@ from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_OWL_RL, GRAPH_SHACL, GRAPH_SOURCE, term
-from irtwin.live.live_run import Tables, activities
+from irtwin.live.live_run import activities
 from irtwin.providers.names import run_iri
 from irtwin.storage.database import Workspace
+from irtwin.storage.rows import Tables
 
 _STATE, _REASON = term("Alarm_State"), term("Alarm_Reason")
 _BESIDE = """CONSTRUCT { ?s ?p ?o } WHERE {

@@ -19,6 +19,7 @@ from irtwin.live.shown import AlarmNews, ShownRuns
 from irtwin.live.stream_health import StreamHealth
 from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.journal import Header, Journal
+from irtwin.storage.rows import Tables, Values
 from irtwin.storage.schema import LIVE, moment_of
 from irtwin.twin.so_far import WatchedStretch
 
@@ -45,14 +46,14 @@ class WatchedRun:
     waiting: list[State] = field(default_factory=list)
     unworked: list[State] = field(default_factory=list)
     energy: LiveEnergy | None = None
-    energy_tables: live_run.Tables = field(default_factory=dict)
+    energy_tables: Tables = field(default_factory=dict)
     worked_at: float = -math.inf  # by the monotonic clock: when the energy was shown last
     health: StreamHealth = field(default_factory=StreamHealth)
     values: FrozenValues = field(default_factory=FrozenValues)
     alarms: AlarmNews = field(default_factory=AlarmNews)
     shown: set[Quad] | None = field(default_factory=set)
     standing_since: float | None = None  # s since 1970; None while a joint moves
-    _mapped: dict[str, tuple[list[live_run.Values], set[Quad]]] = field(default_factory=dict)
+    _mapped: dict[str, tuple[list[Values], set[Quad]]] = field(default_factory=dict)
     _stood: float | None = None  # s, of which the alarms are those of `_idle`: once a second is enough
     _idle: set[Quad] = field(default_factory=set)
     _kinds: set[Quad] = field(default_factory=set)  # which it is of stays the same
@@ -101,7 +102,7 @@ class WatchedRun:
         self.unworked.append(state)
         self.health.good(frozen)
 
-    def tables(self, waited: float) -> live_run.Tables:
+    def tables(self, waited: float) -> Tables:
         """Return the rows of the run as it is now."""
         now = self.newest
         assert now is not None
@@ -112,7 +113,7 @@ class WatchedRun:
         tables = live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
         return live_run.together(tables, self.energy_tables)
 
-    def mapped(self, tables: live_run.Tables, shown: ShownRuns) -> set[Quad]:
+    def mapped(self, tables: Tables, shown: ShownRuns) -> set[Quad]:
         """Return the quads of the rows and their alarms; those of tables that are as before are not made again."""
         for table, rows in tables.items():
             if table not in self._mapped or self._mapped[table][0] != rows:
@@ -134,7 +135,7 @@ class WatchedRun:
         rows = live_run.journal_rows(states)
         return self.energy.feed(dict(zip(self.header.columns, rows.T, strict=True)), least=LEAST)
 
-    def counts(self, waited: float) -> live_run.Values:
+    def counts(self, waited: float) -> Values:
         """Return what the graph says of how well it kept up, and how long the robot has been at rest."""
         counts = {"superseded_states": self.superseded, "waited_s": waited, **self.health.said()}
         if self.newest is None or self.standing_since is None:

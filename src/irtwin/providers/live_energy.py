@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -24,12 +23,11 @@ from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.storage import energy_schema, schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.rows import Tables, Values
 from irtwin.twin.gap_watch import ROBOT, GapWatch, Windows, band
 from irtwin.twin.so_far import EnergySoFar, WatchedStretch
 from irtwin.twin.twin import Twin
 
-Values = dict[str, Any]
-Tables = dict[str, list[Values]]
 _KINDS: Mapping[str, type[schema.Base]] = {
     "run_energy": schema.RunEnergy,
     "energy_share": energy_schema.EnergyShare,

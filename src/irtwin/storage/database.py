@@ -22,7 +22,7 @@ from irtwin.storage.migration import VERSION_TABLE, migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_rows
 from irtwin.storage.rows import (
-    Rows,
+    Tables,
     base_of,
     drop_activities,
     drop_data_set,
@@ -254,7 +254,7 @@ class Workspace:
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
-    def keep_run(self, run: Run, series: pa.Table, rows: Rows | None = None) -> None:
+    def keep_run(self, run: Run, series: pa.Table, rows: Tables | None = None) -> None:
         """Keep a run of no data set with its samples, and further rows about it, by table."""
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)

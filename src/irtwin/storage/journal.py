@@ -15,13 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from irtwin.json_text import parse_json
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.schema import LIVE_RUN, WATCHED_RUNS
 
-Rows = npt.NDArray[np.float64]
 _ENDING = ".journal"
 
 
@@ -52,7 +50,7 @@ class Journal:
         fcntl.flock(self._file, fcntl.LOCK_EX)
         self._write(json.dumps(asdict(header)).encode() + b"\n")
 
-    def append(self, rows: Rows) -> None:
+    def append(self, rows: np.ndarray) -> None:
         """Write rows, (N, columns): they outlive this process when this returns. OSError where the disk is full."""
         self._write(rows.tobytes())
 
@@ -66,7 +64,7 @@ class Journal:
             view = view[os.write(self._file, view) :]
 
 
-def read_journal(path: Path) -> tuple[Header, Rows]:
+def read_journal(path: Path) -> tuple[Header, np.ndarray]:
     """Read a journal; of a batch that a crash cut off, the whole rows before the cut. ValueError if it is none."""
     content = path.read_bytes()
     line, separator, data = content.partition(b"\n")

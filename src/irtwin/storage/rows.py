@@ -39,7 +39,8 @@ from irtwin.storage.schema import (
     in_utc,
 )
 
-Rows = dict[str, list[dict[str, Any]]]  # of each table, by its name
+Values = dict[str, Any]  # of a row, by column
+Tables = dict[str, list[Values]]  # rows, by table
 
 # table -> its columns that name files of the workspace, with those of their SHA-256
 FILES = {
@@ -64,7 +65,7 @@ class NamedFile:
     robot_id: str
 
 
-def values(row: Base) -> dict[str, Any]:
+def values(row: Base) -> Values:
     """Return a row's values, by column."""
     return {column.name: getattr(row, column.name) for column in row.__table__.columns}
 
@@ -90,20 +91,20 @@ def part_tables() -> list[Table]:
 
 def insert_rows(session: Session, rows: Iterable[Base]) -> None:
     """Insert rows, those first that others refer to."""
-    by_table: Rows = {}
+    by_table: Tables = {}
     for row in rows:
         by_table.setdefault(row.__tablename__, []).append(values(row))
     insert_values(session, by_table)
 
 
-def insert_values(session: Session, rows: Rows) -> None:
+def insert_values(session: Session, rows: Tables) -> None:
     """Insert rows of tables, those first that others refer to."""
     for table in Base.metadata.sorted_tables:
         if rows.get(table.name):
             session.execute(insert(table), rows[table.name])
 
 
-def recorded_rows(session: Session, robot_id: str) -> Rows:
+def recorded_rows(session: Session, robot_id: str) -> Tables:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
     there = filled(session.connection())
     return {
@@ -123,7 +124,7 @@ def filled(connection: Connection) -> list[Table]:
     return [tables[at] for (at,) in connection.exec_driver_sql(" UNION ALL ".join(asked))]
 
 
-def modelled_of_live_runs(session: Session, robot_id: str) -> Rows:
+def modelled_of_live_runs(session: Session, robot_id: str) -> Tables:
     """Return the rows of what a robot's twin says of its live runs."""
     made = set(session.scalars(_of_live(robot_id)))
     return {
@@ -142,7 +143,7 @@ def named_files(connection: Connection) -> list[NamedFile]:
     return files
 
 
-def files_of(rows: Rows) -> dict[str, str]:
+def files_of(rows: Tables) -> dict[str, str]:
     """Return the files of the workspace that rows name: path -> SHA-256."""
     return {
         row[file]: row[checksum]

@@ -12,7 +12,7 @@ from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import (
-    Rows,
+    Tables,
     drop_recorded,
     files_of,
     insert_values,
@@ -50,12 +50,12 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
             place.remove_orphans()
 
 
-def _rows(place: Workspace, robot_id: str) -> Rows:
+def _rows(place: Workspace, robot_id: str) -> Tables:
     with place.reading() as session:
         return recorded_rows(session, robot_id)
 
 
-def _put(source: Workspace, rows: Rows, target: Workspace, robot_id: str) -> set[str]:
+def _put(source: Workspace, rows: Tables, target: Workspace, robot_id: str) -> set[str]:
     """Make the rows, and the files that they name, all that the target has of the robot but its live runs.
 
     Returns the files that were whole; whoever needs another says so.
