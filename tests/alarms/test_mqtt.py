@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import queue
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 from tests.alarms import mosquitto
 from tests.sparql_servers import free_port
+from tests.waiting import wait_for
 
 from irtwin.alarms import mqtt
 from irtwin.alarms.mqtt import AlarmTopic, Broker
@@ -73,13 +73,10 @@ def test_what_came_while_a_broker_was_down_is_told_when_it_is_back(tmp_path: Pat
     topic = AlarmTopic(Broker("127.0.0.1", port, "plant/alarms"), said.append)
     for number in range(3):
         topic.put(b"%d" % number)
-    while not said:
-        time.sleep(0.01)
+    wait_for(lambda: said)
     with mosquitto.running(tmp_path, "allow_anonymous true", port):
         topic.put(b"3")
-        deadline = time.monotonic() + 30.0
-        while not topic._client.is_connected() and time.monotonic() < deadline:
-            time.sleep(0.05)
+        wait_for(topic._client.is_connected)
         topic.close()
     assert said == [f"MQTT broker at 127.0.0.1:{port}: it cannot be reached; trying again"]
 

@@ -6,12 +6,12 @@ import json
 import math
 import socket
 import time
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.waiting import wait_for
 
 from irtwin.live import broadcast
 from irtwin.live.broadcast import RECENT_SOCKET, SOCKET, Broadcast, reachable
@@ -31,13 +31,6 @@ def connect(folder: Path, to: Broadcast, count: int = 1) -> socket.socket:
         client.connect(address)
     wait_for(lambda: len(to._clients) >= count)
     return client
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    until = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < until, "it never came"
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize("folder", ["live", "/".join(["a-folder-with-a-long-name"] * 6)])

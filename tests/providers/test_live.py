@@ -15,6 +15,7 @@ import pytest
 from pyoxigraph import Quad
 from sqlalchemy import select
 from tests import rows
+from tests.waiting import wait_for
 
 from irtwin import resources
 from irtwin.errors import InputError
@@ -85,13 +86,6 @@ def mapped(place: Workspace) -> set[Quad]:
 def live_run(place: Workspace) -> Run:
     with place.reading() as session:
         return session.scalars(select(Run).where(Run.kind == "Live_Run")).one()
-
-
-def wait_for(condition) -> None:
-    until = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < until, "it never came"
-        time.sleep(0.01)
 
 
 def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, graph: KnowledgeGraph) -> None:

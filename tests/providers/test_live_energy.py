@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 from tests import small_robots, synthetic
+from tests.waiting import wait_for
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
@@ -73,13 +73,6 @@ def states(run: LoggedRun, torque: Callable[[float], float] = lambda at: 0.0, po
                 more = np.array([0.0, torque(at)]) if field == "torque" else 0.0
                 values.append(tuple((np.atleast_1d(said[row]) + more).tolist()))
         yield State("Arm", NOON + float(at), tuple(values))
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    until = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < until, "it never came"
-        time.sleep(0.02)
 
 
 def live_run(place: Workspace) -> schema.Run:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 
 import httpx
 import pytest
 from tests.endpoint import CLIENT, Server, serving
 from tests.killed_writers import broken_off, take_in
+from tests.waiting import wait_for
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
@@ -31,8 +31,7 @@ def get(server: Server, path: str, accept: str = "text/html") -> httpx.Response:
 
 
 def wait(server: Server, standing: str | None) -> None:
-    while server.ask("ASK {}").headers.get("irtwin-graph") != standing:
-        time.sleep(0.1)
+    wait_for(lambda: server.ask("ASK {}").headers.get("irtwin-graph") == standing, 300)
 
 
 @pytest.mark.nightly

@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from tests.waiting import wait_for
 
 from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
@@ -105,10 +106,7 @@ def test_a_client_that_leaves_in_mid_answer_ends_its_query(server) -> None:
         pieces = response.iter_bytes()  # a name for it: the client leaves as soon as nobody holds it
         assert next(pieces)
         assert before <= set(server.workers())
-    deadline = time.monotonic() + 20
-    while before <= set(server.workers()):
-        assert time.monotonic() < deadline, "the query goes on"
-        time.sleep(0.05)
+    wait_for(lambda: not before <= set(server.workers()), 20)  # else the query goes on
     assert settled(server, gone=(before - set(server.workers())).pop())
     assert server.ask("ASK {}").status_code == 200
 

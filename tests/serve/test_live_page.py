@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 from tests.endpoint import Server, serving
 from tests.forks import Command
 from tests.screens import faults, narrow_and_dark
+from tests.waiting import wait_for
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
@@ -69,13 +70,6 @@ def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server
                 return bool(answer.status_code == 200)
 
         wait_for(there_is_room)
-
-
-def wait_for(condition: Callable[[], Any]) -> None:
-    until = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < until, "it never came"
-        time.sleep(0.05)
 
 
 @pytest.mark.system

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import socket
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from asyncua.sync import Client
 from tests.endpoint import serving
 from tests.forks import Command
 from tests.plants import HOSTILE
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -41,10 +41,7 @@ def test_robots_are_read_by_opc_ua_and_nothing_is_written(plant_place: Path, tmp
     with socket.create_server(("127.0.0.1", 0)) as found:
         port = found.getsockname()[1]
     with serving(graph, "--opcua", port, token=None), Client(f"opc.tcp://127.0.0.1:{port}") as client:
-        ends = time.monotonic() + 20.0
-        while "LastGapDiagnosed" not in values(client, HOSTILE):  # the last that is made
-            assert time.monotonic() < ends
-            time.sleep(0.2)
+        wait_for(lambda: "LastGapDiagnosed" in values(client, HOSTILE))  # the last that is made
         arm = values(client, "Arm_A")
         assert (arm["State"], arm["LastGapVerdict"], arm["LastGapClosedFraction"]) == ("standstill", "attributed", 0.8)
         main = ("Monitoring", "Consumption", "Electricity", "Main")
