@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import signal
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import psutil
@@ -41,6 +43,13 @@ class Server:
     def update(self, text: str, token: str = TOKEN) -> httpx.Response:
         headers = {"Content-Type": "application/sparql-update", "Authorization": f"Bearer {token}"}
         return CLIENT.post(self.sparql, content=text, headers=headers)
+
+    def connected(self, sent: bytes, of: str = "127.0.0.1") -> socket.socket:
+        """Return a connection of one's own, `of` an address of this machine, by which so much was sent."""
+        address = urlsplit(self.url)
+        raw = socket.create_connection((address.hostname, address.port), timeout=10, source_address=(of, 0))
+        raw.sendall(sent)
+        return raw
 
     def workers(self) -> dict[int, float]:
         """Return the processor time in seconds of each worker that lives, by its process."""

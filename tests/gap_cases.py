@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from irtwin.document.curves import Curves
-from irtwin.document.document import Document
+from irtwin.document.document import CauseParameter, Document
 from irtwin.effects.catalogue import catalogue
 
 JOINTS = [f"joint_a{number}" for number in range(1, 7)]
@@ -68,6 +68,14 @@ def evidence(verdict: str) -> dict[str, Any]:
     time = [0.5 * step for step in range(100)]
     move = {"time": time, "joints": ["joint_a3"], "units": ["rad"], "q": [[math.sin(value) for value in time]]}
     return found | {"experiment": move if verdict == "ambiguous" else None}
+
+
+def parameter(value: float, interval: tuple[float, float] | None, simulator: float | None = None) -> CauseParameter:
+    """Return a parameter of a cause: how far one joint's dry friction is off a simulator's."""
+    return CauseParameter(
+        name="Fc", joint="joint_a2", value=value, unit="N m", interval95=interval, simulator=simulator,
+        robot=None if simulator is None else simulator + value,
+    )  # fmt: skip
 
 
 def _friction(joint: str, role: str, size: float) -> dict[str, Any]:

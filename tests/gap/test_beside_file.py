@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from tests.gap_cases import document
+from tests.gap_cases import document, parameter
 
 from irtwin.document.document import CauseParameter
 from irtwin.effects.effect import Term, quantity
@@ -30,13 +30,6 @@ def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model()
     assert not_held(SimpleNamespace(causes=(told,))) == (told,)
     coupled = replace(warm, effect="joint_coupling", parameters=(damping,))
     assert beside(model, coupled, {}) == coupled  # a friction of its own
-
-
-def parameter(value: float, interval: tuple[float, float] | None, simulator: float | None = None) -> CauseParameter:
-    return CauseParameter(
-        name="Fc", joint="joint_a2", value=value, unit="N m", interval95=interval, simulator=simulator,
-        robot=None if simulator is None else simulator + value,
-    )  # fmt: skip
 
 
 def test_friction_that_goes_with_what_no_file_holds_is_written_as_it_is_best_there():

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from tests.gap_cases import document
+from tests.gap_cases import document, parameter
 from tests.synthetic import arm
 
-from irtwin.document.document import CauseParameter
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import (
     _joints,
@@ -26,13 +25,6 @@ def test_members_are_the_cause_and_its_rivals_each_with_its_probability():
     one = replace(cause, evidence=replace(cause.evidence, probability_of_rivals=likely | {"backlash": 0.02}))
     told = {member.effect: member.confidence for member in _members(one)}
     assert told == {cause.effect: cause.confidence} | likely
-
-
-def parameter(value: float, interval: tuple[float, float] | None, simulator: float | None = None) -> CauseParameter:
-    return CauseParameter(
-        name="Fc", joint="joint_a2", value=value, unit="N m", interval95=interval, simulator=simulator,
-        robot=None if simulator is None else simulator + value,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

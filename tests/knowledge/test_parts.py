@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests import small_fleet
 from tests.individuals import individual
+from tests.knowledge.graphs import DRAWN, inferred, quad
 
 from irtwin import rewriting
 from irtwin.alarms.alarm import alarms
@@ -37,18 +38,8 @@ from irtwin.knowledge.vocabulary import (
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 
-SOURCE = GRAPH_SOURCE + "drawn"
 TYPE = RDF + "type"
 ROBOTS = ("r", "s")
-
-
-def quad(subject: str, predicate: str, value, graph: str = SOURCE) -> Quad:
-    return Quad(
-        NamedNode(subject),
-        NamedNode(predicate),
-        value if isinstance(value, Literal) else NamedNode(value),
-        NamedNode(graph),
-    )
 
 
 LIMIT = "https://w3id.org/irtwin/limit/idle_share"
@@ -115,11 +106,6 @@ JOINING = {  # by each of these, something follows for both robots
 }
 
 
-def inferred(graph: KnowledgeGraph) -> dict[str, set]:
-    found = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED)}
-    return {name: triples for name, triples in found.items() if triples}
-
-
 def conclusions(graph: KnowledgeGraph) -> dict[str, set]:
     return {name: triples for name, triples in inferred(graph).items() if name != GRAPH_REASONED}
 
@@ -157,7 +143,7 @@ def test_robots_are_parts_of_their_own() -> None:
     assert reason(graph).joined_by is None
     ontology = parts.Ontology(graph)
     top = parts.parted(ontology, reasoning.asserted(graph))
-    assert len({top(node) for triple in graph.triples(SOURCE) for node in ontology.nodes(triple)}) == len(ROBOTS)
+    assert len({top(node) for triple in graph.triples(DRAWN) for node in ontology.nodes(triple)}) == len(ROBOTS)
 
 
 def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +164,7 @@ def test_any_change_gives_what_the_whole_graph_gives(states: list[list[Quad]], j
     for drawn, join in zip(states, joining, strict=False):
         quads = {*drawn, *([join] if join else [])}
         before = conclusions(graph)
-        now = set(in_graph(graph.triples(SOURCE), SOURCE))
+        now = set(in_graph(graph.triples(DRAWN), DRAWN))
         graph.change(now - quads, quads - now)
         try:
             outcome = reason(graph)
@@ -287,7 +273,7 @@ def test_nothing_in_the_place_of_nothing_has_nothing_done_anew() -> None:
     graph = anew(FACTS)
     before = graph.made_of()
     assert before
-    graph.replace([], SOURCE + "/none")
+    graph.replace([], DRAWN + "/none")
     assert graph.made_of() == before
 
 

@@ -3,13 +3,13 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyoxigraph import Literal, NamedNode, Quad
+from pyoxigraph import Literal, Quad
 from tests.individuals import individual
+from tests.knowledge.graphs import inferred, quad
 
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
-    GRAPH_INFERRED,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
     GRAPH_SHACL,
@@ -20,19 +20,9 @@ from irtwin.knowledge.vocabulary import (
     term,
 )
 
-SOURCE = GRAPH_SOURCE + "drawn"
 TYPE = RDF + "type"
 RUNS = [individual("run", name) for name in ("one", "two")]
 JOINTS = [individual("joint", name) for name in ("a", "b")]
-
-
-def quad(subject: str, predicate: str, value) -> Quad:
-    return Quad(
-        NamedNode(subject),
-        NamedNode(predicate),
-        value if isinstance(value, Literal) else NamedNode(value),
-        NamedNode(SOURCE),
-    )
 
 
 # Each is a fact that some rule or axiom draws on.
@@ -53,11 +43,6 @@ FACTS = [
     quad(term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
     quad(term("exceeds"), RDFS + "domain", term("Lazy")),
 ]
-
-
-def inferred(graph: KnowledgeGraph) -> dict[str, set]:
-    found = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED)}
-    return {name: triples for name, triples in found.items() if triples}
 
 
 def anew(quads: list[Quad]) -> dict[str, set]:

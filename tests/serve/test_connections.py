@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from urllib.parse import urlencode, urlsplit
+from urllib.parse import urlencode
 
 import httpx
 import pytest
@@ -31,17 +31,10 @@ def patient(new_graph: Callable[[], Path], start) -> Iterator[Server]:
         yield running
 
 
-def connected(server: Server, sent: bytes) -> socket.socket:
-    address = urlsplit(server.url)
-    raw = socket.create_connection((address.hostname, address.port), timeout=10)
-    raw.sendall(sent)
-    return raw
-
-
 def test_half_open_connections_give_way(server: Server) -> None:
     with ExitStack() as held:
         for _ in range(MOST + 20):
-            held.enter_context(connected(server, b"GET /sparql HTTP/1.1\r\nHost: local"))
+            held.enter_context(server.connected(b"GET /sparql HTTP/1.1\r\nHost: local"))
         for _ in range(3):
             assert httpx.get(server.sparql, params={"query": "ASK {}"}, timeout=30).status_code == 200
 
@@ -51,7 +44,7 @@ def test_clients_that_do_not_read_hold_no_worker(patient: Server) -> None:
     query = urlencode({"query": LARGE})
     with ExitStack() as held:
         for _ in range(12):
-            held.enter_context(connected(patient, f"GET /sparql?{query} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()))
+            held.enter_context(patient.connected(f"GET /sparql?{query} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()))
         small = httpx.get(patient.sparql, params={"query": "ASK {}"}, timeout=60)
         assert small.status_code == 200
 
@@ -59,7 +52,7 @@ def test_clients_that_do_not_read_hold_no_worker(patient: Server) -> None:
 def test_who_reads_late_gets_all_of_it(patient: Server) -> None:
     query = urlencode({"query": LARGE})
     head = f"GET /sparql?{query} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAccept: text/csv\r\n\r\n".encode()
-    with connected(patient, head) as late:
+    with patient.connected(head) as late:
         at_once = httpx.get(patient.sparql, params={"query": LARGE}, headers={"Accept": "text/csv"}, timeout=60)
         answer = b"".join(iter(lambda: late.recv(1 << 16), b""))
     assert answer.count(b"\r\n") > at_once.content.count(b"\r\n") > 1000

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -71,13 +70,6 @@ def shared(new_graph: Callable[[], Path], start) -> Iterator[Server]:
         yield running
 
 
-def connected(server: Server, of: str, sent: bytes) -> socket.socket:
-    address = urlsplit(server.url)
-    raw = socket.create_connection((address.hostname, address.port), timeout=10, source_address=(of, 0))
-    raw.sendall(sent)
-    return raw
-
-
 def asking(of: str) -> httpx.Client:
     return httpx.Client(transport=httpx.HTTPTransport(local_address=of), timeout=60)
 
@@ -115,12 +107,12 @@ def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_th
 @pytest.mark.slow
 def test_another_client_looks_on_beside_one_that_took_all_streams(shared: Server) -> None:
     with ExitStack() as held:
-        theirs = [held.enter_context(connected(shared, GREEDY, EVENTS)) for _ in range(samples.MOST)]
+        theirs = [held.enter_context(shared.connected(EVENTS, GREEDY)) for _ in range(samples.MOST)]
         assert {status(raw) for raw in theirs} == {b"200"}
-        other = held.enter_context(connected(shared, OTHER, EVENTS))
+        other = held.enter_context(shared.connected(EVENTS, OTHER))
         assert status(other) == b"200"
-        assert status(held.enter_context(connected(shared, GREEDY, EVENTS))) == b"503"
-        others = [held.enter_context(connected(shared, OTHER, EVENTS)) for _ in range(samples.MOST)]
+        assert status(held.enter_context(shared.connected(EVENTS, GREEDY))) == b"503"
+        others = [held.enter_context(shared.connected(EVENTS, OTHER)) for _ in range(samples.MOST)]
         assert [status(raw) for raw in others].count(b"200") == samples.MOST // 2 - 1
 
 
@@ -128,7 +120,7 @@ def test_another_client_looks_on_beside_one_that_took_all_streams(shared: Server
 def test_another_client_is_answered_beside_one_that_took_all_connections(shared: Server) -> None:
     with ExitStack() as held:
         for _ in range(CONNECTIONS + 40):
-            held.enter_context(connected(shared, GREEDY, SLOW_BODY))
+            held.enter_context(shared.connected(SLOW_BODY, GREEDY))
         with asking(OTHER) as http:
             answers = [http.get(shared.sparql, params={"query": "ASK {}"}).status_code for _ in range(5)]
     assert answers == [200] * 5
@@ -141,7 +133,7 @@ def test_who_forwards_is_believed_on_this_machine_alone(shared: Server) -> None:
     for of, said in ((GREEDY, b"503"), ("127.0.0.1", b"200")):
         with ExitStack() as held:
             for _ in range(samples.MOST):
-                held.enter_context(connected(shared, of, forged[0]))
+                held.enter_context(shared.connected(forged[0], of))
             time.sleep(0.5)
-            assert status(held.enter_context(connected(shared, of, forged[1]))) == said
+            assert status(held.enter_context(shared.connected(forged[1], of))) == said
         time.sleep(0.5)

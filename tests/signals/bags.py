@@ -7,14 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
+from tests.signals.test_log import ROBOT
 
+from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.robot.ros_names import ros_joints
 from irtwin.signals.channels import Signals, columns_of
+from irtwin.signals.samples import read_signals
 from irtwin.signals.sources.bag_source import FIELDS, number_topics
 
 FORMS = ("run.bag", "run.mcap", "run")
@@ -90,6 +94,15 @@ def write(path: Path, *messages: Sequence[Message], compression: str | None = No
     if path.suffix == ".mcap":
         next(folder.glob("*.mcap")).rename(path)
     return path
+
+
+def refused(path: Path, **given: Any) -> str:
+    """Return what is said of a bag that is refused, in one line that names it first, without its name."""
+    with pytest.raises(InputError) as error:
+        read_signals(path, ROBOT, **given)
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
+    return str(error.value).removeprefix(str(path))
 
 
 def _fill(bag: Any, types: Any, serialize: Any, rows: Iterable[Message], head: Mapping[str, Any]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
-from tests.signals.bags import FORMS, numbers, states, write
+from tests.signals.bags import FORMS, numbers, refused, states, write
 from tests.signals.test_log import ROBOT
 
 from irtwin.errors import InputError
@@ -28,14 +28,6 @@ def bag(path: Path) -> Path:
 def content(path: Path) -> Path:
     """The file with a bag's messages."""
     return next(path.glob("*.db3")) if path.is_dir() else path
-
-
-def refused(path: Path) -> str:
-    with pytest.raises(InputError) as error:
-        read_signals(path, ROBOT)
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
-    return str(error.value).removeprefix(str(path))
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from tests.signals.bags import FORMS, numbers, states, write
+from tests.signals.bags import FORMS, numbers, refused, states, write
 from tests.signals.test_log import ROBOT, URDF
 
 from irtwin.errors import InputError
@@ -20,14 +19,6 @@ N = 50
 Q = np.column_stack([np.sin(np.arange(N) / 9.0), np.cos(np.arange(N) / 7.0)])
 TORQUE = 3.0 * Q + 1e-17
 POWER = 100.0 + np.arange(N) / 3.0
-
-
-def refused(path: Path, **given: Any) -> str:
-    with pytest.raises(InputError) as error:
-        read_signals(path, ROBOT, **given)
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
-    return str(error.value).removeprefix(str(path))
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests import gap_cases, rows
+from tests.gap_pages import six_axis
 
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
@@ -16,7 +17,6 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Joint
 
 pytestmark = pytest.mark.system
 FOREMOST = {"attributed": "viscous friction", "ambiguous": "Stribeck friction"}
@@ -33,11 +33,7 @@ def answers(workspace: Workspace) -> dict[str, list[dict[str, object]]]:
 
 
 def fill(workspace: Workspace, verdict: str) -> None:
-    joints = [
-        Joint(robot_id=rows.ROBOT, name=name, position=k, kind="revolute") for k, name in enumerate(gap_cases.JOINTS, 1)
-    ]
-    runs = [rows.run(name) for name in gap_cases.RUNS]
-    workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
+    six_axis(workspace)
     record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
 
 
