@@ -123,10 +123,10 @@ def sound(data_set: DataSet, announce: Announce) -> DataSet:
     for line in data_set.repairs:
         announce(f"  {line}")
     check_result = checked(data_set)
-    found = tuple(dict.fromkeys(finding.say for finding in check_result.findings))
-    for line in found:
+    lines = tuple(dict.fromkeys(finding.say for finding in check_result.findings))
+    for line in lines:
         announce(f"  {line}")
-    return replace(check_result.data_set, repairs=(*data_set.repairs, *found))
+    return replace(check_result.data_set, repairs=(*data_set.repairs, *lines))
 
 
 def clocked(announce: Announce) -> Announce:

@@ -220,7 +220,7 @@ def _is_binary(kind: pa.DataType) -> bool:
 def _by_source(path: Path, robot: Robot, topics: Mapping[str, str]) -> Recording:
     """Read a file by its source, which an installed package may have brought."""
     source = source_of(path, robot, topics)
-    table, said = source.read(source.columns(), repair=False)
+    table, notes = source.read(source.columns(), repair=False)
     columns, texts = as_columns(path, table, (source.counted, source.first))
     form = f"{path.suffix.lower()}, by {type(source).__module__.partition('.')[0]}"
-    return Recording(path, form, columns, texts, said=tuple(said), first=source.first, counted=source.counted)
+    return Recording(path, form, columns, texts, said=tuple(notes), first=source.first, counted=source.counted)

@@ -117,20 +117,20 @@ def told_meanwhile(tell: Callable[[], None]) -> Iterator[None]:
 
 def _plan(places: Sequence[str], folder: Path, kind: str, size: int, workers: int, base: str | None) -> None:
     """Put data sets that no batch has into new ones, enough for each worker to have one."""
-    there = batches_of(folder)
-    if there and {one.sets.kind for one in there} != {kind}:
-        raise InputError(f"{folder}: holds a fleet of `{there[0].sets.kind}`; give `{kind}` a folder of its own")
-    if there and {one.sets.base for one in there} != {base}:
-        said = there[0].sets.base
+    batches = batches_of(folder)
+    if batches and {batch.sets.kind for batch in batches} != {kind}:
+        raise InputError(f"{folder}: holds a fleet of `{batches[0].sets.kind}`; give `{kind}` a folder of its own")
+    if batches and {batch.sets.base for batch in batches} != {base}:
+        own_base = batches[0].sets.base
         raise InputError(
-            f"{folder}: the IRIs of this fleet begin with {said or base_iri.DEFAULT}; "
-            + (f"give --base {said}" if said else "leave --base away")
+            f"{folder}: the IRIs of this fleet begin with {own_base or base_iri.DEFAULT}; "
+            + (f"give --base {own_base}" if own_base else "leave --base away")
             + ", or another --out"
         )
-    known = {place for one in there for place in one.sets.data_sets}
+    known = {place for batch in batches for place in batch.sets.data_sets}
     new = [place for place in places if place not in known]
     share = max(1, min(size, -(-len(new) // max(workers, 1))))
-    for number, start in enumerate(range(0, len(new), share), start=len(there) + 1):
+    for number, start in enumerate(range(0, len(new), share), start=len(batches) + 1):
         Batch.create(folder / _NAME.format(number), kind, new[start : start + share], base)
 
 
@@ -143,7 +143,7 @@ def status_of(batches: Sequence[Batch]) -> FleetStatus:
     """Count what became of the data sets of some batches."""
     counts: Counter[str] = Counter()
     aside = []
-    for record in (record for one in batches for record in one.records()):
+    for record in (record for batch in batches for record in batch.records()):
         state = record.state if record is not None and record.final else "left"
         counts[state] += 1
         if record is not None and state in (REFUSED, FAILED):

@@ -38,8 +38,8 @@ def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, 
     with place.reading() as session:
         known = session.get(RunEnergy, header.run_id) is not None
     if not kept:  # else a crash came right here
-        made = {name: rows for name, rows in tables.items() if name != Run.__tablename__}
-        place.keep_run(Run(**tables[Run.__tablename__][0]), series, made)
+        others = {name: rows for name, rows in tables.items() if name != Run.__tablename__}
+        place.keep_run(Run(**tables[Run.__tablename__][0]), series, others)
     if twin is not None and not known:
         tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
     return tables

@@ -203,16 +203,16 @@ class OpcUa:
         return state_of(self.robot_id, len(self._robot.joints), stamp, said, where=self.address)
 
     def _number(self, place: _Place, value: ua.DataValue) -> float:
-        it = None if value.Value is None else value.Value.Value
+        reading = None if value.Value is None else value.Value.Value
         if value.StatusCode is not None and not value.StatusCode.is_good():
             raise InputError(f"{self.address}: {place.key} {place.node}: {value.StatusCode.name}")
         if self._times.hangs(str(place.node), time.monotonic()):
             raise InputError(
                 f"{self.address}: {place.key} {place.node}: hangs: its status is good, its time stands still"
             )
-        if isinstance(it, bool) or not isinstance(it, int | float):
-            raise InputError(f"{self.address}: {place.key} {place.node}: {shown(it)} is not a number")
-        return place.unit.factor * it + place.unit.offset
+        if isinstance(reading, bool) or not isinstance(reading, int | float):
+            raise InputError(f"{self.address}: {place.key} {place.node}: {shown(reading)} is not a number")
+        return place.unit.factor * reading + place.unit.offset
 
     @asynccontextmanager
     async def _places(self) -> AsyncIterator[tuple[Client, list[_Place]]]:
@@ -240,8 +240,8 @@ class OpcUa:
             systems = await (await client.nodes.objects.get_child(f"{di}:DeviceSet")).get_children()
         except (ValueError, ua.UaStatusCodeError):
             raise InputError(f"{self.address}: it has no robots by OPC 40010; name position by --nodes FILE") from None
-        found = [await _child(system, f"{robotics}:MotionDevices") for system in systems]
-        devices = {(await one.read_browse_name()).Name: one for it in found if it for one in await it.get_children()}
+        folders = [await _child(system, f"{robotics}:MotionDevices") for system in systems]
+        devices = {(await one.read_browse_name()).Name: one for it in folders if it for one in await it.get_children()}
         name = self._said.get("device", next(iter(devices)) if len(devices) == 1 else None)
         if name not in devices:
             raise InputError(f"{self.address}: its motion devices are {', '.join(devices)}; say device in --nodes FILE")
@@ -294,28 +294,28 @@ async def _child(node: Node, *path: str) -> Node | None:
 async def _unit_text(node: Node) -> str:
     """Return the unit that a server says of a node; nothing where it says none."""
     units = await _child(node, "0:EngineeringUnits")
-    said = None if units is None else await units.read_value()
-    if not isinstance(said, ua.EUInformation):  # nothing, or what nobody filled in
+    unit = None if units is None else await units.read_value()
+    if not isinstance(unit, ua.EUInformation):  # nothing, or what nobody filled in
         return ""
-    code = int(said.UnitId).to_bytes(4, "big", signed=True).lstrip(b"\0").decode("ascii", "replace")
-    return _UNECE.get(code, said.DisplayName.Text or "")
+    code = int(unit.UnitId).to_bytes(4, "big", signed=True).lstrip(b"\0").decode("ascii", "replace")
+    return _UNECE.get(code, unit.DisplayName.Text or "")
 
 
 def _read_file(file: Path | None, joints: int) -> dict[str, Any]:
     """Return what a file says, node ids by channel. Raises InputError, naming file and key, where it is wrong."""
     if file is None:
         return {}
-    said = read_toml(file)
-    table = TomlTable(file, "", said)
+    settings = read_toml(file)
+    table = TomlTable(file, "", settings)
     table.check_keys((*_FIELDS, "units", *_TEXTS))
-    for key in said:
+    for key in settings:
         if key in _FIELDS:
-            said[key] = _node_ids(file, key, said[key], joints if STREAMED[_FIELDS[key]].per_joint else None)
+            settings[key] = _node_ids(file, key, settings[key], joints if STREAMED[_FIELDS[key]].per_joint else None)
         elif key != "units":
             table.text(key)
-        elif not isinstance(said[key], dict) or not all(isinstance(unit, str) for unit in said[key].values()):
+        elif not isinstance(settings[key], dict) or not all(isinstance(unit, str) for unit in settings[key].values()):
             raise InputError(f'{file}: units should be text by channel, as {{ position = "deg" }}')
-    return said
+    return settings
 
 
 def _node_ids(file: Path, key: str, said: Any, joints: int | None) -> list[ua.NodeId]:

@@ -58,9 +58,9 @@ def deviation(robot: Robot, table: ChainTable, tip: str | None = None) -> tuple[
     far, turned = 0.0, 0.0
     for q in draw.uniform(*ranges(robot), (_POSES, len(robot.joints))):
         pin.framesForwardKinematics(model, data, q)
-        place, said = data.oMf[frame], table.flange(q[[joint - 1 for joint in chain]])
-        far = max(far, float(np.abs(said[:3, 3] - place.translation).max()))
-        turned = max(turned, float(np.abs(said[:3, :3] - place.rotation).max()))
+        place, by_table = data.oMf[frame], table.flange(q[[joint - 1 for joint in chain]])
+        far = max(far, float(np.abs(by_table[:3, 3] - place.translation).max()))
+        turned = max(turned, float(np.abs(by_table[:3, :3] - place.rotation).max()))
     return far, turned
 
 

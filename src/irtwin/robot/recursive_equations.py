@@ -198,14 +198,14 @@ def _evaluated(steps: Sequence[tuple[Any, Any]], asked: Sequence[Any]) -> Callab
     """Return a function of positions, speeds and accelerations (3 n) that gives what the steps say of symbols."""
     sympy = library()
     inputs = [symbol for symbols in symbols_of(len(asked)) for symbol in symbols]
-    made = []
+    functions = []
     for symbol, formula in steps:
         own = sorted(formula.free_symbols, key=str)
-        made.append((symbol, own, sympy.lambdify(own, formula, "math")))
+        functions.append((symbol, own, sympy.lambdify(own, formula, "math")))
 
     def values(*given: float) -> list[float]:
         known: dict[Any, Any] = dict(zip(inputs, given, strict=True))
-        for symbol, own, function in made:
+        for symbol, own, function in functions:
             known[symbol] = function(*(known[each] for each in own))
         return [float(known[symbol]) for symbol in asked]
 

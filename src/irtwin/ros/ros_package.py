@@ -127,7 +127,7 @@ def _templates() -> jinja2.Environment:
     def autoescape(name: str | None) -> bool:
         return name is not None and name.removesuffix(".jinja").endswith((".xml", ".launch", ".srdf"))
 
-    texts = {one.name: one.read_text(encoding="utf-8") for one in files("irtwin.ros").joinpath("package").iterdir()}
+    texts = {file.name: file.read_text(encoding="utf-8") for file in files("irtwin.ros").joinpath("package").iterdir()}
     environment = jinja2.Environment(
         loader=jinja2.DictLoader(texts),
         autoescape=autoescape,

@@ -99,8 +99,8 @@ def _drawn(location: Location, robot_id: str) -> bytes:
         robot = robot_of_graph(graph, iri)
         meshes = meshes_of_graph(graph, iri, location.folder)
         poses = _poses(graph, iri, robot.joint_names)
-    said = {"name": robot.name, "stood": poses[0].tolist()}
-    return json.dumps(robot_data(robot, poses, meshes) | said, allow_nan=False).encode()
+    named = {"name": robot.name, "stood": poses[0].tolist()}
+    return json.dumps(robot_data(robot, poses, meshes) | named, allow_nan=False).encode()
 
 
 def _poses(graph: KnowledgeGraph, iri: str, joints: tuple[str, ...]) -> np.ndarray:

@@ -77,8 +77,8 @@ def _words(name: str) -> str:
 def refused(diagnosis: Document) -> list[str]:
     """Return a line for each effect that was refused as a cause."""
     return [
-        f"refused: {_words(one.effect)}{f' on {listed(one.joints)}' if one.joints else ''}: {one.why}"
-        for one in diagnosis.refused or ()
+        f"refused: {_words(refusal.effect)}{f' on {listed(refusal.joints)}' if refusal.joints else ''}: {refusal.why}"
+        for refusal in diagnosis.refused or ()
     ]
 
 
@@ -93,13 +93,13 @@ def gap(diagnosis: Document) -> AnswerTable:
     rows: list[Row] = [
         {
             "gap": name,
-            "before": _short(one.before),
-            "after": _short(one.after),
-            "noise floor": None if one.noise_floor is None else _short(one.noise_floor),
+            "before": _short(change.before),
+            "after": _short(change.after),
+            "noise floor": None if change.noise_floor is None else _short(change.noise_floor),
             "unit": unit,
         }
-        for name, one, unit in changes
-        if one is not None
+        for name, change, unit in changes
+        if change is not None
     ]
     return AnswerTable(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
 
@@ -112,8 +112,8 @@ def runs(curves: Curves) -> AnswerTable:
         if one.joint is None and one.of:
             of_run.setdefault(one.run, []).append(one)
     rows = [
-        (run, *(None if value is None else _short(value) for one in some for value in (one.before, one.after)))
-        for run, some in of_run.items()
+        (run, *(None if value is None else _short(value) for one in errors for value in (one.before, one.after)))
+        for run, errors in of_run.items()
     ]
     return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
 
@@ -121,7 +121,7 @@ def runs(curves: Curves) -> AnswerTable:
 def horizons(diagnosis: Document) -> AnswerTable:
     """Return how tracking error grows after a run is begun anew as the robot was."""
     columns = ("s since it was begun anew", "tracking error, rad", "with the causes, rad")
-    rows = [(one.seconds, _short(one.before), _short(one.after)) for one in diagnosis.horizons or ()]
+    rows = [(horizon.seconds, _short(horizon.before), _short(horizon.after)) for horizon in diagnosis.horizons or ()]
     return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
 
 
@@ -173,16 +173,18 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 
 def meanings(diagnosis: Document) -> list[str]:
     """Return what each parameter of the causes that matter means, in the ontology's words, as far as it has any."""
-    told = {  # each once, and of a vector's parts ("f_x") the whole
+    parameters = {  # each once, and of a vector's parts ("f_x") the whole
         (cause.effect, one.name.partition("_")[0]): None for cause in diagnosis.mattering for one in cause.parameters
     }
-    if not told:
+    if not parameters:
         return []
     with KnowledgeGraph() as graph:
         graph.load_ontology()
-        said = {(row["effect"].removeprefix(EFFECT), row["name"]): row["meaning"] for row in graph.query(_MEANINGS)}
+        meaning = {(row["effect"].removeprefix(EFFECT), row["name"]): row["meaning"] for row in graph.query(_MEANINGS)}
     return [
-        f"{name} of {effect.replace('_', ' ')}: {said[effect, name]}" for effect, name in told if (effect, name) in said
+        f"{name} of {effect.replace('_', ' ')}: {meaning[effect, name]}"
+        for effect, name in parameters
+        if (effect, name) in meaning
     ]
 
 
