@@ -7,10 +7,10 @@ from datetime import datetime
 from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
 
-from irtwin.storage.schema import Made
+from irtwin.storage.schema import MadeRow
 
 
-class RunPrice(Made):
+class RunPrice(MadeRow):
     """What a planned run will take by its robot's twin, with 95 % intervals.
 
     The twin is named by its id alone: one that was replaced has no row any more, and the price stays what it was.
@@ -33,7 +33,7 @@ class RunPrice(Made):
     saving_upper_j: Mapped[float | None]
 
 
-class SavingVerification(Made):
+class SavingVerification(MadeRow):
     """What the runs before and after a saving action say that it saved, with a 95 % interval."""
 
     action: Mapped[str] = mapped_column(primary_key=True)  # its whole IRI
@@ -48,7 +48,7 @@ class SavingVerification(Made):
     saving_upper_j: Mapped[float | None]
 
 
-class EnergyShare(Made):
+class EnergyShare(MadeRow):
     """The ledger: energy of one effect, in one joint where it has one, over a run."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
@@ -63,7 +63,7 @@ class EnergyShare(Made):
     inseparable: Mapped[int | None]  # number of the InseparableEnergy that it is part of
 
 
-class InseparableEnergy(Made):
+class InseparableEnergy(MadeRow):
     """Energy of shares of a run that the data do not part, with its 95 % interval."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -74,7 +74,7 @@ class InseparableEnergy(Made):
     upper_j: Mapped[float]
 
 
-class MeteredLoad(Made):
+class MeteredLoad(MadeRow):
     """What the power of a run says that a meter alone logged: its standby, the cycles in it, its energy by hour."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -86,7 +86,7 @@ class MeteredLoad(Made):
     energy_by_hour_j: Mapped[str]  # from then on, comma separated
 
 
-class SupplyState(Made):
+class SupplyState(MadeRow):
     """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -101,7 +101,7 @@ class SupplyState(Made):
     differs: Mapped[bool]  # the log's power lies outside the twin's interval
 
 
-class JointEnergy(Made):
+class JointEnergy(MadeRow):
     """The ledger summed over effects: what one joint took over a run."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)

@@ -14,7 +14,7 @@ from sqlalchemy import Boolean, Double, ForeignKey, Integer, String
 from sqlalchemy.orm import Mapped, MappedColumn, mapped_column
 
 from irtwin.document.tables import DOCUMENT, TABLES, Column, Table
-from irtwin.storage.schema import Base, Made
+from irtwin.storage.schema import Base, MadeRow
 
 _TYPES = {str: String, float: Double, int: Integer, bool: Boolean}
 
@@ -38,7 +38,7 @@ class GapDiagnosis(Base):
     activity_id: Mapped[str] = mapped_column(ForeignKey("activity.activity_id"))
 
 
-class OfDiagnosis(Made):
+class OfDiagnosis(MadeRow):
     """What each further table begins and ends with."""
 
     __abstract__ = True

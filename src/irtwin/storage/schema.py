@@ -63,7 +63,7 @@ class Base(DeclarativeBase):
         return _WORD.sub("_", cls.__name__).lower()
 
 
-class Made(Base):
+class MadeRow(Base):
     """A row that a provider made, with its activity."""
 
     __abstract__ = True
@@ -213,7 +213,7 @@ class ActivityUse(Base):
     relation: Mapped[str]  # as PROV names it, see `relation_to`
 
 
-class RunState(Made):
+class RunState(MadeRow):
     """How a run passed, and the robot's state at its last sample."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -221,7 +221,7 @@ class RunState(Made):
     idle_share: Mapped[float]  # of the run's time, 0 to 1
 
 
-class JointState(Made):
+class JointState(MadeRow):
     """A joint at the last sample of a run."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -234,7 +234,7 @@ class JointState(Made):
     joint_temperature_degc: Mapped[float | None]
 
 
-class LiveState(Made):
+class LiveState(MadeRow):
     """How far a live run is, and how well the graph kept up with it."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -248,7 +248,7 @@ class LiveState(Made):
     stale_reason: Mapped[str | None]
 
 
-class GapState(Made):
+class GapState(MadeRow):
     """How far a live run's torque at a joint, or its power, is from its twin now, beside what is usual for it."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -265,7 +265,7 @@ class GapState(Made):
     since: Mapped[datetime]
 
 
-class GapExcursion(Made):
+class GapExcursion(MadeRow):
     """A time that the gap of a live run was outside its band."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
@@ -283,7 +283,7 @@ class GapExcursion(Made):
     peak_ratio: Mapped[float]
 
 
-class Twin(Made):
+class Twin(MadeRow):
     """An identified twin of a robot; `twin_id` is `robot_id.` and a hash of what made it."""
 
     twin_id: Mapped[str] = mapped_column(primary_key=True)
@@ -300,7 +300,7 @@ class Twin(Made):
     torque_scale_why: Mapped[str | None]  # in words
 
 
-class ImprovementRound(Made):
+class ImprovementRound(MadeRow):
     """A try to better a robot's twin by what was logged since; `round_id` is `robot_id.` and its number.
 
     Twins are named by their ids alone: one that was replaced has no row any more.
@@ -319,14 +319,14 @@ class ImprovementRound(Made):
     outcome: Mapped[str]  # "within the limit", "better" or "no better"
 
 
-class TwinEffect(Made):
+class TwinEffect(MadeRow):
     """An effect that a twin is made of."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
     effect: Mapped[str] = mapped_column(primary_key=True)
 
 
-class TwinChoice(Made):
+class TwinChoice(MadeRow):
     """An effect that was chosen by what the fitted runs show, or that they could not tell, and what it is worth.
 
     Worth is on groups of runs left out of the fit in turn, without the effect and with it.
@@ -346,7 +346,7 @@ class TwinChoice(Made):
     energy_error_with_percent: Mapped[float | None]
 
 
-class TwinRun(Made):
+class TwinRun(MadeRow):
     """The part that a run took in a twin: "fit", "held_out", "both" where it was cut in time, "apart" where neither."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
@@ -355,7 +355,7 @@ class TwinRun(Made):
     held_out_from_s: Mapped[float | None]  # of the log's time, where the run was cut in time
 
 
-class Parameter(Made):
+class Parameter(MadeRow):
     """An identified parameter with its 95 % interval."""
 
     parameter_id: Mapped[str] = mapped_column(primary_key=True)  # twin_id.effect.joint or link.name
@@ -372,7 +372,7 @@ class Parameter(Made):
     scaled_upper: Mapped[float | None]
 
 
-class BaseParameter(Made):
+class BaseParameter(MadeRow):
     """A combination of torque coefficients that the measured torque shows, with its 95 % interval."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
@@ -386,7 +386,7 @@ class BaseParameter(Made):
     scaled_upper: Mapped[float | None]
 
 
-class TorqueFit(Made):
+class TorqueFit(MadeRow):
     """How well a twin's torque follows the measured one, per run, joint and part."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)
@@ -402,7 +402,7 @@ def _own_activity(context: Any) -> str:
     return str(context.get_current_parameters()["activity_id"])
 
 
-class RunEnergy(Made):
+class RunEnergy(MadeRow):
     """Energy and power of a run: as measured and as its twin models them."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)
