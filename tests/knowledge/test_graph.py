@@ -47,6 +47,19 @@ def test_many_new_quads_go_into_files_of_their_own_and_count_once(tmp_path: Path
         assert total(graph) == 10_000.0
 
 
+def test_files_of_several_loads_are_merged(tmp_path: Path) -> None:
+    def files() -> int:
+        return len(list((tmp_path / "graph").glob("*.sst")))
+
+    with KnowledgeGraph(tmp_path / "graph") as graph:
+        for name in (A, B):
+            graph.change([], [quad(f"{number}", 1.0, name) for number in range(10_000)])
+        before = files()
+        graph.merge_loads()
+        assert files() < before
+        assert total(graph) == 10_000.0
+
+
 def test_replace_drops_graphs_below_that_have_nothing_left(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
     kept = [quad for quad in two_robots if "Arm_B" not in quad.graph_name.value]
     changed = graph.replace(kept, GRAPH_SOURCE, GRAPH_ACTIVITY)
