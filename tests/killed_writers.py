@@ -15,7 +15,7 @@ from pyoxigraph import Literal, NamedNode, Quad
 from sqlalchemy import Engine, event
 
 from irtwin.knowledge.mapping.remembered import RememberedRows
-from irtwin.knowledge.store import graph as store
+from irtwin.knowledge.store import union_store as store
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.rewriting import conclude, map_rows, rewriting
 from irtwin.storage import database, files, staging

@@ -7,8 +7,7 @@ from pyoxigraph import BlankNode, Literal, NamedNode, Quad
 from tests.individuals import individual
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store import graph as graph_module
-from irtwin.knowledge.store import table
+from irtwin.knowledge.store import table, union_store
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
@@ -55,7 +54,7 @@ def test_files_of_several_loads_are_merged(tmp_path: Path) -> None:
         for name in (A, B):
             graph.change([], [quad(f"{number}", 1.0, name) for number in range(10_000)])
         before = files()
-        graph.merge_loads()
+        graph.store.merge_loads()
         assert files() < before
         assert total(graph) == 10_000.0
 
@@ -107,7 +106,7 @@ def test_failed_first_load_leaves_nothing(tmp_path: Path) -> None:
 def test_a_first_load_that_fails_after_its_first_piece_leaves_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(graph_module, "_AT_ONCE", 2)
+    monkeypatch.setattr(union_store, "_AT_ONCE", 2)
 
     def breaking():
         yield from (quad(name, 1.0, A) for name in "xyz")

@@ -115,7 +115,7 @@ def test_no_file_outside_the_workspace_is_read(graph: KnowledgeGraph, tmp_path: 
     """Whoever may update the graph may not thereby read the server's files."""
     pa.parquet.write_table(pa.table({"time": [0.0], "power": [1.0]}), tmp_path / "secret.parquet")
     with KnowledgeGraph(workspace=tmp_path / "workspace") as other:
-        other._store.update(
+        other.store.embedded.update(
             """PREFIX irt: <https://w3id.org/irtwin#> INSERT DATA {
               <urn:s> irt:series_of <urn:run> ; irt:Series_Kind "measured" ; irt:File "../secret.parquet" }"""
         )

@@ -31,7 +31,7 @@ def server_url() -> Iterator[str]:
 @pytest.fixture
 def served(server_url: str, two_robots: list[Quad]) -> KnowledgeGraph:
     graph = KnowledgeGraph(server_url)
-    graph._store.update("DROP ALL")
+    graph.store._store.update("DROP ALL")
     graph.load_ontology()
     graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
     return graph
@@ -56,7 +56,7 @@ def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGr
 @pytest.mark.slow
 def test_what_is_there_already_is_left_alone(served: KnowledgeGraph, two_robots: list[Quad]) -> None:
     """The server calls blank nodes as it likes: the ontology is the same all the same."""
-    served._store.update(f"INSERT DATA {{ GRAPH <{A}> {{ <https://example.org/x> a <https://example.org/X> }} }}")
+    served.store._store.update(f"INSERT DATA {{ GRAPH <{A}> {{ <https://example.org/x> a <https://example.org/X> }} }}")
     assert served.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY) == []
     ontology = served.triples(GRAPH_ONTOLOGY)
     served.load_ontology()

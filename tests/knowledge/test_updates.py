@@ -29,7 +29,7 @@ def graph() -> KnowledgeGraph:
 
 def values(graph: KnowledgeGraph) -> dict[str, list[int]]:
     """Return the numbers in each graph, the union under an empty name, after a check that it is one."""
-    quads = list(graph._store.quads_for_pattern(None, None, None, None))
+    quads = list(graph.store.embedded.quads_for_pattern(None, None, None, None))
     named = [quad for quad in quads if not isinstance(quad.graph_name, DefaultGraph)]
     assert {quad.triple for quad in named} == graph.triples()
     found: dict[str, list[int]] = {"": sorted(int(triple.object.value) for triple in graph.triples())}
@@ -88,11 +88,11 @@ def test_data_by_itself_leaves_what_the_whole_comparison_leaves(updates: list[tu
         text = f"{operation} DATA {{ {said} }}"
         looked_up.update(text)
         compared.change(*by_doing(text, compared.quads()))
-        assert set(looked_up._store) == set(compared._store)
+        assert set(looked_up.store.embedded) == set(compared.store.embedded)
 
 
 def asking(graph: KnowledgeGraph) -> Callable[[str], set[Triple]]:
-    return lambda query: set(graph._store.query(query, base_iri="http://e/"))  # type: ignore[arg-type]
+    return lambda query: set(graph.store.embedded.query(query, base_iri="http://e/"))  # type: ignore[arg-type]
 
 
 TERMS = st.sampled_from(["<x>", "<y>", "?s", "?o", "1", "2", "3"])
@@ -111,7 +111,7 @@ def test_a_pattern_that_is_asked_leaves_what_the_whole_comparison_leaves(gone: s
     numbers = [Triple(NamedNode("http://e/x"), NamedNode("http://e/p"), Literal(n)) for n in (1, 2)]
     graph.replace([Quad(*one, NamedNode(place)) for place in (A, B) for one in numbers], "http://e/")  # type: ignore[misc]
     text = f'DELETE {{ {gone} }} INSERT {{ <y> <q> "}}" . {come} #}}\n }} WHERE {{ {where} }} ;'
-    asked = by_asking(text, graph._holding, asking(graph), "http://e/")
+    asked = by_asking(text, graph.store.holding, asking(graph), "http://e/")
     assert asked == by_doing(text, graph.quads(), "http://e/")
 
 
@@ -128,7 +128,7 @@ def test_a_pattern_that_is_asked_leaves_what_the_whole_comparison_leaves(gone: s
     ],
 )
 def test_what_is_no_single_pattern_over_all_graphs_is_not_asked(graph: KnowledgeGraph, text: str) -> None:
-    assert by_asking(text, graph._holding, asking(graph), "http://e/") is None
+    assert by_asking(text, graph.store.holding, asking(graph), "http://e/") is None
 
 
 def test_data_with_blank_nodes_goes_the_long_way(graph: KnowledgeGraph) -> None:

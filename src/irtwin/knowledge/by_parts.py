@@ -69,7 +69,7 @@ def conclude(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name] | 
         for region, conclusions in _conclude(ontology, some):
             concluded = conclusions.quads()
             own = _minted(ontology, region, concluded - region.concluded)
-            if not minted.isdisjoint(own) or any(graph.about(node) for node in own):
+            if not minted.isdisjoint(own) or any(graph.store.about(node) for node in own):
                 raise Joined("what rules conclude of several robots, and the ontology does not name")
             minted |= own
             changes.take(region, concluded)

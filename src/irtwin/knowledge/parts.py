@@ -145,14 +145,14 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
     """Return the parts that the seeds belong to, or None where one is a term that more is said of than the ontology."""
     region, todo = Region(), set(seeds)
     terms = todo & ontology.terms
-    if any(_place(name.value) == _ASSERTED and name.value != GRAPH_ONTOLOGY for *_, name in graph.said_of(terms)):
+    if any(_place(name.value) == _ASSERTED and name.value != GRAPH_ONTOLOGY for *_, name in graph.store.said_of(terms)):
         return None
     todo -= terms
     while todo:
         region.nodes |= todo
-        nodes = region.take(graph.said_of(todo), ontology)
-        before = graph.leading_to(todo, _NOT_FOLLOWED)
-        nodes |= region.take((row for row in graph.said_of(before & ontology.terms) if row[2] in todo), ontology)
+        nodes = region.take(graph.store.said_of(todo), ontology)
+        before = graph.store.leading_to(todo, _NOT_FOLLOWED)
+        nodes |= region.take((row for row in graph.store.said_of(before & ontology.terms) if row[2] in todo), ontology)
         todo = (nodes | before - ontology.terms) - region.nodes
     return region
 
@@ -191,7 +191,7 @@ def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
 
 def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
     """Return the robots of a graph, by name."""
-    return sorted(graph.subjects(TYPE, _ROBOT) - ontology.terms, key=str)
+    return sorted(graph.store.subjects(TYPE, _ROBOT) - ontology.terms, key=str)
 
 
 def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
@@ -216,7 +216,7 @@ def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
 def held(graph: KnowledgeGraph) -> Counter[str]:
     """Return how many quads of each kind of named graph there are, but for the ontology."""
     counts = Counter[str]()
-    for name, count in graph.sizes():
+    for name, count in graph.store.sizes():
         if (kind := _kind(name)) and kind != GRAPH_ONTOLOGY:
             counts[kind] += count
     return counts
@@ -257,7 +257,7 @@ def of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
     """Return what was concluded of the ontology alone, as a part without nodes."""
     region = Region()
     if graph.graphs(GRAPH_INFERRED):
-        statements = graph.said_of(term for term in ontology.terms if isinstance(term, Name))
+        statements = graph.store.said_of(term for term in ontology.terms if isinstance(term, Name))
         of_none = (
             row for row in statements if _place(row[3].value) != _ASSERTED and not ontology.nodes(Triple(*row[:3]))
         )

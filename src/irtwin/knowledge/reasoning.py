@@ -132,7 +132,7 @@ def _by_parts(graph: KnowledgeGraph, ontology: Ontology, changed: set[Quad]) -> 
         changes = by_parts.conclude(graph, ontology)
         base = Conclusions(made_of={_OWL_RL: name}, made_by={_made_by(NATIVE)}).quads()
         changes.write(changed | notes - changes.noted - base, base - notes)
-        graph.merge_loads()
+        graph.store.merge_loads()
     elif changed:
         changes = by_parts.conclude(graph, ontology, nodes_of(changed))
         changes.write(changed)

@@ -54,7 +54,7 @@ def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
         if _turned(triple) not in old and not (triple.subject in known and _is_declaration(triple))
     }
     removed = {
-        quad for triple in gone for quad in graph.said(triple.subject, triple.predicate) if quad.triple == triple
+        quad for triple in gone for quad in graph.store.said(triple.subject, triple.predicate) if quad.triple == triple
     }
     words = [f"{sign} {' '.join(show(term, graph.base) for term in triple)}" for sign, triple in _in_order(gone, came)]
     return Edit(frozenset(removed), frozenset(in_graph(came, GRAPH_ASSERTED)), tuple(words))

@@ -191,7 +191,7 @@ def _fill(
     if fact.value == fact.replaced:
         return
     assertion.facts.append(fact)
-    assertion.removed |= {quad for quad in graph.said(*about) if quad.graph_name == cell.graph}
+    assertion.removed |= {quad for quad in graph.store.said(*about) if quad.graph_name == cell.graph}
     if fact.value is not None:
         assertion.added.add(quad_of(fact))
 

@@ -4,36 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, cast
+from typing import TYPE_CHECKING, Self, cast
 
-from pyoxigraph import (
-    BlankNode,
-    DefaultGraph,
-    Literal,
-    NamedNode,
-    Quad,
-    QueryBoolean,
-    QuerySolutions,
-    QueryTriples,
-    Store,
-    Triple,
-)
+from pyoxigraph import Literal, NamedNode, Quad, QueryBoolean, QuerySolutions, QueryTriples, Store, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.store import changes, ontology, store_files
-from irtwin.knowledge.store.blank_nodes import by_name, has_blank_node, named_below, same
-from irtwin.knowledge.store.damage import check_files, telling, told
+from irtwin.knowledge.store import changes, ontology
+from irtwin.knowledge.store.blank_nodes import has_blank_node, named_below, same
+from irtwin.knowledge.store.damage import telling
 from irtwin.knowledge.store.keywords import refuse_service
-from irtwin.knowledge.store.named_graphs import belonging, graph_name, is_below, is_of_many, names_in, triples_in
+from irtwin.knowledge.store.named_graphs import belonging, graph_name, names_in, triples_in
 from irtwin.knowledge.store.reading import KeptAnswers, answers_of
 from irtwin.knowledge.store.series_functions import Functions, series_functions
-from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.syntax_error import in_words
 from irtwin.knowledge.store.table import AnswerTable, table_of
-from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
+from irtwin.knowledge.store.union_store import UnionStore
 from irtwin.knowledge.store.update_dataset import using
 from irtwin.knowledge.store.updates import by_asking, by_doing, check
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, ID, VOID, prefixes
@@ -42,10 +30,7 @@ from irtwin.resources import Resources, resources_of
 if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
-Subject = NamedNode | BlankNode | Triple
 _MOST_KEPT = 2_000  # values of an answer that is kept
-_MANY = 10_000  # new quads: from there on a file of their own is quicker than the store's log, and takes no memory
-_AT_ONCE = 200_000  # quads of a bulk load, which holds all of them: 0.6 GB in place of 1.8 of 900,000, as fast
 URI_SPACE = f"{VOID}uriSpace"  # says of the graphs of sources what their individuals lie below
 _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base }} }} LIMIT 1"
 
@@ -53,8 +38,7 @@ _ASK_BASE = f"SELECT ?base {{ GRAPH ?any {{ <{GRAPH_SOURCE}> <{URI_SPACE}> ?base
 class KnowledgeGraph:
     """Ontology, individuals and inferences in named graphs: in a folder, on a SPARQL server by its URL, or in memory.
 
-    The store's default graph holds the union of the named graphs, each triple once: Oxigraph's own union
-    repeats a triple that several graphs hold, and a sum would count it twice.
+    `store` holds the quads, for who looks these up one by one.
 
     Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
     in `workspace`, which a folder's parent is if none is given. Its individuals lie below `base`, else below what the
@@ -70,26 +54,14 @@ class KnowledgeGraph:
         *,
         read_only: bool = False,
     ):
-        self._store: Store | SparqlServer
-        self._read_only = read_only
+        self.store = UnionStore(place, read_only=read_only)
+        self.folder = self.store.folder
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
         self._resources = resources
         self._base = base
         self._says_first = False  # whether the next change has it say first that it is behind
-        self._loads = 0  # bulk loads since their files were merged
         self.asserted_since = 0
-        self.folder = None if place is None or is_url(place) else Path(place)
-        if self.folder is None:
-            self._store = Store() if place is None else SparqlServer(str(place))
-        elif read_only:
-            self._store = Store.read_only(str(self.folder))
-        else:
-            check_files(self.folder)
-            with told(self.folder):
-                self._store = Store(str(self.folder))
-            for old in self.folder.glob("LOG.old.*"):  # the store keeps one of each opening, and never reads them
-                old.unlink(missing_ok=True)
-        self._answers = answers_of(self._store)
+        self._answers = answers_of(self.store)
 
     @classmethod
     def of_workspace(cls, place: Workspace) -> Self:
@@ -115,19 +87,13 @@ class KnowledgeGraph:
 
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
-        written = isinstance(self._store, Store) and not self._read_only
-        with told(self.folder):
-            if written:
-                self._store.flush()
-            self._store = Store()
-            self._answers = answers_of(self._store)
-            if written and self.folder is not None:
-                store_files.note_sums(self.folder)
+        self.store.close()
+        self._answers = answers_of(self.store)
 
     @property
     def shown(self) -> str:
         """Where it is, as messages may say it: never with a password."""
-        return self._store.shown if isinstance(self._store, SparqlServer) else str(self.folder or "memory")
+        return self.store.shown
 
     @property
     def resources(self) -> Resources:
@@ -140,7 +106,7 @@ class KnowledgeGraph:
     def base(self) -> str:
         """What the IRIs of its individuals begin with."""
         if self._base is None:
-            solutions = cast(QuerySolutions, self._store.query(_ASK_BASE))
+            solutions = cast(QuerySolutions, self.store.query(_ASK_BASE))
             self._base = next((row["base"].value for row in solutions), ID)
         return self._base
 
@@ -173,7 +139,7 @@ class KnowledgeGraph:
     @telling
     def is_behind(self) -> bool:
         """Whether somebody began to change the graph, or the rows that it is made of, and has not ended that."""
-        return changes.BEHIND in self._holding([changes.BEHIND.triple])
+        return changes.BEHIND in self.store.holding([changes.BEHIND.triple])
 
     @contextmanager
     def rewritten(self) -> Iterator[None]:
@@ -201,13 +167,13 @@ class KnowledgeGraph:
             self.change((), [changes.BEHIND])
 
     @contextmanager
-    def _writing(self) -> Iterator[Any]:
+    def _writing(self) -> Iterator[UnionStore]:
         """Give the store to write to, and forget what was read of it: all writing goes this way."""
         self._say_behind()
         try:
-            yield self._store
+            yield self.store
         finally:
-            self._answers = answers_of(self._store)
+            self._answers = answers_of(self.store)
 
     @property
     def answers(self) -> KeptAnswers:
@@ -224,45 +190,24 @@ class KnowledgeGraph:
         """
         quads = belonging(quads, below)
         old = self.graphs(*below)
-        if isinstance(self._store, Store) and not old:
+        if self.store.embedded is not None and not old:
             first = next(quads, None)
             if first is None:  # nothing in the place of nothing
                 return []
             self._forget_what_was_inferred(below)
-            self._load(chain([first], quads), below)
+            with self._writing() as store:
+                store.load(chain([first], quads), below)
             return self.graphs(*below)
         new = Store()  # turns literals into the form that the store gives back: 1.0 and 1.00 are one double
         new.extend(quads)
         names = {*names_in(new), *old}
-        changed = sorted(name for name in names if not same(triples_in(new, name), triples_in(self._store, name)))
+        changed = sorted(name for name in names if not same(triples_in(new, name), self.store.triples(name)))
         if changed:
             self._forget_what_was_inferred(changed)
-            with self._writing():
-                self._write(";\n".join(replacement(name, triples_in(new, name)) for name in changed))
-            self._store.flush()
+            with self._writing() as store:
+                store.replace({name: triples_in(new, name) for name in changed})
+            self.flush()
         return changed
-
-    def _load(self, quads: Iterator[Quad], below: tuple[str, ...]) -> None:
-        """Put quads into graphs that are not there yet, and take them out again where that fails."""
-        with self._writing():
-            try:
-                for first in quads:
-                    self._bulk_load(chain([first], islice(quads, _AT_ONCE - 1)))
-                self.merge_loads()
-            except BaseException:
-                self._write(";\n".join(replacement(name, set()) for name in self.graphs(*below)))
-                raise
-
-    def _bulk_load(self, quads: Iterable[Quad]) -> None:
-        assert isinstance(self._store, Store)
-        self._store.bulk_extend(with_union(quads))
-        self._loads += 1
-
-    def merge_loads(self) -> None:
-        """Merge the files of several bulk loads: they are read slower by a third, and by who opens them next merged."""
-        if self._loads > 1 and isinstance(self._store, Store):
-            self._store.optimize()
-        self._loads = 0
 
     @telling
     def change(self, removed: Iterable[Quad], added: Iterable[Quad]) -> None:
@@ -273,42 +218,16 @@ class KnowledgeGraph:
         taken, given = set(removed), set(added)
         taken -= given
         self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
-        if isinstance(self._store, Store):
-            given |= changes.notes(self._store, taken | given)
+        if self.store.embedded is not None:
+            given |= changes.notes(self.store.embedded, taken | given)
         if has_blank_node(taken | given):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
         with self._writing() as store:
-            if not taken and isinstance(store, Store):
-                if len(given) >= _MANY:
-                    self._bulk_load(given)
-                else:
-                    store.extend(with_union(given))
-            elif taken or given:
-                triples = {quad.triple for quad in taken}
-                remaining = {quad.triple for quad in self._holding(triples) if quad not in taken}
-                lost = triples - remaining - {quad.triple for quad in given}
-                self._write(
-                    f"DELETE DATA {{ {triple_data(lost)}\n{quad_data(taken)} }} ;\n"
-                    f"INSERT DATA {{ {triple_data({quad.triple for quad in given})}\n{quad_data(given)} }}"
-                )
-
-    def _write(self, text: str) -> None:
-        """Do an update of ours."""
-        if isinstance(self._store, SparqlServer):
-            self._store.change(text)
-        else:
-            self._store.update(text)
+            store.exchange(taken, given)
 
     def flush(self) -> None:
         """Put what `change` wrote into the store's files: who opens the graph to read replays the store's log."""
-        self._store.flush()
-
-    def _holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
-        """Yield the quads of named graphs that say one of the triples."""
-        if isinstance(self._store, SparqlServer):
-            return self._store.holding(triples)
-        found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
-        return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
+        self.store.flush()
 
     def quads(self) -> Iterator[Quad]:
         """Yield the quads of all named graphs, as one query sees them."""
@@ -318,12 +237,14 @@ class KnowledgeGraph:
     @telling
     def graphs_with(self, triple: Triple) -> list[str]:
         """Return the IRIs of the named graphs that hold a triple."""
-        return [quad.graph_name.value for quad in self._holding([triple]) if isinstance(quad.graph_name, NamedNode)]
+        return [
+            quad.graph_name.value for quad in self.store.holding([triple]) if isinstance(quad.graph_name, NamedNode)
+        ]
 
     @telling
     def holds(self, triple: Triple) -> bool:
         """Whether some named graph holds a triple."""
-        return next(iter(self._holding([triple])), None) is not None
+        return next(iter(self.store.holding([triple])), None) is not None
 
     @telling
     def graphs(self, *below: str) -> list[str]:
@@ -331,20 +252,16 @@ class KnowledgeGraph:
 
         below: whole IRIs; one that ends in / stands for all graphs whose IRIs begin with it, and "" for all.
         """
-        if below and not any(map(is_of_many, below)):  # a fleet has too many to look through
-            return sorted(name for name in set(below) if self._store.contains_named_graph(NamedNode(name)))
-        return sorted(name for name in names_in(self._store) if not below or is_below(name, below))
+        return self.store.graphs(*below)
 
     @telling
     def triples(self, *below: str) -> set[Triple]:
         """Return the triples of the named graphs `below`, as in `graphs`, of all without it."""
-        if not below:
-            return {quad.triple for quad in self._store.quads_for_pattern(None, None, None, DefaultGraph())}
-        return {triple for name in self.graphs(*below) for triple in triples_in(self._store, name)}
+        return self.store.triples(*below)
 
     def quads_in(self, name: str) -> Iterator[Quad]:
         """Yield the quads of one named graph, by its whole IRI, as the store gives them."""
-        return self._store.quads_for_pattern(None, None, None, NamedNode(name))
+        return self.store.quads_in(name)
 
     @telling
     def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> AnswerTable:
@@ -386,10 +303,10 @@ class KnowledgeGraph:
         else below the graph's.
         """
         base = base or self.base
-        refuse_service(text, base, isinstance(self._store, SparqlServer))
+        refuse_service(text, base, self.store.embedded is None)
         whole = not (default_graphs or named_graphs)
         try:
-            return self._store.query(
+            return self.store.query(
                 text,
                 base_iri=base,
                 prefixes=self.prefixes,
@@ -428,93 +345,38 @@ class KnowledgeGraph:
         Graphs and base are those of `answer`. InputError where the text is no update, reads from elsewhere, or fails.
         """
         base = base or self.base
-        check(text, base, isinstance(self._store, SparqlServer))
+        check(text, base, self.store.embedded is None)
         if default_graphs or named_graphs:
             text = using(text, default_graphs, named_graphs, base)
 
         def construct(asked: str) -> set[Triple]:
-            return set(cast(QueryTriples, self._store.query(asked, base_iri=base, prefixes=self.prefixes)))
+            return set(cast(QueryTriples, self.store.query(asked, base_iri=base, prefixes=self.prefixes)))
 
         try:
-            change = by_asking(text, self._holding, construct, base, self.prefixes)
+            change = by_asking(text, self.store.holding, construct, base, self.prefixes)
             removed, added = change or by_doing(text, self.quads(), base, self.prefixes)
         except (SyntaxError, RuntimeError) as error:
             raise InputError(f"the update failed, nothing changed: {error}") from error
         return removed, named_below(added, self.iri("genid/"))
 
-    def said(self, subject: Subject, predicate: NamedNode) -> set[Quad]:
-        """Return the quads of named graphs that say a property of a subject."""
-        rows = self._store.query(f"SELECT ?o ?g {{ GRAPH ?g {{ {subject} {predicate} ?o }} }}")
-        return {Quad(subject, predicate, row["o"], row["g"]) for row in cast(QuerySolutions, rows)}
-
-    @telling
-    def about(self, node: NamedNode | BlankNode) -> list[Quad]:
-        """Return the quads of named graphs that have a node for subject or object; not of a server's graph."""
-        assert isinstance(self._store, Store)
-        return [
-            quad
-            for ends in ((node, None), (None, node))
-            for quad in self._store.quads_for_pattern(ends[0], None, ends[1], None)
-            if not isinstance(quad.graph_name, DefaultGraph)
-        ]
-
-    def said_of(self, nodes: Iterable[NamedNode | BlankNode]) -> Iterator[tuple[Any, Any, Any, NamedNode]]:
-        """Yield subject, predicate, object and named graph of what has one of some nodes for subject.
-
-        Not of a server's graph.
-        """
-        named, others = by_name(nodes)
-        for some in named:
-            rows = self._store.query(f"SELECT ?s ?p ?o ?g {{ VALUES ?s {{ {some} }} GRAPH ?g {{ ?s ?p ?o }} }}")
-            yield from map(tuple, cast(Any, rows))
-        yield from (cast(Any, tuple(quad)) for node in others for quad in self.about(node) if quad.subject == node)
-
-    @telling
-    def leading_to(self, nodes: Iterable[NamedNode | BlankNode], apart: Iterable[str]) -> set[NamedNode | BlankNode]:
-        """Return the subjects of which named graphs, but for some, say something with one of some nodes for object."""
-        named, others = by_name(nodes)
-        without = ", ".join(f"<{name}>" for name in apart)
-        form = "SELECT DISTINCT ?s {{ VALUES ?o {{ {} }} GRAPH ?g {{ ?s ?p ?o }} FILTER(?g NOT IN ({})) }}"
-        linked = {
-            row[0] for some in named for row in cast(QuerySolutions, self._store.query(form.format(some, without)))
-        }
-        apart = set(apart)
-        quads = (quad for node in others for quad in self.about(node) if quad.object == node)
-        linked.update(quad.subject for quad in quads if getattr(quad.graph_name, "value", "") not in apart)
-        return linked
-
-    @telling
-    def subjects(self, predicate: NamedNode, object: NamedNode) -> set[NamedNode | BlankNode]:
-        """Return the subjects of the triples that end so; not of a server's graph."""
-        assert isinstance(self._store, Store)
-        quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
-        return {quad.subject for quad in quads}  # type: ignore[misc]
-
-    def sizes(self) -> Iterator[tuple[str, int]]:
-        """Yield the IRIs of the named graphs and how many triples each holds."""
-        rows = self._store.query("SELECT ?g (COUNT(*) AS ?n) { GRAPH ?g { ?s ?p ?o } } GROUP BY ?g")
-        for row in cast(QuerySolutions, rows):
-            yield row["g"].value, int(row["n"].value)
-
     @telling
     def changed(self, reader: str) -> set[Quad] | None:
         """Return the notes of `changes` for GRAPH_INFERRED or GRAPH_VALIDATION; None on a server, where none are."""
-        return changes.noted(self._store, reader) if isinstance(self._store, Store) else None
+        return None if self.store.embedded is None else changes.noted(self.store.embedded, reader)
 
     def made_of(self) -> set[Quad]:
         """Return what `changes` says of the inferred graphs and the report as a whole; nothing of a server's graph."""
-        return changes.made_of(self._store) if isinstance(self._store, Store) else set()
+        return set() if self.store.embedded is None else changes.made_of(self.store.embedded)
 
     def _forget_what_was_inferred(self, written: Iterable[str]) -> None:
         """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
         if all(name.startswith(changes.NOT_ASSERTED) for name in written):
             return
         self.asserted_since += 1
-        if isinstance(self._store, Store):
-            self.change(changes.made_of(self._store), ())
+        self.change(self.made_of(), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
         """Return the functions that reach the samples of runs, where their files are known."""
-        if isinstance(self._store, SparqlServer) or self._workspace is None:
+        if self.store.embedded is None or self._workspace is None:
             return {}
-        return series_functions(self._store, self._workspace, faults)
+        return series_functions(self.store.embedded, self._workspace, faults)

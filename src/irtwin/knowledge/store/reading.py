@@ -11,9 +11,7 @@ from collections.abc import Hashable
 from threading import Lock
 from typing import Any
 
-from pyoxigraph import Store
-
-from irtwin.knowledge.store.sparql_server import SparqlServer
+from irtwin.knowledge.store.union_store import UnionStore
 
 MOST_ANSWERS = 256
 # What answers anew each time, and the functions that read files; a backslash may hide them.
@@ -46,6 +44,6 @@ class KeptAnswers:
                 del self._answers[next(iter(self._answers))]
 
 
-def answers_of(store: Store | SparqlServer) -> KeptAnswers:
+def answers_of(store: UnionStore) -> KeptAnswers:
     """Return where answers of a store are kept that nobody else writes to: others write to a server."""
-    return KeptAnswers(0 if isinstance(store, SparqlServer) else MOST_ANSWERS)
+    return KeptAnswers(0 if store.embedded is None else MOST_ANSWERS)
