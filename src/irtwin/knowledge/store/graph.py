@@ -217,11 +217,14 @@ class KnowledgeGraph:
         """
         taken, given = set(removed), set(added)
         taken -= given
-        self.asserted_since += any(map(changes.is_asserted, chain(taken, given)))
-        if self.store.embedded is not None:
-            given |= changes.notes(self.store.embedded, taken | given)
-        if has_blank_node(taken | given):
+        both = taken | given
+        if has_blank_node(both):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
+        self.asserted_since += any(map(changes.is_asserted, both))
+        if (embedded := self.store.embedded) is not None:
+            notes = changes.notes(embedded, both)
+            taken -= notes
+            given |= {note for note in notes if note not in embedded}  # those of a live robot are there already
         with self._writing() as store:
             store.exchange(taken, given)
 
