@@ -10,11 +10,10 @@ properties, equalities, lists, keys of its own), or nodes have no name, the grap
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from itertools import chain
+from itertools import chain, islice
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -25,10 +24,8 @@ from pyoxigraph import BlankNode, NamedNode, Quad, Triple
 from irtwin.knowledge.owl_rl.program import program
 from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.rules.files import all_rules
-from irtwin.knowledge.store.changes import is_asserted
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
-    GRAPH_ACTIVITY,
     GRAPH_CHANGED,
     GRAPH_INFERRED,
     GRAPH_MAPPED,
@@ -46,10 +43,12 @@ Row = tuple[Any, Any, Any, NamedNode]  # subject, predicate, object, and the nam
 
 MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
 MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
+_AT_ONCE = 500_000  # nodes that are looked up among those that are known
 
 TYPE = NamedNode(RDF + "type")
 EQUALITIES = {NamedNode(OWL + name) for name in ("sameAs", "differentFrom")}
 _ROBOT = NamedNode(term("Industrial_Robot"))
+_ONTOLOGY = NamedNode(GRAPH_ONTOLOGY)
 _NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED, GRAPH_MAPPED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
@@ -115,17 +114,14 @@ class Region:
     nodes: set[Name] = field(default_factory=set)
     asserted: set[Triple] = field(default_factory=set)
     concluded: set[Quad] = field(default_factory=set)
-    read: Counter[str] = field(default_factory=Counter)  # how many quads, by their graphs
 
     def take(self, rows: Iterable[Row], ontology: Ontology) -> set[Name]:
         """Take in quads; return the nodes of parts that are their objects."""
-        terms, names, counts = ontology.terms, set[Name](), dict[NamedNode, int]()
-        places = dict[NamedNode, str]()
+        terms, names, places = ontology.terms, set[Name](), dict[NamedNode, str]()
         for subject, predicate, object, graph in rows:
             place = places.get(graph)
             if place is None:
-                place, counts[graph] = places.setdefault(graph, _place(graph.value)), 0
-            counts[graph] += 1
+                place = places.setdefault(graph, _place(graph.value))
             if place == _ASSERTED:
                 self.asserted.add(Triple(subject, predicate, object))
             elif place == _APART:
@@ -136,8 +132,6 @@ class Region:
                     continue
             if type(object) in _NAMES and predicate != TYPE and object not in terms:
                 names.add(object)
-        for graph, count in counts.items():
-            self.read[_kind(graph.value)] += count
         return names
 
 
@@ -145,7 +139,7 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
     """Return the parts that the seeds belong to, or None where one is a term that more is said of than the ontology."""
     region, todo = Region(), set(seeds)
     terms = todo & ontology.terms
-    if any(_place(name.value) == _ASSERTED and name.value != GRAPH_ONTOLOGY for *_, name in graph.store.said_of(terms)):
+    if any(map(_says_more, graph.store.said_of(terms))):
         return None
     todo -= terms
     while todo:
@@ -196,30 +190,27 @@ def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
 
 def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
     """Yield the ontology alone, as a part without nodes, and all parts, robots first; None as `around`."""
-    unread, hashes = held(graph), [np.empty(0, np.int64)]  # of nodes 8 bytes each, for a fleet has millions
-    for region in chain([of_ontology(graph, ontology)], some(graph, ontology, robots_of(graph, ontology))):
+    of_terms = list(graph.store.said_of(term for term in ontology.terms if isinstance(term, Name)))
+    if any(map(_says_more, of_terms)):
+        yield None
+        return
+    led_to = {node for row in of_terms for node in ontology.nodes(Triple(*row[:3]))}
+    nodes = chain(led_to, graph.store.speakers(_NOT_FOLLOWED))  # as they are now, before anything is concluded
+    known = [_hashes(ontology.terms)]  # of nodes 8 bytes each, for a fleet has millions
+    alone = Region()
+    alone.take((row for row in of_terms if row[3] != _ONTOLOGY and not ontology.nodes(Triple(*row[:3]))), ontology)
+    yield alone
+    for region in some(graph, ontology, robots_of(graph, ontology)):
         if region is not None:
-            hashes.append(_hashes(region.nodes))
-            unread -= region.read
+            known.append(_hashes(region.nodes))
         yield region
-    left = set[Name]()
-    for quad in _of_kinds(graph, unread.keys()):
-        nodes = ontology.nodes(quad.triple)
-        if not nodes and is_asserted(quad):
-            yield None
-            return
-        left.update(nodes)
-    known = np.isin(_hashes(left), np.concatenate(hashes))
-    yield from some(graph, ontology, [node for node, is_known in zip(left, known, strict=True) if not is_known])
+    yield from some(graph, ontology, _unknown(nodes, np.concatenate(known)))
 
 
-def held(graph: KnowledgeGraph) -> Counter[str]:
-    """Return how many quads of each kind of named graph there are, but for the ontology."""
-    counts = Counter[str]()
-    for name, count in graph.store.sizes():
-        if (kind := _kind(name)) and kind != GRAPH_ONTOLOGY:
-            counts[kind] += count
-    return counts
+def _unknown(nodes: Iterator[Name], known: npt.NDArray[np.int64]) -> Iterator[Name]:
+    """Yield the nodes whose hashes are not among those that are known, (N,)."""
+    while batch := list(islice(nodes, _AT_ONCE)):
+        yield from (node for node, is_known in zip(batch, np.isin(_hashes(batch), known), strict=True) if not is_known)
 
 
 def together(regions: Iterable[Region | None]) -> Iterator[list[Region]]:
@@ -253,33 +244,12 @@ def one(regions: Iterable[Region]) -> Region:
     return whole
 
 
-def of_ontology(graph: KnowledgeGraph, ontology: Ontology) -> Region:
-    """Return what was concluded of the ontology alone, as a part without nodes."""
-    region = Region()
-    if graph.graphs(GRAPH_INFERRED):
-        statements = graph.store.said_of(term for term in ontology.terms if isinstance(term, Name))
-        of_none = (
-            row for row in statements if _place(row[3].value) != _ASSERTED and not ontology.nodes(Triple(*row[:3]))
-        )
-        region.take(of_none, ontology)
-    return region
+def _says_more(row: Row) -> bool:
+    """Whether what is said of a term stands in an asserted graph that is not the ontology's."""
+    return row[3] != _ONTOLOGY and _place(row[3].value) == _ASSERTED
 
 
-def _of_kinds(graph: KnowledgeGraph, kinds: Collection[str]) -> Iterator[Quad]:
-    """Yield the quads of the named graphs of some kinds."""
-    for name in graph.graphs() if kinds else ():
-        if _kind(name) in kinds:
-            yield from graph.quads_in(name)
-
-
-def _kind(name: str) -> str:
-    """Return what a graph is counted with; nothing where it is neither asserted nor inferred."""
-    if name.startswith(GRAPH_ACTIVITY):
-        return GRAPH_ACTIVITY
-    return "" if name.startswith(_NOT_FOLLOWED) else name
-
-
-def _hashes(nodes: Collection[Name]) -> npt.NDArray[np.int64]:
+def _hashes(nodes: Collection[object]) -> npt.NDArray[np.int64]:
     return np.fromiter(map(hash, nodes), np.int64, len(nodes))
 
 

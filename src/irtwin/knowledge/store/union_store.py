@@ -197,10 +197,11 @@ class UnionStore:
         quads = self._store.quads_for_pattern(None, predicate, object, DefaultGraph())
         return {quad.subject for quad in quads}  # type: ignore[misc]
 
-    def sizes(self) -> Iterator[tuple[str, int]]:
-        """Yield the IRIs of the named graphs and how many triples each holds."""
-        for row in self._rows("SELECT ?g (COUNT(*) AS ?n) { GRAPH ?g { ?s ?p ?o } } GROUP BY ?g"):
-            yield row["g"].value, int(row["n"].value)
+    def speakers(self, apart: Iterable[str]) -> Iterator[NamedNode | BlankNode]:
+        """Yield the subjects of all named graphs but for some, each once."""
+        without = ", ".join(f"<{name}>" for name in apart)
+        rows = self._rows(f"SELECT DISTINCT ?s {{ GRAPH ?g {{ ?s ?p ?o }} FILTER(?g NOT IN ({without})) }}")
+        return (row[0] for row in rows)
 
     def _rows(self, text: str) -> QuerySolutions:
         return cast(QuerySolutions, self._store.query(text))
