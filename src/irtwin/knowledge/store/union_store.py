@@ -28,7 +28,6 @@ from irtwin.knowledge.store.blank_nodes import by_name
 from irtwin.knowledge.store.damage import check_files, telling, told
 from irtwin.knowledge.store.named_graphs import is_below, is_of_many, names_in, triples_in
 from irtwin.knowledge.store.sparql_server import SparqlServer, is_url
-from irtwin.knowledge.store.union import quad_data, replacement, triple_data, with_union
 
 Subject = NamedNode | BlankNode | Triple
 _MANY = 10_000  # new quads: from there on a file of their own is quicker than the store's log, and takes no memory
@@ -127,7 +126,7 @@ class UnionStore:
 
     def replace(self, contents: dict[str, set[Triple]]) -> None:
         """Make triples the whole content of named graphs, in one transaction."""
-        self._write(";\n".join(replacement(name, triples) for name, triples in contents.items()))
+        self._write(";\n".join(_replacement(name, triples) for name, triples in contents.items()))
 
     def exchange(self, taken: set[Quad], given: set[Quad]) -> None:
         """Take quads out of their named graphs and put others in, none of both, in one transaction."""
@@ -140,8 +139,8 @@ class UnionStore:
             triples, new = ({quad.triple for quad in quads} for quads in (taken, given))
             lost = triples - new - {quad.triple for quad in self.holding(triples) if quad not in taken}
             self._write(
-                f"DELETE DATA {{ {triple_data(lost)}\n{quad_data(taken)} }} ;\n"
-                f"INSERT DATA {{ {triple_data(new)}\n{quad_data(given)} }}"
+                f"DELETE DATA {{ {_triple_data(lost)}\n{_quad_data(taken)} }} ;\n"
+                f"INSERT DATA {{ {_triple_data(new)}\n{_quad_data(given)} }}"
             )
 
     def _write(self, text: str) -> None:
@@ -205,3 +204,35 @@ class UnionStore:
 
     def _rows(self, text: str) -> QuerySolutions:
         return cast(QuerySolutions, self._store.query(text))
+
+
+def with_union(quads: Iterable[Quad]) -> Iterator[Quad]:
+    """Yield each quad, and its triple for the default graph."""
+    for quad in quads:
+        yield quad
+        yield Quad(*quad.triple)
+
+
+def _replacement(name: str, triples: set[Triple]) -> str:
+    """Return the SPARQL Update that swaps a named graph's content, and keeps the default graph the union."""
+    text = "\n".join(f"{triple} ." for triple in triples)
+    return f"""
+    DELETE {{ ?s ?p ?o }} WHERE {{
+      GRAPH <{name}> {{ ?s ?p ?o }}
+      FILTER NOT EXISTS {{ GRAPH ?other {{ ?s ?p ?o }} FILTER(?other != <{name}>) }}
+    }} ;
+    DROP SILENT GRAPH <{name}> ;
+    INSERT DATA {{ {text} GRAPH <{name}> {{ {text} }} }}"""
+
+
+def _quad_data(quads: Iterable[Quad]) -> str:
+    """Write quads of named graphs as SPARQL's QuadData, the triples of each graph together."""
+    by_graph: dict[Any, list[Triple]] = {}
+    for quad in quads:
+        by_graph.setdefault(quad.graph_name, []).append(quad.triple)
+    return "\n".join(f"GRAPH {name} {{ {_triple_data(triples)} }}" for name, triples in by_graph.items())
+
+
+def _triple_data(triples: Iterable[Triple]) -> str:
+    """Write triples as SPARQL's TriplesTemplate."""
+    return " .\n".join(map(str, triples))

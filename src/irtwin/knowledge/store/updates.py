@@ -18,7 +18,7 @@ from irtwin.knowledge.store.keywords import is_update, parse_update, refuse_serv
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.sparql_text import SPACE, after_prologue
 from irtwin.knowledge.store.syntax_error import in_words
-from irtwin.knowledge.store.union import with_union
+from irtwin.knowledge.store.union_store import with_union
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, PREFIXES
 
 _NO_GRAPH = re.compile(r"The graph <([^>]*)> does not exist")
