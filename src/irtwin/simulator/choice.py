@@ -15,7 +15,8 @@ import scipy
 
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import Criterion
-from irtwin.simulator.fit import BY_WHOLE, LIKELY, SHARED, SMOOTH, Fit, Played, Slopes, StepEquations, marginal
+from irtwin.simulator.equations import Equations
+from irtwin.simulator.fit import LIKELY, SHARED, SMOOTH, Fit, Played
 from irtwin.simulator.servos import HOLDS, NAMES, PARTS, SOFT
 
 _HOLDING = NAMES.index("holding")
@@ -40,7 +41,7 @@ class DifferingNumbers:
 
     fit: Fit
     played: Played
-    slopes: Slopes
+    slopes: Equations
     differs: np.ndarray
     odds: np.ndarray
     interval: np.ndarray
@@ -69,10 +70,9 @@ class DifferingNumbers:
         ends = self.fit.servos.chart(self.interval)
         spread, at = (ends[1] - ends[0]) / (2 * NORMAL), self.played.at.copy()
         for joint in range(at.shape[1]):
-            rows, normal, _ = _equations(self.fit, self.played, self.slopes, self.differs, joint)
-            inverse = np.linalg.inv(normal)
-            alike = inverse / np.sqrt(np.outer(np.diag(inverse), np.diag(inverse)))
-            at[rows, joint] += spread[rows, joint] * rng.multivariate_normal(np.zeros(len(rows)), alike)
+            own = self.fit.equations(self.played.at, self.slopes, self.differs, joint)
+            alike = np.linalg.inv(own.normal) / np.sqrt(np.outer(own.variance, own.variance))
+            at[own.rows, joint] += spread[own.rows, joint] * rng.multivariate_normal(np.zeros(len(own.rows)), alike)
         at[list(SHARED)] += spread[list(SHARED)] * rng.standard_normal((len(SHARED), 1))
         return self.fit.servos.of_chart(at)
 
@@ -80,8 +80,8 @@ class DifferingNumbers:
         """Return the numbers (k, n) that fit when stretches (p,) are left out, by one step from those of all."""
         at = self.played.at.copy()
         for joint in range(at.shape[1]):
-            rows, normal, right = _equations(self.fit, self.played, self.slopes, self.differs, joint, ~left_out)
-            at[rows, joint] += np.clip(np.linalg.solve(normal, right), -0.5, 0.5)
+            own = self.fit.equations(self.played.at, self.slopes, self.differs, joint, ~left_out)
+            at[own.rows, joint] += np.clip(own.step(), -0.5, 0.5)
         return self.fit.servos.of_chart(at)
 
 
@@ -121,9 +121,9 @@ def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> 
     `part` and `robots` (k, 1): what joints share of it, and of what was found before.
     """
     free, own = _free(fit) | robots, fit.servos.chart(fit.servos.numbers)
-    _, normal, each = _of_robot(fit, best, free | part)
+    shared, each = _of_robot(fit, best, free | part)
     pull = each.sum(axis=0)
-    if pull @ np.linalg.solve(normal, pull) / 2 < _SHOWS:
+    if pull @ replace(shared, right=pull).step() / 2 < _SHOWS:
         return best, False
     begun = (best, fit.played(np.where(robots, best.at, own)))
     alone = np.broadcast_to(part, own.shape)
@@ -226,12 +226,11 @@ def _evidences(fit: Fit, ways: Sequence[tuple[Played, np.ndarray]]) -> list[np.n
     rows = [[row for row in SMOOTH if differs[row].any()] or SMOOTH[:1] for _, differs in ways]
     every = fit.all_slopes([(best, own) for (best, _), own in zip(ways, rows, strict=True)])
     evidences = []
-    for (best, differs), own, slopes in zip(ways, rows, every, strict=True):
+    for (best, differs), slopes in zip(ways, every, strict=True):
         found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
         for joint in range(differs.shape[1]):
-            some = [row for row in own if differs[row, joint]]
-            _, normal, _ = fit.equations(best.at, slopes, own, some, joint)
-            found[joint] += np.linalg.slogdet(normal * LIKELY[some, 0] * LIKELY[some, 0, None])[1] / 2
+            one = fit.equations(best.at, slopes, differs, joint)
+            found[joint] += one.known(LIKELY[one.rows, 0])
         evidences.append(found)
     return evidences
 
@@ -272,7 +271,7 @@ def certainty(best: Played) -> np.ndarray:
     return np.asarray(np.clip(np.median(counts, axis=0), 1.0, _MOST / len(counts)))
 
 
-def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _weighed(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much the cost rises (k, n) where a number is given back, and by how much it has to, to differ.
 
     The latter is what the number could have been besides, and which of all numbers it is.
@@ -280,10 +279,9 @@ def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tup
     own, loss = fit.servos.chart(fit.servos.numbers), np.full(differs.shape, np.inf)
     worth = np.full(differs.shape, np.log(len(NAMES)))
     for joint in range(differs.shape[1]):
-        rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-        variance = np.diag(np.linalg.inv(normal))
-        loss[rows, joint] = (best.at - own)[rows, joint] ** 2 / variance / 2
-        worth[rows, joint] += np.log(LIKELY[rows, 0] ** 2 / variance) / 2
+        one = fit.equations(best.at, slopes, differs, joint)
+        loss[one.rows, joint] = (best.at - own)[one.rows, joint] ** 2 / one.variance / 2
+        worth[one.rows, joint] += np.log(LIKELY[one.rows, 0] ** 2 / one.variance) / 2
     if differs[_HOLDING].any():
         back = best.at.copy()
         back[_HOLDING] = own[_HOLDING]
@@ -291,7 +289,7 @@ def _weighed(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> tup
     return loss, worth
 
 
-def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np.ndarray:
+def _interval(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray) -> np.ndarray:
     """Return the ends of 95 % (2, k, n) of the numbers, by how stretches disagree, and by what is left of each.
 
     Numbers that were given back may differ all the same: without gravity's load, motion alone says little of the scale
@@ -299,67 +297,47 @@ def _interval(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray) -> np
     """
     spread = np.zeros(differs.shape)
     for joint in range(differs.shape[1]):
-        rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-        each = slopes.right[:, joint][:, [SMOOTH.index(row) for row in rows]]
+        own = fit.equations(best.at, slopes, differs, joint)
+        each = slopes.some(own.rows).right[:, joint]
         doubt = _doubt(fit, best, slopes, differs, joint)
-        spread[rows, joint] = np.sqrt(variance(normal, each, len(rows)) + doubt)
-    rows, normal, each = _of_robot(fit, best, differs)
-    spread[rows] = np.sqrt(variance(normal, each, 1))[:, None]
+        spread[own.rows, joint] = np.sqrt(own.disagreement(each, len(own.rows)) + doubt)
+    shared, each = _of_robot(fit, best, differs)
+    spread[shared.rows] = np.sqrt(shared.disagreement(each, 1))[:, None]
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
 
 
-def variance(normal: np.ndarray, each: np.ndarray, count: int) -> np.ndarray:
-    """Return the variance (D,) of `count` numbers, by their equations and by how right sides (p, D) differ."""
-    inverse = np.linalg.inv(normal)
-    between = inverse @ (each.T @ each) @ inverse * len(each) / max(len(each) - count, 1)
-    return np.asarray(np.maximum(np.diag(between), np.diag(inverse)))
-
-
 def _known(fit: Fit, best: Played, free: np.ndarray) -> float:
-    """Return how much better than before what joints share is known, of what is free (k, n): half a log determinant."""
-    rows, normal, _ = _of_robot(fit, best, free)
-    return float(np.linalg.slogdet(normal * LIKELY[rows, 0] * LIKELY[rows, 0, None])[1] / 2)
+    """Return how much better than before what joints share is known, of what is free (k, n)."""
+    shared, _ = _of_robot(fit, best, free)
+    return shared.known(LIKELY[shared.rows, 0])
 
 
-def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """Return rows that joints share and are free (k, n), their normal equations, and each stretch's right side."""
+def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[Equations, np.ndarray]:
+    """Return the equations of rows that joints share and are free (k, n), and each stretch's right side (p, k)."""
     alike = [row for row in SHARED if free[row].any()]
-    rows = (*SMOOTH, *alike)
-    slopes = fit.slopes(best, rows)
-    joints = [
-        fit.equations(best.at, slopes, rows, [row for row in rows if free[row, joint]], joint)
-        for joint in range(free.shape[1])
-    ]
-    rights = []
-    for each in slopes.right:
-        parts = [
-            one._replace(right=each[joint, [rows.index(row) for row in one.rows]]) for joint, one in enumerate(joints)
-        ]
-        rights.append(marginal(parts, alike)[1])
-    return alike, marginal(joints, alike)[0], np.array(rights)
+    slopes = fit.slopes(best, (*SMOOTH, *alike))
+    found, rights = [], []
+    for joint in range(free.shape[1]):
+        own = fit.equations(best.at, slopes, free, joint)
+        found.append(own.marginal(alike))
+        rights.append(replace(own, right=slopes.some(own.rows).right[:, joint]).marginal(alike).right)
+    return Equations.beside(found).together(), np.sum(rights, axis=0)
 
 
-def _doubt(fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int) -> np.ndarray:
+def _doubt(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray, joint: int) -> np.ndarray:
     """Return what a joint's numbers that were given back add to the variance of those that differ.
 
     Each adds what freeing it would, as likely as the data leave it that it differs.
     """
-    rows, normal, _ = _equations(fit, best, slopes, differs, joint)
-    before, found = np.diag(np.linalg.inv(normal)), np.zeros(len(rows))
-    for row in (one for one in SMOOTH if one not in rows):
+    before = fit.equations(best.at, slopes, differs, joint)
+    found = np.zeros(len(before.rows))
+    for row in (one for one in SMOOTH if one not in before.rows):
         freed = differs.copy()
         freed[row, joint] = True
-        some, normal, right = _equations(fit, best, slopes, freed, joint)
-        variance, step = np.diag(np.linalg.inv(normal)), np.linalg.solve(normal, right)
-        own, others = some.index(row), [some.index(one) for one in rows]
+        after = fit.equations(best.at, slopes, freed, joint)
+        variance, step = after.variance, after.step()
+        own, others = after.rows.index(row), [after.rows.index(one) for one in before.rows]
         worth = np.log(len(NAMES)) + np.log(LIKELY[row, 0] ** 2 / variance[own]) / 2
         chance = scipy.special.expit(step[own] ** 2 / variance[own] / 2 - worth)
-        found += chance * (np.maximum(variance[others] - before, 0.0) + step[others] ** 2)
+        found += chance * (np.maximum(variance[others] - before.variance, 0.0) + step[others] ** 2)
     return found
-
-
-def _equations(
-    fit: Fit, best: Played, slopes: Slopes, differs: np.ndarray, joint: int, chosen: np.ndarray | slice = slice(None)
-) -> StepEquations:
-    """Return a joint's own numbers that differ and are smooth, and the normal equations of a step from them."""
-    return fit.equations(best.at, slopes, BY_WHOLE, [row for row in BY_WHOLE if differs[row, joint]], joint, chosen)

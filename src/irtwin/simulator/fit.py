@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from irtwin.identification.progress import tell_step
 from irtwin.signals.sampling import interval
 from irtwin.simulator.alone import Alone
+from irtwin.simulator.equations import Equations
 from irtwin.simulator.play import PlayedStretch, play
 from irtwin.simulator.servos import HOLDS, NAMES, OF_JOINTS, OF_ROBOT, SOFT, Servos
 
@@ -58,41 +59,6 @@ class Played:
     at: np.ndarray  # (k, n), in the chart
     remainders: tuple[np.ndarray, ...]  # a stretch: (N, c, n), robot less model
     squares: np.ndarray
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Normal equations of each stretch and joint about numbers: `normal` (p, n, k, k), `right` (p, n, k)."""
-
-    normal: np.ndarray
-    right: np.ndarray
-
-
-class StepEquations(NamedTuple):
-    """Normal equations for a step of some `rows` of the numbers at a joint: `normal` (j, j), `right` (j,)."""
-
-    rows: Sequence[int]
-    normal: np.ndarray
-    right: np.ndarray
-
-
-def marginal(joints: Sequence[StepEquations], rows: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of rows that joints share, each joint's own numbers fitted beside."""
-    normal, right = np.zeros((len(rows), len(rows))), np.zeros(len(rows))
-    for one in joints:
-        places = [one.rows.index(row) for row in rows]
-        others = [place for place, row in enumerate(one.rows) if row not in rows]
-        cross = one.normal[np.ix_(others, places)]
-        beside = np.column_stack([cross, one.right[others]])
-        found = np.linalg.solve(one.normal[np.ix_(others, others)], beside)
-        normal += one.normal[np.ix_(places, places)] - cross.T @ found[:, :-1]
-        right += one.right[places] - cross.T @ found[:, -1]
-    return normal, right
-
-
-def no_farther(step: np.ndarray, rows: Sequence[int]) -> np.ndarray:
-    """Return a step of rows, or the part of it that goes no farther than one step should."""
-    return np.asarray(step / max(1.0, np.abs(step / FARTHEST[rows, 0]).max(initial=0.0)))
 
 
 def _remainder(stretch: PlayedStretch, moved: np.ndarray) -> np.ndarray:
@@ -193,26 +159,30 @@ class Fit:
         off[_HOLDING] = 0.0
         return np.asarray(off)
 
-    def slopes(self, one: Played, rows: Sequence[int] = SMOOTH) -> Slopes:
-        """Return the normal equations of some rows of the numbers, weighted as the misfit counts."""
+    def slopes(self, one: Played, rows: Sequence[int] = SMOOTH) -> Equations:
+        """Return the equations (p, n, ...) of each stretch and joint for a step of some rows of the numbers."""
         return self.all_slopes([(one, rows)])[0]
 
-    def all_slopes(self, many: Sequence[tuple[Played, Sequence[int]]]) -> list[Slopes]:
-        """Return the normal equations about several numbers, each of its rows."""
+    def all_slopes(self, many: Sequence[tuple[Played, Sequence[int]]]) -> list[Equations]:
+        """Return the equations about several numbers, each of its rows."""
         stepped = [one.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for one, rows in many for row in rows]
         moved = iter(self.all_played(stepped))
-        return [self._slopes(one, rows, [next(moved) for _ in rows]) for one, rows in many]
+        return [
+            self.sums(one, rows, [next(moved) for _ in rows], np.array([STEP[row, 0] for row in rows]))
+            for one, rows in many
+        ]
 
-    def _slopes(self, one: Played, rows: Sequence[int], moved: Sequence[Played]) -> Slopes:
-        normal, right = [], []
+    def sums(self, one: Played, rows: Sequence[Any], moved: Sequence[Played], steps: np.ndarray) -> Equations:
+        """Return the equations (p, n, ...) of each stretch and joint, weighted as the misfit counts.
+
+        By what is left where each of the rows is `moved` by one of `steps` (k,).
+        """
+        found = []
         for place, left in enumerate(one.remainders):
-            columns = np.stack(
-                [(left - each.remainders[place]) / STEP[row, 0] for row, each in zip(rows, moved, strict=True)], axis=-1
-            )
+            columns = left - np.array([each.remainders[place] for each in moved]).reshape(-1, *left.shape)
             weight = self.certainty / (len(left) * (one.squares[place] + self.floor**2))
-            normal.append(np.einsum("tcnk,tcnl,cn->nkl", columns, columns, weight, optimize=True))
-            right.append(np.einsum("tcnk,tcn,cn->nk", columns, left, weight, optimize=True))
-        return Slopes(np.array(normal), np.array(right))
+            found.append(Equations.of(rows, columns / steps[:, None, None, None], left, weight))
+        return Equations.beside(found)
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
         """Return numbers with those that are free (k, n) fitted."""
@@ -231,7 +201,7 @@ class Fit:
         for number in range(passes):
             every = self.all_slopes([(found[k], rows[k]) for k in going])
             steps = [
-                self._steps(found[k].at, slopes, rows[k], free[k], damping[k] * times)
+                self._steps(found[k].at, slopes, free[k], damping[k] * times)
                 for k, slopes in zip(going, every, strict=True)
                 for times in _DAMPINGS
             ]
@@ -251,34 +221,27 @@ class Fit:
             tell_step(f"  numbers of servos, pass {number + 1} of {passes} at most: {left:.3g} mrad left")
         return found
 
-    def _steps(
-        self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], free: np.ndarray, damping: np.ndarray
-    ) -> np.ndarray:
+    def _steps(self, at: np.ndarray, slopes: Equations, free: np.ndarray, damping: np.ndarray) -> np.ndarray:
         """Return the step (k, n) of all numbers, none of those that are not free."""
-        steps, equations = np.zeros(at.shape), []
-        for joint in range(at.shape[1]):
-            one = self.equations(at, slopes, rows, [row for row in rows if free[row, joint]], joint)
-            equations.append(one._replace(normal=one.normal + damping[joint] * np.diag(np.diag(one.normal))))
-        alike = [row for row in rows if row in SHARED]
+        steps = np.zeros(at.shape)
+        joints = [self.equations(at, slopes, free, joint).damped(own) for joint, own in enumerate(damping)]
+        alike = [row for row in slopes.rows if row in SHARED]
         if alike:
-            steps[alike] = no_farther(np.linalg.solve(*marginal(equations, alike)), alike)[:, None]
-        for joint, (own, normal, right) in enumerate(equations):
-            of_joint = [place for place, row in enumerate(own) if row not in SHARED]
-            right = (right - normal @ steps[own, joint])[of_joint]  # beside the step of what joints share
-            step = np.linalg.solve(normal[np.ix_(of_joint, of_joint)], right)
-            some = [own[place] for place in of_joint]
-            steps[some, joint] = no_farther(step, some)
+            shared = Equations.beside([one.marginal(alike) for one in joints]).together()
+            steps[alike] = shared.step(FARTHEST[alike, 0])[:, None]
+        for joint, one in enumerate(joints):
+            own = [row for row in one.rows if row not in SHARED]
+            beside = replace(one, right=one.right - one.normal @ steps[one.rows, joint])  # the step of what they share
+            steps[own, joint] = beside.some(own).step(FARTHEST[own, 0])
         return steps
 
     def equations(
-        self, at: np.ndarray, slopes: Slopes, rows: Sequence[int], own: Sequence[int], joint: int,
-        chosen: np.ndarray | slice = slice(None),
-    ) -> StepEquations:  # fmt: skip
-        """Return a joint's equations for a step of its `own` of the slopes' rows, from stretches that are chosen."""
-        places, likely = [list(rows).index(row) for row in own], LIKELY[own, 0]
-        normal = slopes.normal[chosen, joint].sum(axis=0)[np.ix_(places, places)] + np.diag(likely**-2.0)
-        right = slopes.right[chosen, joint].sum(axis=0)[places] - self.away(at)[own, joint] / likely
-        return StepEquations(own, normal, right)
+        self, at: np.ndarray, slopes: Equations, free: np.ndarray, joint: int, chosen: np.ndarray | slice = slice(None)
+    ) -> Equations:
+        """Return a joint's equations of those of the slopes' rows that are free (k, n), from stretches chosen."""
+        own = [row for row in slopes.rows if free[row, joint]]
+        every = Equations(slopes.rows, slopes.normal[chosen, joint], slopes.right[chosen, joint])
+        return every.together().some(own).likely(self.away(at)[own, joint], LIKELY[own, 0])
 
     def _costs(self, tried: Sequence[Played], together: bool) -> np.ndarray:
         costs = np.array([self.cost(one) for one in tried])

@@ -26,9 +26,10 @@ _BLOCK = 0.5  # s, of which what is left is one number
 _SMOOTH = 0.3  # s, over which what is off is smoothed for its acceleration
 _SHORTEST, _MOST = 3, 3  # bins of a push; pushes
 _LIKELY = 100.0  # N, standard deviation of a force along an axis
+_DEVIATIONS = np.array([_LIKELY] * 3 + [1e6] * 3)  # of its ends, s, nothing is known before
 _ROUGH = 0.01  # of a force: how it comes and goes is not known
 _SHARP = 0.01  # s, in which a push comes at least
-_STEP, _EARLIER = 1.0, 0.02  # N; s, of difference quotients
+_STEPS = np.array([1.0] * 3 + [0.02] * 3)  # N; s, of difference quotients
 _PASSES = 6
 
 
@@ -144,35 +145,20 @@ def _window(jacobian: np.ndarray, torque: np.ndarray, noise: np.ndarray) -> tupl
 def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, Played] | None:
     """Return a push of a stretch, its force and its ends fitted by rollouts, and what the model does with it."""
     here = _played(fit, best, place, [push])[0]
-    normal = np.eye(6)
     for _ in range(_PASSES):
-        moved = list(_moved(push))
-        columns = np.stack(
-            [
-                (here.remainders[place] - one.remainders[place]) / step
-                for one, (_, step) in zip(_played(fit, best, place, [to for to, _ in moved]), moved, strict=True)
-            ],
-            axis=-1,
-        )
-        left = here.remainders[place]
-        weight = fit.certainty / (len(left) * (here.squares[place] + fit.floor**2))
-        normal = np.einsum("tcnk,tcnl,cn->kl", columns, columns, weight, optimize=True)
-        normal[:3, :3] += np.eye(3) / _LIKELY**2
-        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(6)
-        right = np.einsum("tcnk,tcn,cn->k", columns, left, weight, optimize=True)
-        right[:3] -= push.force / _LIKELY**2
-        step = np.linalg.solve(normal, right)
+        sums = fit.sums(here, range(len(_STEPS)), _played(fit, best, place, list(_moved(push))), _STEPS)
+        off = np.append(push.force, np.zeros(3)) / _LIKELY
+        found = sums.together().together().likely(off, _DEVIATIONS).damped(1e-9)
+        step = found.step()
         step[3:] = np.clip(step[3:], -0.2, 0.2)
-        ways = [_stepped(push, share * step) for share in (1.0, 0.3)]
-        tried = _played(fit, best, place, ways)
-        costs = [fit.total(one) for one in (here, *tried)]
-        at = int(np.argmin(costs))
-        push, here = ((push, *ways)[at], (here, *tried)[at])
+        before, ways = fit.total(here), [_stepped(push, share * step) for share in (1.0, 0.3)]
+        tried = zip((push, *ways), (here, *_played(fit, best, place, ways)), strict=True)
+        push, here = min(tried, key=lambda pair: fit.total(pair[1]))
         tell_step(f"  a push of {np.linalg.norm(push.force):.3g} N from {push.start:.3g} to {push.stop:.3g} s")
-        if costs[0] - costs[at] < 0.05:
+        if before - fit.total(here) < 0.05:
             break
     fit = replace(fit, certainty=certainty(here))  # of what is left beside it
-    variance = np.diag(np.linalg.inv(normal)).copy()
+    variance = found.variance.copy()
     runs = sum(one.time[-1] for one in fit.stretches) / _BIN
     worth = np.log(runs**2 / 2) + np.log(_LIKELY**2 / variance[:3]).sum() / 2 + np.log(len(NAMES))
     gain = fit.total(best) - fit.total(here)
@@ -181,13 +167,12 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
     return FoundPush(push, odds, np.sqrt(variance)), here
 
 
-def _moved(push: Push) -> Iterator[tuple[Push, float]]:
-    """Yield the push with each of its numbers changed, and by how much."""
-    for axis in np.eye(3):
-        yield replace(push, force=push.force + _STEP * axis), _STEP
-    yield replace(push, start=push.start + _EARLIER), _EARLIER
-    yield replace(push, stop=push.stop + _EARLIER), _EARLIER
-    yield replace(push, rise=push.rise + _EARLIER), _EARLIER
+def _moved(push: Push) -> Iterator[Push]:
+    """Yield the push with each of its numbers changed."""
+    for axis, step in zip(np.eye(3), _STEPS, strict=False):
+        yield replace(push, force=push.force + step * axis)
+    for name, step in zip(("start", "stop", "rise"), _STEPS[3:], strict=True):
+        yield replace(push, **{name: getattr(push, name) + float(step)})
 
 
 def _stepped(push: Push, step: np.ndarray) -> Push:
