@@ -82,3 +82,15 @@ def test_noise_of_positions_is_no_elastic_joint() -> None:
     runs = [logged(seed) for seed in range(1, 6)]
     assert blamed(equations(runs, told=False)) == ["joint_elasticity"]
     assert blamed(equations(runs, told=True)) == []
+
+
+def test_what_noise_of_positions_makes_is_no_gap() -> None:
+    noisy, clean = (
+        equations([logged(seed, noise) for seed in range(1, 6)], told=True).with_columns(())[0].by_speed
+        for noise in (NOISE, 0.0)
+    )
+    fast = noisy.halves[0]
+    assert np.all(noisy.noise_before[fast] > 5 * clean.noise_before[fast])
+    assert noisy.position_noise[fast] == pytest.approx(noisy.noise_before[fast], rel=0.15)
+    assert np.all(noisy.position_noise <= noisy.noise_before)  # where friction turns, too
+    assert not clean.position_noise.any()

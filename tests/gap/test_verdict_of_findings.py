@@ -44,7 +44,7 @@ def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), **more):
         name="torque",
         places=("j1", "j2")[: len(before)],
         causes=causes,
-        floor=floor,
+        floor_within=floor,
         apart=SimpleNamespace(
             plain=SimpleNamespace(halves=(slice(None),)),
             left=(np.array(before), np.array(after)),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from tests import gap_cases
 
-from irtwin.document.document import Document
+from irtwin.document.document import Document, FrictionSpread
 from irtwin.report.gap import summary
 
 
@@ -37,6 +37,21 @@ def test_the_filter_is_said_where_it_is_known():
 def test_what_was_done_with_the_logs_is_said(lines, said):
     document = replace(gap_cases.document("ambiguous"), mended="\n".join(lines))
     assert summary.filtered(document) == [f"Of the logs, when they were read: {said}"]
+
+
+@pytest.mark.parametrize(
+    ("dry", "viscous", "said"),
+    [
+        (0.028, 0.04, ["dry by 2.8 % and viscous by 4 %"]),
+        (0.0025, 0.113, ["viscous by 11 %"]),
+        (0.02, None, ["dry by 2 %"]),
+        (0.0, 0.0025, []),
+    ],
+)
+def test_how_much_friction_differs_from_run_to_run_is_said(dry, viscous, said):
+    spread = FrictionSpread(dry=dry, viscous=viscous)
+    lines = summary.filtered(replace(gap_cases.document("ambiguous"), friction_spread=spread))
+    assert lines == [f"Friction differs from run to run, {each} (one standard deviation): noise." for each in said]
 
 
 def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():

@@ -29,6 +29,7 @@ from irtwin.storage.revisions.versions import r0022_no_yardstick as second
 from irtwin.storage.revisions.versions import r0023_saving_verification as third
 from irtwin.storage.revisions.versions import r0024_odd_stretches as fourth
 from irtwin.storage.revisions.versions import r0025_mended_in_logs as fifth
+from irtwin.storage.revisions.versions import r0026_friction_spread as sixth
 from irtwin.storage.schema import Base
 
 BEFORE = migration.newest()
@@ -183,13 +184,14 @@ def test_a_workspace_of_0_2_loses_what_is_told_no_more(tmp_path: Path) -> None:
         connection.execute(text("CREATE TABLE gap_closeable (activity_id VARCHAR, closed FLOAT)"))
         for table in (third.TABLE, fourth.JOINTS, fourth.TABLE):
             connection.execute(text(f"DROP TABLE {table}"))
-        connection.execute(text(f"ALTER TABLE {fifth.TABLE} DROP COLUMN {fifth.COLUMN}"))
+        for column in (fifth.COLUMN, *sixth.COLUMNS):
+            connection.execute(text(f"ALTER TABLE {fifth.TABLE} DROP COLUMN {column}"))
         connection.execute(text(f"UPDATE alembic_version SET version_num = '{second.down_revision}'"))
     with Workspace(tmp_path) as place:
         assert not inspect(place.engine).has_table("gap_closeable")
         made = inspect(place.engine)
         assert all(made.has_table(table) for table in (third.TABLE, fourth.JOINTS, fourth.TABLE))
-        assert fifth.COLUMN in {column["name"] for column in made.get_columns(fifth.TABLE)}
+        assert {fifth.COLUMN, *sixth.COLUMNS} <= {column["name"] for column in made.get_columns(fifth.TABLE)}
         with place.engine.connect() as connection:
             assert migration.revision(connection) == migration.newest()
 

@@ -296,6 +296,17 @@ class Cutoff:
 
 
 @part()
+class FrictionSpread:
+    """By what share of it a joint's dry and viscous friction differ from run to run, one standard deviation.
+
+    None: not known. It counts as noise.
+    """
+
+    dry: Share | None = told("Dry_Friction_Spread", column="dry_friction_spread")
+    viscous: Share | None = told("Viscous_Friction_Spread", column="viscous_friction_spread")
+
+
+@part()
 class Change:
     """A measure of the gap on runs outside the fit, before and after the causes are added, in the measure's unit."""
 
@@ -434,6 +445,7 @@ class Document:
     horizons: tuple[Horizon, ...] | None = told(default=None)
     odd_stretches: tuple[OddStretch, ...] | None = told(default=None)
     mended: str | None = told("Mended_In_Logs", column="mended", default=None)
+    friction_spread: FrictionSpread | None = told(default=None)
 
     def __post_init__(self) -> None:
         ids = {cause.id for cause in self.causes}

@@ -145,7 +145,8 @@ class Effect(ABC):
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect;
     one that is `never_changed` has such a shape for its changes. Columns of one that is `smooth` depend on their
-    sample's states alone, and vary no faster than these.
+    sample's states alone, and vary no faster than these. `differs_by_run`: what its coefficients are called, which are
+    others in each run.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -171,6 +172,7 @@ class Effect(ABC):
     memory: ClassVar[bool] = False
     reach: ClassVar[float | None] = None
     smooth: ClassVar[bool] = False
+    differs_by_run: ClassVar[str | None] = None
     family: ClassVar[str]
     requires: ClassVar[frozenset[str]] = frozenset()
     bodies: ClassVar[bool] = False

@@ -71,6 +71,7 @@ class CoulombFriction(JointEffect):
 
     id: ClassVar[str] = "coulomb_friction"
     family: ClassVar[str] = "friction"
+    differs_by_run: ClassVar[str] = "dry"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fc": "frictionloss"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -93,6 +94,7 @@ class ViscousFriction(JointEffect):
 
     id: ClassVar[str] = "viscous_friction"
     family: ClassVar[str] = "friction"
+    differs_by_run: ClassVar[str] = "viscous"
     in_mjcf: ClassVar[Mapping[str, str]] = {"Fv": "damping"}
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -142,6 +142,7 @@ class Diagnosis:
             simulator=None if self.simulator is None else self.simulator.name,
             odd_stretches=(self.twin and self.twin.odd_stretches) or None,
             mended="\n".join(self.mended) or None,
+            friction_spread=writing.friction_spread(self.channels),
         )
 
     @property

@@ -165,7 +165,9 @@ class DifferingRepeats:
     def _closing(self, one: Removed) -> Closing:
         finding = self._finding(one)
         squares = _squares(finding, one)
-        return closing(squares, squares.sum(axis=1) > 0, finding.counted, finding.floor, finding.attribution.noise)
+        return closing(
+            squares, squares.sum(axis=1) > 0, finding.counted, finding.floor_within, finding.attribution.noise
+        )
 
     def shrink(self, shrink: document.Shrink, seed: int) -> document.Shrink:
         """Return how far the gap shrinks, with what was taken out."""

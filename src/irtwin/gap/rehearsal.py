@@ -54,7 +54,7 @@ class Rehearsal:
         known, noise = self._known
         played = None if programme is None else self._played(programme)
         system = known.by_speed if played is None else known.joined(played).by_speed
-        floor = self.finding.floor
+        floor = self.finding.floor_within
         level = None if floor is None else np.tile(floor, len(system.halves))
         chosen = self._placed(self.true)
         return judged(system, chosen, [*chosen, *self._placed(self.rivals)], self.limits, level, noise)
@@ -63,7 +63,7 @@ class Rehearsal:
     def _reduced(self) -> tuple[System, dict[int, int]]:
         """The equations of the data with the columns in question alone, and the place of each of these."""
         asked = sorted({k for one in (*self.true, *self.rivals) for shape in one.variants for k in shape.columns})
-        system, places = self.finding.system.with_columns(asked)
+        system, places = self.finding.steadied.system.with_columns(asked)
         return system, dict(zip(asked, places, strict=True))
 
     @cached_property

@@ -13,13 +13,14 @@ from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.data.case import Case
-from irtwin.gap.data.noise_floor import Floor, noise_floor
+from irtwin.gap.data.noise_floor import OUT_OF_BAND, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import ChannelFinding, find
 from irtwin.gap.isolation.refusal import Refusals, find_possible
+from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
@@ -55,8 +56,11 @@ class Search:
 
     @cached_property
     def floor(self) -> Floor:
-        """The noise floor."""
-        return noise_floor(self.case.runs, self.case.motions, self.case.thresholds.data)
+        """The noise floor; from above the band, with friction that differs from run to run, which repeats show."""
+        floor = noise_floor(self.case.runs, self.case.motions, self.case.thresholds.data)
+        if floor.source != OUT_OF_BAND or floor.torque is None or self.plain is None:
+            return floor
+        return replace(floor, torque=np.hypot(floor.torque, np.sqrt(Steadied.of(self.case, self.plain).made)))
 
     @cached_property
     def twin(self) -> LeftOut | ThroughPower:
@@ -112,7 +116,7 @@ class Search:
         first = find("torque", self.case, system, self.floor.torque, self.seed, without)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
-        return replace(first, floor=left.torque), left
+        return replace(first, signal_floor=left.torque), left
 
     def power_causes(
         self, tried: Sequence[Effect], floor: Floor, explained: ExplainedTorque | None
@@ -132,7 +136,7 @@ class Search:
             finding = find("power", case, system, level, self.seed, without, plain)
             of_power = explained_power(self.power_stack, finding, torque, power_of)
             left = floor_left(case, floor, of_power) if finding.causes else floor
-            return replace(finding, floor=None if left.power is None else np.array([left.power])), left
+            return replace(finding, signal_floor=None if left.power is None else np.array([left.power])), left
 
         finding, _, refusals = find_possible(case, search, self.unknown)
         return explained_power(self.power_stack, finding, torque, power_of), refusals

@@ -34,6 +34,12 @@ def gap(joints: Sequence[str], findings: Sequence[ChannelFinding], energies: Ene
     )
 
 
+def friction_spread(findings: Sequence[ChannelFinding]) -> document.FrictionSpread | None:
+    """Return by how much friction differs from run to run; None where that is not known."""
+    shares = next((finding.steadied.shares for finding in findings if finding.name == "torque"), {})
+    return document.FrictionSpread(dry=shares.get("dry"), viscous=shares.get("viscous")) if shares else None
+
+
 def _sizes(finding: ChannelFinding) -> list[document.Size]:
     judged = finding.held_out.rows.sum(axis=0)
     return [

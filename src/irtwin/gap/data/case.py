@@ -15,7 +15,7 @@ from irtwin.effects.sensing import TorqueOffset
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
-from irtwin.gap.data.noise_floor import shaken
+from irtwin.gap.data.noise_floor import sensor_noise, shaken
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
@@ -118,6 +118,12 @@ class Case:
     def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
         """Some observed motions, each with the same once more to which its noise of positions was added again."""
         return shaken(self.runs, self.motions, self.robot, self.thresholds.data)
+
+    @cached_property
+    def sensor_noise(self) -> np.ndarray | None:
+        """(n,) RMS of the noise of torque's sensors in the band; None where it is unknown."""
+        real = [run for run in self.runs if run.role != "simulated"]
+        return sensor_noise(real, self.motions, self.thresholds.data)[0]
 
     @property
     def long(self) -> bool:

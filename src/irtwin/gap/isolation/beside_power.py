@@ -14,6 +14,7 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
 from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, attributed, finding_of
+from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without
 from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Torque
@@ -57,7 +58,7 @@ def find_beside_power(
     left = floor_left(case, floor, explained, power)
     if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * power.system.noise_before[0]:
         return about(explained, power, left), left
-    return replace(first, floor=left.torque), left
+    return replace(first, signal_floor=left.torque), left
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
@@ -75,12 +76,13 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    both = attributed(case, whole, np.concatenate(levels), without)
+    steadied = Steadied.of(case, whole)
+    both = attributed(case, whole, steadied, np.concatenate(levels), without)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
-    beside = BesidePower(equations, tuple(of_power), both.noise)
-    where = "torque", case.robot.joint_names, case.observed
-    return finding_of(*where, torque, _of_torque(both, equations), floor.torque, seed, beside=beside)
+    beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), both.noise)
+    where = "torque", case.robot.joint_names, case.observed, torque, Steadied.of(case, torque)
+    return finding_of(*where, _of_torque(both, equations), floor.torque, seed, beside=beside)
 
 
 def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:

@@ -16,6 +16,7 @@ from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing
 from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
@@ -32,26 +33,38 @@ _NO_NOISE = 1e-9
 class ChannelFinding:
     """What was found in one channel, `name`: "torque" (g equations, one per joint) or "power" (g = 1).
 
-    `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `floor` (g,) N m or
-    W, None where unknown; `held_out`: what is left of groups left out, `counted` the same as `apart` counts it;
-    `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is
-    closed theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where
-    `system` stands on torque that causes explain. `seed` draws orders of many causes.
+    `places`: each equation's joint, None for the whole robot; `observed`: the runs to be diagnosed; `steadied`: the
+    `system` without what differs from run to run, of which `apart` and `estimate` are; `held_out`: what is left of
+    groups left out, `counted` the same as `apart` counts it; `signal_floor` (g,) N m or W, of the measured signal, None
+    where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is closed
+    theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where `system`
+    stands on torque that causes explain. `seed` draws orders of many causes.
     """
 
     name: str
     places: tuple[str | None, ...]
     observed: frozenset[str]
     system: System
+    steadied: Steadied
     attribution: Attribution
     apart: Apart
     held_out: HeldOut
     counted: HeldOut
-    floor: np.ndarray | None
+    signal_floor: np.ndarray | None
     estimate: Estimate
     part: float = 1.0
     plain: System | None = None
     seed: int = 0
+
+    @property
+    def floor(self) -> np.ndarray | None:
+        """(g,) the noise floor, RMS."""
+        return self.steadied.floor(self.signal_floor)
+
+    @property
+    def floor_within(self) -> np.ndarray | None:
+        """(g,) the same within a run, where no dry friction turns."""
+        return self.steadied.within(self.signal_floor)
 
     @cached_property
     def closed_squares(self) -> np.ndarray:
@@ -66,7 +79,7 @@ class ChannelFinding:
     @cached_property
     def shares(self) -> tuple[float, ...]:
         """Each cause's part of what they close together, none where they close nothing."""
-        level = self.attribution.noise if self.floor is None else self.floor
+        level = self.attribution.noise if self.floor_within is None else self.floor_within
         own = shares(self.closed_squares, self.counted.rows, level)
         return tuple(self.part * share for share in own)
 
@@ -79,7 +92,7 @@ class ChannelFinding:
         closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
-        return closing(closed, acting, self.counted, self.floor, self.attribution.noise)
+        return closing(closed, acting, self.counted, self.floor_within, self.attribution.noise)
 
     @property
     def chosen(self) -> list[int]:
@@ -147,8 +160,9 @@ def find(
     `plain` as a finding's.
     """
     places = (None,) if name == "power" else case.robot.joint_names
-    attribution = attributed(case, system, floor, without)
-    return finding_of(name, places, case.observed, system, attribution, floor, seed, plain)
+    steadied = Steadied.of(case, system)
+    attribution = attributed(case, system, steadied, floor, without)
+    return finding_of(name, places, case.observed, system, steadied, attribution, floor, seed, plain)
 
 
 def finding_of(
@@ -156,6 +170,7 @@ def finding_of(
     places: tuple[str | None, ...],
     observed: frozenset[str],
     system: System,
+    steadied: Steadied,
     attribution: Attribution,
     floor: np.ndarray | None,
     seed: int,
@@ -166,13 +181,14 @@ def finding_of(
     chosen = [k for cause in attribution.causes for k in cause.columns]
     alone, inside = system.with_columns(chosen)
     judged = held_out(alone, (plain or alone).noise_before, attribution.noise, inside, plain)
-    apart = Apart.of(plain or system, system, [cause.columns for cause in attribution.causes])
-    fitted = estimate_of(system, chosen) if beside is None else beside.estimate(chosen)
+    apart = Apart.of(plain or steadied.system, steadied.system, [cause.columns for cause in attribution.causes])
+    fitted = estimate_of(steadied.system, chosen) if beside is None else beside.estimate(chosen)
     return ChannelFinding(
         name,
         places,
         observed,
         system,
+        steadied,
         attribution,
         apart,
         judged,
@@ -185,16 +201,18 @@ def finding_of(
 
 
 def attributed(
-    case: Case, system: System, floor: np.ndarray | None, without: Set[Without] = frozenset()
+    case: Case, system: System, steadied: Steadied, floor: np.ndarray | None, without: Set[Without] = frozenset()
 ) -> Attribution:
-    """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown."""
+    """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown.
+
+    The noise that is left is that of all runs together, with what differs from run to run.
+    """
     tell_step("  rows in which joints are slow")
     candidates = _hypotheses(case, system)
-    apart = system.by_speed
-    level = floor if floor is None or apart is system else np.tile(floor, 2)
+    apart, level = steadied.system.by_speed, steadied.within(floor)
+    if level is not None:
+        level = np.tile(level, len(apart.halves))
     attribution = attribute(apart, candidates, case.thresholds.criterion, level, without)
-    if apart is system:
-        return attribution
     alone, chosen = system.with_columns([k for cause in attribution.causes for k in cause.columns])
     return replace(attribution, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before)))
 

@@ -60,9 +60,9 @@ def most_left(findings: Sequence[ChannelFinding], limits: Thresholds, *, alike: 
     `alike` as of `left_open`: where dry friction turns otherwise than in the reference runs, that is the place.
     """
     left = (alike and _turned(findings, limits)) or {
-        (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor)) ** 2)[place])
+        (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor_within)) ** 2)[place])
         for finding in findings
-        if finding.floor is not None
+        if finding.floor_within is not None
         for place in range(len(finding.places))
     }
     return max(left, key=lambda place: left[place])
@@ -99,7 +99,8 @@ def _classes(finding: document.Finding) -> list[list[float]]:
 
 def _spread(findings: Sequence[ChannelFinding], unknown: float) -> float:
     """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
-    known = [spread(one.apart.plain, one.floor, one.apart.plain.halves[0]) for one in findings if one.floor is not None]
+    levels = [(one.apart.plain, one.floor_within) for one in findings]
+    known = [spread(plain, level, plain.halves[0]) for plain, level in levels if level is not None]
     return max((unknown if one is None else one for one in known), default=unknown)
 
 
@@ -108,8 +109,8 @@ def _turned(findings: Sequence[ChannelFinding], limits: Thresholds) -> dict[tupl
     return {
         (finding.name, place): float(more)
         for finding in findings
-        if finding.floor is not None
-        for place, more in enumerate(finding.apart.turned(finding.floor))
+        if finding.floor_within is not None
+        for place, more in enumerate(finding.apart.turned(finding.floor_within))
         if more > limits.criterion.excess
     }
 
@@ -122,9 +123,9 @@ def _largest(
     Over the floor, and over what the reference runs show, if there are any. They may lie at different joints. Of what
     does not repeat, `explained` is out of the equations and is counted in the first; `located` is in them.
     """
-    if finding.floor is None:
+    if finding.floor_within is None:
         return 0.0, 0.0, 0.0
-    level = finding.apart.level(finding.floor)
+    level = finding.apart.level(finding.floor_within)
     before, after = ((rms / level) ** 2 - 1 for rms in finding.apart.left)
     before = before + _excess(explained, finding, level)
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,16 +49,22 @@ def torque_system(
             assert motion.torque is not None
             own = stack.columns_by_joint(motion)
             columns = list(zip(own, candidates.part(motion), strict=True))
-            slow = turning(robot, motion.dq) if effects else None
-            return Rows(columns, stack.shift_torque(motion), motion.torque, stack.undecided(motion), slow)
+            return Rows(
+                columns,
+                stack.shift_torque(motion),
+                motion.torque,
+                stack.undecided(motion),
+                turning(robot, motion.dq),
+            )
 
         return of_part
 
     blocks = accumulate(motions, equations(), pattern, by_products=bool(effects))
-    noise = shaken_products([pair for pair in shaken if pair[0].torque is not None], equations(), equations(), pattern)
+    told = [pair for pair in shaken if pair[0].torque is not None]
+    noise = shaken_products(told, equations(), equations(), pattern, len(stack.torque_terms))
     known = stack.prior_rows(stack.torque_terms)
     system = System(stack.torque_terms, columns, pattern, tuple(blocks), *grouping.of(blocks), prior_rows=known)
-    return enough(replace(system, shaken=noise))
+    return enough(replace(system, **vars(noise)) if noise else system)
 
 
 def power_system(
@@ -123,13 +129,21 @@ def enough(system: System) -> System:
     return system
 
 
-def shaken_products(
-    pairs: Pairs, equations: Equations, again: Equations, pattern: np.ndarray
-) -> tuple[np.ndarray, ...] | None:
-    """Return each equation's products a row, (k + 1, k + 1), of what shaking changes; None where there is no pair.
+@dataclass(frozen=True)
+class Shaking:
+    """What shaking changes, as `System` has it."""
 
-    `pattern`: (g, K) which columns each has; the last is the measurement's, less what is known. `equations` are of the
-    motions as they are, `again` the same of shaken ones.
+    shaken: tuple[np.ndarray, ...]
+    shaken_twin: tuple[np.ndarray, ...]
+
+
+def shaken_products(
+    pairs: Pairs, equations: Equations, again: Equations, pattern: np.ndarray, twin: int
+) -> Shaking | None:
+    """Return each equation's products a row of what shaking changes; None where there is no pair.
+
+    `pattern`: (g, K) which columns each has, the `twin`'s first; the last is the measurement's, less what is known.
+    `equations` are of the motions as they are, `again` the same of shaken ones.
     """
     if not pairs:
         return None
@@ -145,13 +159,21 @@ def shaken_products(
         undecided = None
         if one.undecided is not None and other.undecided is not None:
             undecided = one.undecided | other.undecided
-        return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided)
+        return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided, one.slow)
 
-    motions = [motion for motion, _ in pairs]
-    rows, products = np.zeros(len(pattern)), [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
-    for motion in motions:  # one by one: blocks of all together take many times what their products do
+    whole = [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
+    own = [np.append(np.arange(count), -1) for count in pattern[:, :twin].sum(axis=1)] * 2
+    parts = [np.zeros((len(some), len(some))) for some in own]
+    rows = np.zeros(len(parts))
+    for motion, _ in pairs:  # one by one: blocks of all together take many times what their products do
         for block in accumulate_any([motion], difference, pattern, by_products=True):
-            rows += block.rows
-            for total, factor in zip(products, block.factors, strict=True):
+            rows += block.apart.rows
+            for total, factor in zip(whole, block.factors, strict=True):
                 total += factor.T @ factor
-    return tuple(total / max(count, 1.0) for total, count in zip(products, rows, strict=True))
+            for total, factor, some in zip(parts, block.apart.factors, own, strict=True):
+                total += factor[:, some].T @ factor[:, some]
+    of_both = rows.reshape(2, -1).sum(axis=0)
+    return Shaking(
+        tuple(total / max(count, 1.0) for total, count in zip(whole, of_both, strict=True)),
+        tuple(total / max(count, 1.0) for total, count in zip(parts, rows, strict=True)),
+    )

@@ -95,9 +95,9 @@ def joint_equations(
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, equations(), pattern, by_products=True)
-    noise = shaken_products(shaken, equations(), equations(), pattern)
     alone = [one.of(slice(-1)) for one in blocks if one.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
+    noise = shaken_products(shaken, equations(), equations(), pattern, len(terms))
     whole = System(
         terms,
         columns,
@@ -106,11 +106,13 @@ def joint_equations(
         *grouping.of(blocks),
         beside_power=True,
         prior_rows=stack.prior_rows(terms),
-        shaken=noise,
     )
     of_joints = np.concatenate([stack.pattern, tried], axis=1)
     known = stack.prior_rows(stack.torque_terms)
     torque = System(stack.torque_terms, mechanical, of_joints, tuple(alone), *grouping.of(alone), prior_rows=known)
+    if noise:
+        fast_and_slow = (*noise.shaken_twin[: len(tried)], *noise.shaken_twin[len(pattern) : -1])
+        whole, torque = replace(whole, **vars(noise)), replace(torque, shaken_twin=fast_and_slow)
     return JointEquations(enough(whole), enough(torque))
 
 

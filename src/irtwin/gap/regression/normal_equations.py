@@ -16,7 +16,7 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import CandidateColumn
-from irtwin.gap.regression.moments import Moments, Places, Products, numbers
+from irtwin.gap.regression.moments import Moments, Places, Products, Summed, numbers
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
@@ -34,9 +34,10 @@ class System:
     whether the block belongs to an observed run. `prior_rows` (K, K): what is known of the twin's terms, as
     `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
     stands there twice: as it is, and (from index K + M) zero in all but observed runs. `beside_power`: the last
-    equation is power's, beside those of torque. `shaken`: the products a row, (k + 1, k + 1) of each equation's columns
-    and measurement, that noise of positions makes; None: of none. `apart`: the second half of the equations are the
-    first half's rows in which dry friction turns.
+    equation is power's, beside those of torque. `shaken`: the products
+    a row, (k + 1, k + 1) of each equation's columns and measurement, that noise of positions makes; `shaken_twin` those
+    of the twin's columns alone in fast rows of each equation, then in slow ones; None: of none. `apart`: the second
+    half of the equations are the first half's rows in which dry friction turns.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -48,6 +49,7 @@ class System:
     beside_power: bool = False
     prior_rows: np.ndarray | None = None
     shaken: tuple[np.ndarray, ...] | None = None
+    shaken_twin: tuple[np.ndarray, ...] | None = None
     apart: bool = False
 
     @property
@@ -309,15 +311,15 @@ class System:
         if self.shaken is None:
             return None
         weights = np.maximum(noise, self.quietest) ** -2.0
-        a_row = [
-            np.array(
+        a_row = np.array(
+            [
                 [
                     weight * self._among_all(k, observed, _times(products, self._held(k, observed, coefficients)))
                     for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
                 ]
-            )
-            for observed in (False, True)
-        ]
+                for observed in (False, True)
+            ]
+        )
         return np.array(
             [self.rows[group, kind] @ a_row[int(self.group_observed[group])][kind] for kind, group in self.parts]
         )
@@ -352,6 +354,24 @@ class System:
     def noise_before(self) -> np.ndarray:
         """(g,) RMS that the twin alone leaves of each equation, equations weighted alike."""
         return self.residual_rms((), np.ones(len(self.pattern)))
+
+    @cached_property
+    def position_noise(self) -> np.ndarray:
+        """(g,) RMS that noise of positions makes of what the twin alone leaves; no more than that, 0 where unknown.
+
+        Of rows apart alone: where dry friction turns it makes far more.
+        """
+        left = self.noise_before
+        if self.shaken_twin is None or not self.apart:
+            return np.zeros_like(left)
+        solution = self.solution((), Summed(self.group_moments(left)))
+        coefficients = np.append(-solution, 1.0)
+        squares = []
+        for equation, products in enumerate(self.shaken_twin):
+            own = self._held(equation, True, coefficients)
+            held = np.append(own[: len(products) - 1], own[-1])
+            squares.append(held @ products @ held)
+        return np.asarray(np.minimum(np.sqrt(np.maximum(squares, 0.0)), left))
 
     def rms(
         self,

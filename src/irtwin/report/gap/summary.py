@@ -16,6 +16,7 @@ from irtwin.report.wording import listed
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
+_WORTH_SAYING = 0.01  # of friction, from run to run
 _STEPS = 3  # motions to log that are told
 _MEANINGS = """SELECT ?effect ?name ?meaning {
     ?effect irt:has_Effect_Parameter ?parameter . ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
@@ -126,12 +127,20 @@ def horizons(diagnosis: Document) -> AnswerTable:
 
 
 def filtered(diagnosis: Document) -> list[str]:
-    """Return a line on the filter that all runs passed, and one on what was done with logs as they were read."""
+    """Return lines on the filter that all runs passed, on friction from run to run, and on what was done with logs."""
     cutoff, mended = diagnosis.cutoff, (diagnosis.mended or "").splitlines()
     lines = [f"Signals were low-pass filtered at {cutoff.hz:.{_DIGITS}g} Hz ({cutoff.why})."] if cutoff else []
     if len(mended) > _MENDED:
         mended[_MENDED:] = [f"and {len(mended) - _MENDED} more, which `irtwin check` lists"]
-    return [*lines, *([f"Of the logs, when they were read: {'; '.join(mended)}."] if mended else [])]
+    read = [f"Of the logs, when they were read: {'; '.join(mended)}."] if mended else []
+    return [*lines, *_differing_friction(diagnosis), *read]
+
+
+def _differing_friction(diagnosis: Document) -> list[str]:
+    spread = diagnosis.friction_spread
+    shares = (("dry", spread.dry), ("viscous", spread.viscous)) if spread else ()
+    said = [f"{name} by {100 * share:.2g} %" for name, share in shares if share and share >= _WORTH_SAYING]
+    return [f"Friction differs from run to run, {listed(said)} (one standard deviation): noise."] if said else []
 
 
 def causes(diagnosis: Document) -> AnswerTable:
