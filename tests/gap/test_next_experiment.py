@@ -16,6 +16,7 @@ from irtwin.effects.stack import Stack
 from irtwin.gap import next_experiment as module
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.finding import finding_of
+from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, judged
 from irtwin.gap.next_experiment import next_experiment
 from irtwin.gap.regression.channel_equations import torque_system
@@ -60,7 +61,10 @@ def channel_of(motions, tried, cause=None, rivals=(), part=1.0):
         shape = own.variants[int(np.argmax(shown))]
         causes = (FoundCause(cause, MISSING, ("joint_2",), (shape,), 1.0, 9.0, 0.8, dict.fromkeys(rivals, 0.2)),)
     attribution = Attribution(causes, np.full(2, NOISE), found, np.zeros((len(found), 2)), np.zeros(0))
-    finding = finding_of("torque", ROBOT.joint_names, frozenset(m.run for m in motions), system, attribution, None, 0)
+    none = np.full(2, np.inf)
+    steadied = Steadied(system, {}, np.zeros(2), none, np.zeros((2, 2)))
+    about = "torque", ROBOT.joint_names, frozenset(m.run for m in motions), system, steadied
+    finding = finding_of(*about, attribution, None, 0)
     vars(finding)["closed_squares"] = np.array([part * finding.counted.before for _ in causes])
     return finding, system_of
 

@@ -109,6 +109,8 @@ def test_repeats_that_differ_by_friction_have_a_floor_of_noise_within_a_run() ->
     assert steadied.floor(signal) == pytest.approx(signal)
     assert steadied.within(signal) == pytest.approx(np.full(JOINTS, NOISE), rel=1e-6)
     assert steadied.within(np.sqrt(made)) == pytest.approx(np.full(JOINTS, 0.9 * NOISE))
+    unknown = replace(steadied, sensors=np.full(JOINTS, np.inf))
+    assert unknown.within(signal) == pytest.approx(signal)  # nobody knows what noise is without friction
     assert steadied.within(None) is None and steadied.floor(None) is None
     shaken = replace(steadied, positions=positions)  # noise of positions is in both
     assert shaken.within(signal) == pytest.approx(np.full(JOINTS, np.sqrt(5) * NOISE))

@@ -17,8 +17,8 @@ class Steadied:
     """The `system`; `shares`: by what each kind of coefficient of friction differs from run to run, of itself.
 
     made (g,): the mean square that this makes between repeats, or between all runs where none is repeated; sensors
-    (g,): the RMS of their noise, 0 where it is unknown; positions (h, g): RMS that noise of positions makes of what the
-    twin leaves, in rows apart.
+    (g,): the RMS of their noise, infinite where it is unknown; positions (h, g): RMS that noise of positions makes of
+    what the twin leaves, in rows apart.
     """
 
     system: System
@@ -37,7 +37,7 @@ class Steadied:
         differing = RunToRun.of(system, sides)
         rows = {run: np.sum([block.rows for block in system.blocks if block.run == run], axis=0) for run in runs}
         made = differing.mean_squares(_alike(case, runs, sides), rows)
-        sensors = np.zeros(len(made))
+        sensors = np.full(len(made), np.inf)  # not known: the floor stays as it is
         if case.sensor_noise is not None and len(made) >= len(case.sensor_noise):
             sensors[: len(case.sensor_noise)] = case.sensor_noise
         steadied = differing.steadied(system)
