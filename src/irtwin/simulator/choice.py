@@ -261,12 +261,6 @@ def _free(fit: Fit) -> np.ndarray:
 
 def certainty(best: Played) -> np.ndarray:
     """Return how many independent samples the remainder of a stretch has, (c, n): the median of all."""
-    counts = independent(best)
-    return np.asarray(np.clip(np.median(counts, axis=0), 1.0, _MOST / len(counts)))
-
-
-def independent(best: Played) -> np.ndarray:
-    """Return how many independent samples the remainder of each stretch has, (p, c, n)."""
     counts = []
     for left in best.remainders:
         spectrum = np.abs(np.fft.rfft(left, 2 * len(left), axis=0)) ** 2
@@ -274,7 +268,7 @@ def independent(best: Played) -> np.ndarray:
         correlation /= np.maximum(correlation[0], 1e-300)
         fallen = np.cumsum(correlation < 0.05, axis=0) > 0
         counts.append(len(left) / (2 * np.where(fallen, 0.0, correlation).sum(axis=0) - 1))
-    return np.maximum(counts, 1.0)
+    return np.asarray(np.clip(np.median(counts, axis=0), 1.0, _MOST / len(counts)))
 
 
 def _weighed(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -72,7 +72,7 @@ class Fit:
     """What numbers are fitted to, and how a misfit counts.
 
     A stretch counts by the logarithm of its mean square: how much any may be off is not known before. `certainty`
-    (c, n) or (p, c, n): independent samples a stretch has; `floor` (c, n), rad and N m: misfits below it are none.
+    (c, n): independent samples a stretch has; `floor` (c, n), rad and N m: misfits below it are none.
     """
 
     alone: Alone
@@ -180,8 +180,7 @@ class Fit:
         found = []
         for place, left in enumerate(one.remainders):
             columns = left - np.array([each.remainders[place] for each in moved]).reshape(-1, *left.shape)
-            certainty = np.broadcast_to(self.certainty, one.squares.shape)[place]
-            weight = certainty / (len(left) * (one.squares[place] + self.floor**2))
+            weight = self.certainty / (len(left) * (one.squares[place] + self.floor**2))
             found.append(Equations.of(rows, columns / steps[:, None, None, None], left, weight))
         return Equations.beside(found)
 

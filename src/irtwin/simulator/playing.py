@@ -24,7 +24,7 @@ from irtwin.simulator.soft import softened
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
-_FALLEN, _BRIEF = 0.15, 2.0  # rad (m), RMS from the model, of a robot that falls; s, of its stretches
+_FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls; s, of its stretches
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
