@@ -67,7 +67,7 @@ class RunFriction:
 class RunToRun:
     """`shares`: by what each kind of coefficient differs from run to run, one standard deviation, of itself.
 
-    None where no side has two runs. `frictions`: each equation's, None where it has none.
+    Empty where no side has two runs. `frictions`: each equation's, None where it has none.
     """
 
     shares: Mapping[str, float]
