@@ -14,9 +14,11 @@ from irtwin.gap.regression.moments import Moments, Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
+from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import Run
 
 _OF_BODY = 10  # parameters: mass, first moments, inertia
+_AS_MUCH = 2.0  # times: friction that only has another sign
 
 
 def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: Data) -> None:
@@ -24,7 +26,7 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
 
     `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
     better than those of the reference runs; another robot's bodies are wrong in several, or friction drives half of its
-    joints.
+    joints. Where the same friction drives, the torque has the other sign.
     """
     if not system.both:
         return
@@ -35,7 +37,15 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
     total = Summed([m for m, own in zip(moments, seen, strict=True) if own])
     own = system.solution((), total)
     foreign = _foreign_share(system, total, own, other) > limits.foreign[others[0].role]
-    opposed = _opposed(stack.robot, system, own, other)
+    opposed, reversed_here = _opposed(stack.robot, system, own, other)
+    for role, some in {"observed": reversed_here < 0, others[0].role: reversed_here > 0}.items():
+        if some.any():
+            file = next(run.file for run in runs if run.role == role)
+            columns = CHANNELS["torque"].columns(np.array(stack.robot.joint_names)[some])
+            raise InputError(
+                f"{file}: in the {role} runs {', '.join(columns)} has the other sign, as friction drives there; "
+                "change it in these runs"
+            )
     if foreign.sum() > 1 or opposed.mean() >= 0.5:
         named = [name for k, name in enumerate(stack.robot.joint_names) if foreign[k] or opposed[k]]
         raise InputError(
@@ -61,9 +71,12 @@ def _foreign_share(system: System, total: Moments, own: np.ndarray, other: np.nd
     return np.asarray((squares(borrowed) - squares(own)) / np.maximum(squares(nothing), np.finfo(float).tiny))
 
 
-def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return on which joints (n,) all friction of the other runs drives where that of the observed runs brakes."""
-    opposed = []
+def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return on which joints (n,) all friction drives in one kind of run and brakes in the other.
+
+    Beside it (n,): -1 where as much of it drives in the observed runs, 1 where it does in the others, else 0.
+    """
+    opposed, alike = [], []
     for joint in robot.joint_names:
         places = [
             k
@@ -73,7 +86,9 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
         seen = own[places] + system.expected[places] / system.scale[places]
         elsewhere = other[places] + system.expected[places] / system.scale[places]
         opposed.append(bool(places) and bool(np.all(elsewhere * seen < 0)))
-    return np.array(opposed)
+        same = opposed[-1] and bool(np.all(np.abs(np.log(-seen / elsewhere)) < np.log(_AS_MUCH)))
+        alike.append(np.sign(seen.sum()) if same else 0.0)
+    return np.array(opposed), np.array(alike)
 
 
 def _refitted(system: System, total: Moments, start: np.ndarray) -> np.ndarray:
