@@ -266,7 +266,7 @@ _CASES: dict[str, dict[str, Any]] = {
             "high": 0.94,
             "why": "The scale of torque is uncertain by 10 %: torque of drives comes from nominal constants",
         },
-        "cutoff": {"hz": 9.786, "stated": False, "why": "found: 10 times the bandwidth of the widest motion"},
+        "cutoff": {"hz": 9.786, "stated": False, "why": "found: 10 times the bandwidth of the motion"},
         "shrink": _shrink(
             0.93,
             0.5,

@@ -265,7 +265,7 @@ def _runs() -> Iterator[Base]:
             )  # fmt: skip
 
 
-CUTOFF_WHY = {"Arm_A": "found: 10 times the bandwidth of the widest motion", "Arm_B": "stated"}
+CUTOFF_WHY = {"Arm_A": "found: 10 times the bandwidth of the motion", "Arm_B": "stated"}
 
 
 def _twins() -> Iterator[Base]:

@@ -107,7 +107,7 @@ class Factory:
         self.say(
             f"<{self.iri}> irt:has_Twin {self._twin} . {self._twin} a irt:Energy_Twin ; irt:has_Effect {effects} ;"
             ' irt:Created "2026-03-09T09:00:00Z"^^xsd:dateTime ; irt:Cutoff_Frequency 10.0e0 ;'
-            ' irt:Cutoff_Reason "found: 10 times the bandwidth of the widest motion" ;'
+            ' irt:Cutoff_Reason "found: 10 times the bandwidth of the motion" ;'
             " irt:Condition_Number 83.2e0 ; irt:Base_Parameter_Count 36 ;"
             f' irt:Data_Split "fitted on {len(fit)} runs, held out {len(held_out)}" ;'
             f' irt:Checksum "{"ab" * 32}" ; prov:wasGeneratedBy {self._act("identification")} .'

@@ -270,7 +270,7 @@ def test_what_cannot_be_true_and_the_scale_of_torque_are_said(pages: dict[str, P
 
 def test_the_filter_is_said(pages: dict[str, Path]) -> None:
     page = html.unescape(pages["attributed"].read_text(encoding="utf-8")).replace("\N{NO-BREAK SPACE}", " ")
-    assert "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the widest motion)." in page
+    assert "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the motion)." in page
     assert "low-pass filtered" not in pages["ambiguous"].read_text(encoding="utf-8")
 
 

@@ -23,7 +23,7 @@ def test_the_gap_stands_before_and_after_with_its_unit():
 
 def test_the_filter_is_said_where_it_is_known():
     (said,) = summary.filtered(gap_cases.document("attributed"))
-    assert said == "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the widest motion)."
+    assert said == "Signals were low-pass filtered at 9.79 Hz (found: 10 times the bandwidth of the motion)."
     assert summary.filtered(gap_cases.document("ambiguous")) == []
 
 

@@ -59,7 +59,7 @@ def test_the_twin_says_how_sure_the_scale_of_its_torque_is(graph: KnowledgeGraph
 
 def test_the_twin_says_its_filter(graph: KnowledgeGraph, page_of: PageOf):
     page = text(page_of(six_axis(graph)))
-    assert "Signals were low-pass filtered at 10.0 Hz (found: 10 times the bandwidth of the widest motion)." in page
+    assert "Signals were low-pass filtered at 10.0 Hz (found: 10 times the bandwidth of the motion)." in page
 
 
 def test_key_numbers_stand_at_the_top(graph: KnowledgeGraph, page_of: PageOf):

@@ -1,7 +1,8 @@
 """The cutoff of the filter by what the sensors resolve: the one with which a fitted twin tells other data best.
 
 An encoder of coarse steps makes noise of the acceleration. A filter lets the less of it pass, the lower its cutoff;
-too low a cutoff takes the motion away too. Torque that took no part in the fit says which of both weighs more.
+too low a cutoff takes the motion away too. So it begins no higher than that noise makes no more of a torque than its
+sensor does, and torque that took no part in the fit says whether less is better.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.fits import fit_torque
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import condition, cutoff_of_motion
+from irtwin.signals.conditioning import condition, cutoff_of_motion, white_noise
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import interpolated
 
-_MOST_SAMPLES = 40_000  # of all runs that are looked at: enough to tell one cutoff from its half
+_MOST_SAMPLES = 40_000  # that are looked at: enough to tell one cutoff from its half
 _FEWEST_PERIODS = 20  # of the cutoff in what is fitted, and in what is held out
 _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, in the mean: less is chance
 
@@ -30,21 +31,42 @@ _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, 
 def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None) -> Cutoff:
     """Return the cutoff for runs that are to be treated alike: the one that is stated, Hz, as it is.
 
-    Else it is ten times the band of the motion (`cutoff_of_motion`), or that halved as long as the torque of what is
-    held out is told better so. Without torque nothing tells it.
+    Else it is ten times the band of the motion (`cutoff_of_motion`). Where noise of positions is louder than that of
+    torque it is half of it, and that halved as long as the torque of what is held out is told better so.
     """
     if stated is not None:
         return Cutoff(hz=stated, stated=True, why="stated")
     highest, why = cutoff_of_motion(runs)
-    halved = _halved(robot, runs, highest)
+    resolved = _resolved(robot, runs)
+    if resolved < highest:
+        highest, why = (
+            highest / 2,
+            f"{why}, {highest:.3g} Hz, halved as noise of positions is louder than that of torque",
+        )
+    halved = _halved(robot, runs, highest, resolved)
     if halved:
         times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")
         why = f"{why}, {highest:.3g} Hz, halved {times}, as that tells held-out torque better"
     return Cutoff(hz=highest / 2**halved, stated=False, why=f"found: {why}")
 
 
-def _halved(robot: Robot, runs: Sequence[Run], cutoff: float) -> int:
-    """Return how often a cutoff, Hz, is halved."""
+def _resolved(robot: Robot, runs: Sequence[Run]) -> float:
+    """Return up to which frequency, Hz, white noise of positions makes less of each torque than that has of its own.
+
+    Below f it makes M (2 pi f)^2 / sqrt(5) as much of the torque, M being the inertia that a joint moves.
+    """
+    seen = [run.signals.rows(slice(_MOST_SAMPLES)) for run in runs if run.signals.torque is not None]
+    if not seen:
+        return np.inf
+    of_positions = np.median([white_noise(one.time, one.q) for one in seen], axis=0)
+    of_torques = np.median([white_noise(one.time, one.torque) for one in seen if one.torque is not None], axis=0)
+    makes = robot.mean_inertia * of_positions
+    told = (makes > 0) & (of_torques > 0)
+    return float(np.sqrt(np.sqrt(5) * np.min(of_torques[told] / makes[told], initial=np.inf)) / (2 * np.pi))
+
+
+def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, resolved: float) -> int:
+    """Return how often a cutoff, Hz, is halved; what is `resolved` is no noise to be taken away."""
     found = 0
     measured = [run for run in runs if run.signals.torque is not None]
     if not measured:
@@ -55,7 +77,7 @@ def _halved(robot: Robot, runs: Sequence[Run], cutoff: float) -> int:
     seconds = min(float(run.signals.time[-1] - run.signals.time[0]) for run in looked_at) / parts
     try:
         error = _held_out(robot, looked_at, cutoff)
-        while cutoff / 2 * seconds >= _FEWEST_PERIODS:
+        while cutoff > resolved and cutoff / 2 * seconds >= _FEWEST_PERIODS:
             lower = _held_out(robot, looked_at, cutoff / 2)
             if lower > error + np.log(1 - _BETTER):
                 break

@@ -20,6 +20,7 @@ from irtwin.signals.sampling import holes, interpolated, interval
 _BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
 _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
 _ABOVE_NOISE = 3.0  # times the mean noise: what stands out is motion
+_SMOOTHED = 4.0  # times: white noise has as much in the upper half of the highest octave as in all of it
 _NYQUIST_SHARE = 0.8  # of the Nyquist frequency: the highest cutoff that is chosen
 _STATES = ("q", "dq", "ddq")
 _STATES_WIDER = 3.0  # what is below the cutoff then passes unchanged
@@ -112,14 +113,23 @@ def choose_cutoff(runs: Iterable[Run]) -> float:
     seen in the highest octave, is taken off first. The cutoff is ten times that (M. Gautier, "Dynamic
     identification of robots with power model", ICRA 1997, asks for at least five), so that the filter leaves the
     motion and its accelerations as they are and takes away the noise above; at most 0.8 of the Nyquist frequency.
-    Of several runs the one of the widest band decides.
+    All runs count together: in slow ones steps of the encoder look like motion of a wide band.
     """
     return cutoff_of_motion(runs)[0]
 
 
 def cutoff_of_motion(runs: Iterable[Run]) -> tuple[float, str]:
     """Return the cutoff (Hz) as `choose_cutoff` does, and what decided it, in words."""
-    return max(_cutoff(run) for run in runs)
+    every = list(runs)
+    frequency, power = map(np.concatenate, zip(*(_speed_spectrum(run) for run in every), strict=True))
+    order = np.argsort(frequency, kind="stable")
+    share = np.cumsum(power[order]) / max(power.sum(), np.finfo(float).tiny)
+    band = frequency[order][min(int(np.searchsorted(share, _BAND_SHARE)), len(order) - 1)]
+    shortest = min(float(run.signals.time[-1] - run.signals.time[0]) for run in every)
+    wanted = float(max(_BAND_FACTOR * band, FEWEST_PERIODS / shortest))
+    highest = max(_NYQUIST_SHARE / interval(run.signals.time) / 2 for run in every)
+    of_motion = wanted, f"{_BAND_FACTOR:g} times the bandwidth of the motion"
+    return min(of_motion, (highest, f"{_NYQUIST_SHARE:g} of the Nyquist frequency"))
 
 
 def differentiate(signal: np.ndarray, rate: float) -> np.ndarray:
@@ -167,23 +177,34 @@ def _even_time(run: Run) -> np.ndarray:
     return np.linspace(time[0], time[-1], round((time[-1] - time[0]) / interval(time)) + 1)
 
 
-def _cutoff(run: Run) -> tuple[float, str]:
-    time, q = run.signals.time, run.signals.q
+def _speed_spectrum(run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return frequencies (F,), Hz, and the squares of all joints' speeds at each, times the run's time, less noise."""
     even = _even_time(run)
     rate = 1 / (even[1] - even[0])
-    speed = np.diff(interpolated(time, q, even), axis=0)
-    power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2
+    speed = rate * np.diff(interpolated(run.signals.time, run.signals.q, even), axis=0)
+    power = np.abs(np.fft.rfft(speed * np.hanning(len(speed))[:, None], axis=0)) ** 2 / len(speed)
     frequency = np.fft.rfftfreq(len(speed), 1 / rate)
     gain = np.sin(np.pi * frequency / rate)[:, None] ** 2  # white positions, differenced
     octave = frequency > rate / 4
-    noise = np.median(power[octave] / gain[octave], axis=0) / np.log(2)  # mean of what is exponential, from its median
-    power = np.maximum(power - _ABOVE_NOISE * noise * gain, 0.0).sum(axis=1)
-    share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
-    band = frequency[min(int(np.searchsorted(share, _BAND_SHARE)), len(frequency) - 1)]
-    wanted = float(max(_BAND_FACTOR * band, FEWEST_PERIODS / (even[-1] - even[0])))
-    highest = float(_NYQUIST_SHARE * rate / 2)
-    of_motion = wanted, f"{_BAND_FACTOR:g} times the bandwidth of the widest motion"
-    return min(of_motion, (highest, f"{_NYQUIST_SHARE:g} of the Nyquist frequency"))
+    noise = _of_exponential(power[octave] / gain[octave])
+    return frequency, np.maximum(power - _ABOVE_NOISE * noise * gain, 0.0).sum(axis=1) / rate
+
+
+def white_noise(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the standard deviation (n,) of the white noise of values (N, n), as seen in the highest octave.
+
+    NaN where that falls as of values that were smoothed before they were logged.
+    """
+    rate, window = 1 / interval(time), np.hanning(len(values))[:, None]
+    power = np.abs(np.fft.rfft(window * (values - values.mean(axis=0)), axis=0)) ** 2 / np.sum(window**2)
+    frequency = np.fft.rfftfreq(len(values), 1 / rate)
+    whole, upper = (_of_exponential(power[frequency > share * rate]) for share in (0.25, 0.375))
+    return np.where(whole > _SMOOTHED * upper, np.nan, np.sqrt(whole))
+
+
+def _of_exponential(power: np.ndarray) -> np.ndarray:
+    """Return the mean (n,) of what is exponential, (F, n), from its median: lines of a spectrum do not move that."""
+    return np.asarray(np.median(power, axis=0) / np.log(2))
 
 
 def _agreeing(logged: np.ndarray | None, derived: np.ndarray) -> np.ndarray:
