@@ -1,4 +1,4 @@
-"""Friction whose temperature dependence changed: equal to the former one at a temperature of its own."""
+"""Friction: what changes with temperature, what is known of a law, and where nobody knows its state."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 from tests.synthetic import arm, swing
 
 from irtwin.effects.effect import Coefficients
-from irtwin.effects.friction import ChangedFrictionWithTemperature, StribeckFriction, TemperatureDependentFriction
+from irtwin.effects.friction import (
+    ChangedFrictionWithTemperature,
+    NonlinearViscousFriction,
+    PreslidingHysteresis,
+    StribeckFriction,
+    TemperatureDependentFriction,
+)
+from irtwin.effects.stack import Stack
+from irtwin.signals.motion import Motion
 
 ROBOT = arm(2)
 MOTION = swing(ROBOT, 1, seconds=5.0)
@@ -50,3 +58,45 @@ def test_no_stribeck_friction_is_tried_at_speeds_over_which_a_joints_dry_frictio
     }
     slow, fast = ("joint_1",), ("joint_1", "joint_2")
     assert tried == {(0.01, slow), (0.025, slow), (0.05, fast), (0.1, fast), (0.2, fast)}
+
+
+@pytest.mark.parametrize("friction", [StribeckFriction(), NonlinearViscousFriction()])
+def test_the_law_over_speed_is_known_to_a_part_of_a_joints_dry_friction(friction) -> None:
+    for dry, unnamed in ((None, 0.0), (5.0, 0.1)):
+        (term,) = friction.joint_terms(replace(ROBOT.joints[0], dry_friction=dry))
+        assert term.unnamed == pytest.approx(unnamed)
+
+
+def moving(*ways: float, rest: float = 1.0, rate: float = 100.0) -> Motion:
+    """Joint 1 moves on by `ways`, rad, at 0.1 rad/s each, and rests between; joint 2 does not move."""
+    speeds, still = [], []
+    for way in ways:
+        count = round(abs(way) / 0.1 * rate)
+        speeds += [0.1 * np.sign(way)] * count + [0.0] * round(rest * rate)
+        still += [False] * count + [True] * round(rest * rate)
+    dq = np.column_stack([speeds, np.zeros(len(speeds))])
+    standing = np.column_stack([still, np.ones(len(still), dtype=bool)])
+    return Motion(np.arange(len(dq)) / rate, np.cumsum(dq, axis=0) / rate, dq, 0 * dq, run="moves", standing=standing)
+
+
+def test_friction_that_builds_up_is_undecided_over_the_first_way_from_rest() -> None:
+    motion = moving(0.3, -0.3)
+    undecided = PreslidingHysteresis().undecided(motion)[:, 0]
+    way = 0.06 * 100 / 0.1  # samples
+    moved = np.flatnonzero(motion.dq[:, 0])
+    assert [undecided[moved[:300]].sum(), undecided[moved[300:]].sum()] == pytest.approx([way, way], abs=2)
+    assert undecided[moved[:50]].all() and not undecided[moved[70:300]].any() and undecided[moved[310:340]].all()
+    part = motion.part(200, 500)
+    np.testing.assert_array_equal(PreslidingHysteresis().undecided(part)[:, 0], undecided[200:500])
+
+
+def test_a_short_stop_and_a_joint_that_hardly_moves_on_are_modelled() -> None:
+    stops = moving(0.3, -0.3, rest=0.1)
+    assert not PreslidingHysteresis().undecided(stops)[300:, 0].any()
+    assert not PreslidingHysteresis().undecided(moving(0.05, -0.05)).any()
+
+
+def test_only_joints_that_have_such_friction_are_undecided() -> None:
+    motion = moving(0.3, -0.3)
+    for joints, some in ((None, True), (("joint_1",), True), (("joint_2",), False)):
+        assert Stack(ROBOT, [PreslidingHysteresis(joints=joints)]).undecided(motion)[:, 0].any() == some

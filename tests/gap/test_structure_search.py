@@ -126,6 +126,16 @@ def test_a_crumb_does_not_unsay_what_explains_nearly_everything(crumb):
     assert first.effect == "effect_0" and first.probability > 0.9
 
 
+def test_what_any_healthy_robot_may_have_of_an_effect_is_no_cause():
+    system, candidates = system_of(np.eye(2), [0.1, 0.0])  # as large as ten noises
+    term = Term("k0", "1", unnamed=0.05)
+    law = replace(candidates[0], variants=(replace(candidates[0].variants[0], terms=(term,)),))
+    assert [cause.effect for cause in causes(system, candidates)] == ["effect_0"]
+    assert not causes(system, [law, candidates[1]])
+    system, candidates = system_of(np.eye(2), [1.0, 0.0])
+    assert [cause.effect for cause in causes(system, [law, candidates[1]])] == ["effect_0"]
+
+
 def test_groups_that_disagree_speak_against_an_effect():
     generator = np.random.default_rng(2)
 

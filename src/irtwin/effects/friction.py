@@ -29,6 +29,9 @@ SLOW = 0.02  # rad/s, across which friction surely changes its sign, whatever it
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
 _TURNED = 2.0  # widths, where most of a turn is over
 _OVER = 3.0  # widths, where a turn is over
+_FROM_REST, _REST = 0.06, 0.2  # rad, over which friction builds up again, and s, after which a joint rested
+_MOST_FIRST = 0.5  # of a run's motion: a joint of which more is over this way is modelled there, too
+_LAW = 0.02  # of a joint's dry friction: as well as its law over speed is known, one standard deviation
 _MOST_LOST = 0.6  # of a load, in gears: those that lose half when driven back hold by themselves
 
 
@@ -60,6 +63,18 @@ def turning(robot: Robot, dq: np.ndarray) -> np.ndarray:
     """Return (N, n), by speeds, where a joint is so slow that its dry friction turns: its law there is its own."""
     widths = np.array([joint.friction_widest or joint.friction_width or _SHARP for joint in robot.joints])
     return np.asarray(np.abs(dq) < _TURNED * widths)
+
+
+def _rested(standing: np.ndarray, count: int) -> np.ndarray:
+    """Return (N, n) where each joint has stood for some samples."""
+    stood = np.cumsum(standing, axis=0)
+    moved = np.maximum.accumulate(np.where(standing, 0, stood), axis=0)
+    return np.asarray(stood - moved > count)
+
+
+def _law(joint: Joint) -> float:
+    """Return how well the law of a joint's dry friction is known, N m or N."""
+    return _LAW * (joint.dry_friction or 0.0)
 
 
 @dataclass(frozen=True)
@@ -128,7 +143,7 @@ class StribeckFriction(JointEffect):
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Fs."""
-        return (Term("Fs", force_unit(joint), joint=joint.name, spread=10.0, lowest=0.0),)
+        return (Term("Fs", force_unit(joint), joint.name, spread=10.0, lowest=0.0, unnamed=_law(joint)),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s exp(-(|dq|/vs)^d)."""
@@ -164,7 +179,7 @@ class NonlinearViscousFriction(JointEffect):
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k, the torque at one unit of speed."""
-        return (Term("k", force_unit(joint), joint=joint.name, spread=10.0),)
+        return (Term("k", force_unit(joint), joint.name, spread=10.0, unnamed=_law(joint)),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s |dq|^d."""
@@ -311,7 +326,8 @@ class ChangedFrictionWithTemperature(TemperatureDependentFriction):
 class PreslidingHysteresis(JointEffect):
     """Fc (z - s), dz/dt = dq (1 - s z)/d: after a reversal friction builds up over an angle (Dahl 1968).
 
-    Before the first reversal of a run it is taken to slide. A speed near standstill keeps its last direction.
+    Before the first reversal of a run it is taken to slide. A speed near standstill keeps its last direction. Whatever
+    held a joint at rest, it is undecided over the first way from there.
     """
 
     id: ClassVar[str] = "presliding_hysteresis"
@@ -337,6 +353,21 @@ class PreslidingHysteresis(JointEffect):
             signs = sharp_sign(motion.dq[:, joint])
             column[:, joint] = signs + self._lag(motion.q[:, joint], signs) - slides[:, joint]
         return (column,)
+
+    def undecided(self, motion: Motion) -> np.ndarray:
+        """Return where a joint has hardly moved from where the run began, or from where it rested for a while.
+
+        Nowhere, where it hardly moves on in the whole run.
+        """
+        whole = motion.whole or motion
+        still = np.zeros(whole.q.shape, dtype=bool) if whole.standing is None else whole.standing
+        place = np.arange(len(still))[:, None]
+        begun = np.maximum.accumulate(np.where(_rested(still, round(_REST * whole.rate)), place, 0), axis=0)
+        away = np.abs(whole.q - np.take_along_axis(whole.q, begun, axis=0)) >= _FROM_REST
+        first = np.maximum.accumulate(np.where(away, place, -1), axis=0) <= begun
+        speed = np.abs(whole.dq)
+        first &= np.sum(first * speed, axis=0) < _MOST_FIRST * np.sum(speed, axis=0)
+        return first[motion.start : motion.start + len(motion.time)]
 
     def _lag(self, q: np.ndarray, signs: np.ndarray) -> np.ndarray:
         """Return z - sign(dq) (N,): minus twice the new direction at a reversal, decaying with the way from it."""

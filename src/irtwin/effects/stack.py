@@ -262,7 +262,9 @@ class Stack:
         undecided = np.zeros(motion.dq.shape, dtype=bool)
         for effect in self._torque:
             part = effect.undecided(motion)
-            undecided |= False if part is None else part
+            if part is not None:
+                acting = [self.robot.index(joint.name) for joint in effect.acting(self.robot)]
+                undecided[:, acting] |= part[:, acting]
         return undecided
 
     def switching(self, motion: Motion) -> np.ndarray | None:

@@ -92,7 +92,12 @@ def _found(
     """
     blocks, pattern = _reduced(stack, open_shapes, motions, tried, every)
     told = track(enumerate(tried), "friction near zero speed of each joint")
-    return [_best(blocks, pattern, joint, turns) for joint, turns in told], blocks
+    imitating = {shape.id for shape in open_shapes}
+    sure = [
+        np.flatnonzero([stack.torque_terms[k][0].id not in imitating for k in np.flatnonzero(used)])
+        for used in stack.pattern
+    ]
+    return [_best(blocks, pattern, joint, turns, sure[joint]) for joint, turns in told], blocks
 
 
 def _around(found: Turn) -> list[Turn]:
@@ -168,14 +173,20 @@ def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
         yield turn(dq, width, exponent, powers[exponent])[:, None]
 
 
-def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn]) -> Dry:
-    """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always."""
+def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn], sure: np.ndarray) -> Dry:
+    """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always.
+
+    Effects whose shape is open imitate friction, so how large that is, is asked beside the `sure` columns alone.
+    """
     own = int(pattern[joint].sum()) - len(shapes) - 1
     seen = [block for block in blocks if block.rows[joint]]
     if not seen:
         return None, None
     factors = _weighted([block.factors[joint] for block in seen], np.array([block.rows[joint] for block in seen]), own)
-    left, friction = _left(triangle(np.concatenate(factors)), factors, own)
+    whole = triangle(np.concatenate(factors))
+    left, friction = _left(whole, factors, own)
+    if len(sure) < own:
+        _, friction = _left(triangle(whole[:, [*sure, *range(own, whole.shape[1])]]), [], len(sure))
     best = int(np.argmin(left.sum(axis=1)))
     if not _everywhere(left[0] - left[best]):
         best = 0

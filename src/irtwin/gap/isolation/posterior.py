@@ -93,8 +93,8 @@ class Posterior:
     @cached_property
     def variance(self) -> np.ndarray:
         """(V,) of what is left along a variant's columns, a row, in units of the noise."""
-        noise = self.evidence.disagreement / self.evidence.rows_that_speak
-        return np.asarray(self.misfit**2 + noise)
+        seen = self.evidence
+        return np.asarray(self.misfit**2 + (seen.disagreement + seen.unnamed) / seen.rows_that_speak)
 
     @cached_property
     def log_odds(self) -> np.ndarray:

@@ -56,6 +56,12 @@ class HypothesisEvidence:
         return np.asarray(self.explained / self.rows_that_speak)
 
     @cached_property
+    def unnamed(self) -> np.ndarray:
+        """(V,) squares that a variant explains where it is as large as any healthy robot may have it."""
+        shares = [[term.unnamed / term.spread for term in variant.terms] for variant in self.variants]
+        return np.array([np.diag(a) @ np.square(b) for a, b in zip(self.information, shares, strict=True)])
+
+    @cached_property
     def disagreement(self) -> np.ndarray:
         """(V,) how much more groups disagree on a variant than noise makes them, 1 at least.
 
