@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tests.synthetic import arm, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
@@ -29,7 +30,15 @@ def of_stribeck(effects):
 def test_an_effect_that_is_named_gets_the_shape_that_the_motions_show():
     effects = shaped(ROBOT, [sticking(1), sticking(2)], [*BASELINE, "stribeck_friction"])
     assert set(BASELINE) <= set(effects)
-    assert {(one.vs, one.d) for one in of_stribeck(effects)} == {(0.1, 2.0)}
+    assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(effects))
+
+
+def test_a_shape_lies_between_those_that_are_tried_where_motions_say_so():
+    effects = of_stribeck(
+        shaped(ROBOT, [sticking(1, 0.14, 1.4), sticking(2, 0.14, 1.4)], [*BASELINE, "stribeck_friction"])
+    )
+    assert {name for one in effects for name in one.joints} == set(ROBOT.joint_names)
+    assert all(one.vs == pytest.approx(0.14, rel=0.1) and one.d == pytest.approx(1.4, rel=0.1) for one in effects)
 
 
 def test_what_is_given_in_a_shape_keeps_it():
@@ -50,4 +59,4 @@ def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
     named = [*BASELINE, "nonlinear_viscous_friction", "stribeck_friction"]
     for effects in (named, [*BASELINE, *named[:-3:-1]]):
         found = shaped(ROBOT, [curved(1), curved(2)], effects)
-        assert {(one.vs, one.d) for one in of_stribeck(found)} == {(0.1, 2.0)}
+        assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(found))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -17,7 +18,9 @@ from irtwin.identification.reduced_torque import ReducedTorque
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
-_LOOKS = 8  # at shapes between two that were tried
+_NO_BRACKET = -1  # of `find_minimum`: the least is not inside
+_LOOKS = 5  # at shapes between two that were tried
+_PASSES = 2  # over the numbers of a shape, of all joints at once: each stands on the others'
 _SWEEPS = 4  # over effects that share a joint, at most: the shape of one stands on the other's
 
 
@@ -73,21 +76,46 @@ def _shaped(stack: Stack, open_shapes: Set[str], signal: str, fit: Callable[[Sta
             stack = _with_best_shape(stack, effect, fit)
         if stack.effects == before:
             break
+    for effect in opened:
+        stack = _with_shape_between(stack, effect, fit)
     return stack
 
 
 def _with_best_shape(stack: Stack, effect: Effect, fit: Callable[[Stack], Estimate]) -> Stack:
-    own = [place for place, one in enumerate(stack.effects) if one.id == effect.id]
-    before, after = stack.effects[: own[0]], stack.effects[own[-1] + 1 :]
+    """Give an effect the best of the shapes that are tried: joint by joint where it acts so."""
+    before, _, after = _around(stack, effect.id)
+    shapes = effect.candidates(stack.robot)
+    noise = np.array([fit(stack.with_effects([*before, shape, *after])).noise for shape in shapes])
+    if not (isinstance(effect, JointEffect) and effect.signal == "torque"):
+        return stack.with_effects([*before, shapes[int(np.argmin(np.log(noise).sum(axis=1)))], *after])
+    places = {joint.name: stack.robot.index(joint.name) for joint in effect.acting(stack.robot)}
+    best = {joint: shapes[int(np.argmin(noise[:, place]))] for joint, place in places.items()}
+    return stack.with_effects([*before, *_by_shape(best, stack.robot), *after])
+
+
+def _with_shape_between(stack: Stack, effect: Effect, fit: Callable[[Stack], Estimate]) -> Stack:
+    """Give an effect the shape between those that were tried that leaves least."""
+    before, own, after = _around(stack, effect.id)
     shapes = effect.candidates(stack.robot)
 
-    def left(shape: Effect) -> np.ndarray:
-        return fit(stack.with_effects([*before, shape, *after])).noise
+    def left(some: Sequence[Effect]) -> np.ndarray:
+        return fit(stack.with_effects([*before, *some, *after])).noise
 
-    best = _best(shapes, np.array([left(shape) for shape in shapes]), stack.robot)
     if not isinstance(effect, JointEffect):
-        best = [_between(best[0], shapes, lambda shape: float(np.log(left(shape)).sum()))]
-    return stack.with_effects([*before, *best, *after])
+        best = _between(own[0], shapes, lambda shape: float(np.log(left([shape])).sum()))
+        return stack.with_effects([*before, best, *after])
+    if effect.signal == "torque":
+        of_joint = {joint.name: replace(one, joints=None) for one in own for joint in one.acting(stack.robot)}
+        of_joint = _between_by_joint(of_joint, shapes, stack.robot, lambda some: left(_by_shape(some, stack.robot)))
+        return stack.with_effects([*before, *_by_shape(of_joint, stack.robot), *after])
+    return stack
+
+
+def _around(stack: Stack, effect: str) -> tuple[Sequence[Effect], Sequence[Effect], Sequence[Effect]]:
+    """Return what stands before an effect, the effect, which may be several, and what stands after."""
+    first = [one.id for one in stack.effects].index(effect)
+    own, after = ([one for one in stack.effects[first:] if (one.id == effect) is of_it] for of_it in (True, False))
+    return stack.effects[:first], own, after
 
 
 def _between(best: Effect, shapes: Sequence[Effect], left: Callable[[Effect], float]) -> Effect:
@@ -106,13 +134,52 @@ def _between(best: Effect, shapes: Sequence[Effect], left: Callable[[Effect], fl
     return best
 
 
-def _best(shapes: Sequence[Effect], noise: np.ndarray, robot: Robot) -> list[Effect]:
-    """Return the best of shapes by what each leaves in g equations, (shapes, g): joint by joint where it acts so."""
-    if not isinstance(shapes[0], JointEffect) or noise.shape[1] != len(robot.joints):
-        return [shapes[int(np.argmin(np.log(noise).sum(axis=1)))]]
-    chosen: dict[int, list[str]] = {}
-    for joint, best in zip(robot.joint_names, np.argmin(noise, axis=0).tolist(), strict=True):
-        chosen.setdefault(best, []).append(joint)
-    if len(chosen) == 1:
-        return [shapes[next(iter(chosen))]]
-    return [shapes[best].on(*joints) for best, joints in chosen.items()]
+def _between_by_joint(
+    best: Mapping[str, Effect],
+    shapes: Sequence[Effect],
+    robot: Robot,
+    left: Callable[[Mapping[str, Effect]], np.ndarray],
+) -> dict[str, Effect]:
+    """Return the same joint by joint; `left` of joints' shapes is what each equation leaves."""
+    found = dict(best)
+    for name, ends in [*shapes[0].ranges.items()] * _PASSES:
+        tried = sorted({*(float(shape.shape[name]) for shape in shapes), *ends})
+        found |= _number_by_joint(found, name, tried, robot, left)
+    return found
+
+
+def _number_by_joint(
+    found: Mapping[str, Effect],
+    name: str,
+    tried: Sequence[float],
+    robot: Robot,
+    left: Callable[[Mapping[str, Effect]], np.ndarray],
+) -> dict[str, Effect]:
+    """Return the shapes whose number leaves less than those that were tried, by joint: one fit looks at all joints."""
+    from scipy.optimize import elementwise  # takes a while to import
+
+    joints, points = list(found), np.array(tried)
+    own = np.array([float(found[joint].shape[name]) for joint in joints])
+    below = points[np.maximum(np.searchsorted(points, own) - 1, 0)]
+    above = points[np.minimum(np.searchsorted(points, own, side="right"), len(points) - 1)]
+    inner = np.where((below < own) & (own < above), own, (below + above) / 2)
+
+    def shapes_of(values: np.ndarray, which: np.ndarray) -> dict[str, Effect]:
+        numbers = zip((joints[k] for k in which), values, strict=True)
+        return {joint: found[joint].variants(**{name: (float(value),)})[0] for joint, value in numbers}
+
+    def left_of(values: np.ndarray, which: np.ndarray) -> np.ndarray:
+        return left({**found, **shapes_of(values, which)})[[robot.index(joints[k]) for k in which]]
+
+    every = np.arange(len(joints))
+    least = elementwise.find_minimum(left_of, (below, inner, above), args=(every,), maxiter=_LOOKS)
+    inside = least.status != _NO_BRACKET
+    return shapes_of(least.x[inside], every[inside])
+
+
+def _by_shape(of_joint: Mapping[str, Effect], robot: Robot) -> list[Effect]:
+    """Return effects, each at the joints that have its shape."""
+    joints: dict[Effect, list[str]] = {}
+    for joint, effect in of_joint.items():
+        joints.setdefault(effect, []).append(joint)
+    return [effect if len(some) == len(robot.joints) else effect.on(*some) for effect, some in joints.items()]
