@@ -39,10 +39,8 @@ def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None) -> Cutof
     highest, why = cutoff_of_motion(runs)
     resolved = _resolved(robot, runs)
     if resolved < highest:
-        highest, why = (
-            highest / 2,
-            f"{why}, {highest:.3g} Hz, halved as noise of positions is louder than that of torque",
-        )
+        why = f"{why}, {highest:.3g} Hz, halved as noise of positions is louder than that of torque"
+        highest /= 2
     halved = _halved(robot, runs, highest, resolved)
     if halved:
         times = {1: "once", 2: "twice"}.get(halved, f"{halved} times")

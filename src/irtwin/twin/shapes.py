@@ -19,7 +19,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
 _NO_BRACKET = -1  # of `find_minimum`: the least is not inside
-_LOOKS = 5  # at shapes between two that were tried
+_LOOKS, _LOOKS_BY_JOINT = 8, 5  # at shapes between two that were tried; what is joint by joint is looked at twice
 _PASSES = 2  # over the numbers of a shape, of all joints at once: each stands on the others'
 _SWEEPS = 4  # over effects that share a joint, at most: the shape of one stands on the other's
 
@@ -172,7 +172,7 @@ def _number_by_joint(
         return left({**found, **shapes_of(values, which)})[[robot.index(joints[k]) for k in which]]
 
     every = np.arange(len(joints))
-    least = elementwise.find_minimum(left_of, (below, inner, above), args=(every,), maxiter=_LOOKS)
+    least = elementwise.find_minimum(left_of, (below, inner, above), args=(every,), maxiter=_LOOKS_BY_JOINT)
     inside = least.status != _NO_BRACKET
     return shapes_of(least.x[inside], every[inside])
 
