@@ -86,8 +86,8 @@ def test_friction_that_builds_up_is_undecided_over_the_first_way_from_rest() -> 
     moved = np.flatnonzero(motion.dq[:, 0])
     assert [undecided[moved[:300]].sum(), undecided[moved[300:]].sum()] == pytest.approx([way, way], abs=2)
     assert undecided[moved[:50]].all() and not undecided[moved[70:300]].any() and undecided[moved[310:340]].all()
-    part = motion.part(200, 500)
-    np.testing.assert_array_equal(PreslidingHysteresis().undecided(part)[:, 0], undecided[200:500])
+    part = Stack(ROBOT, [PreslidingHysteresis()]).undecided(motion.part(200, 500))
+    np.testing.assert_array_equal(part[:, 0], undecided[200:500])
 
 
 def test_a_short_stop_and_a_joint_that_hardly_moves_on_are_modelled() -> None:

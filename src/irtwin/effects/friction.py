@@ -359,15 +359,14 @@ class PreslidingHysteresis(JointEffect):
 
         Nowhere, where it hardly moves on in the whole run.
         """
-        whole = motion.whole or motion
-        still = np.zeros(whole.q.shape, dtype=bool) if whole.standing is None else whole.standing
+        still = np.zeros(motion.q.shape, dtype=bool) if motion.standing is None else motion.standing
         place = np.arange(len(still))[:, None]
-        begun = np.maximum.accumulate(np.where(_rested(still, round(_REST * whole.rate)), place, 0), axis=0)
-        away = np.abs(whole.q - np.take_along_axis(whole.q, begun, axis=0)) >= _FROM_REST
+        begun = np.maximum.accumulate(np.where(_rested(still, round(_REST * motion.rate)), place, 0), axis=0)
+        away = np.abs(motion.q - np.take_along_axis(motion.q, begun, axis=0)) >= _FROM_REST
         first = np.maximum.accumulate(np.where(away, place, -1), axis=0) <= begun
-        speed = np.abs(whole.dq)
+        speed = np.abs(motion.dq)
         first &= np.sum(first * speed, axis=0) < _MOST_FIRST * np.sum(speed, axis=0)
-        return first[motion.start : motion.start + len(motion.time)]
+        return first
 
     def _lag(self, q: np.ndarray, signs: np.ndarray) -> np.ndarray:
         """Return z - sign(dq) (N,): minus twice the new direction at a reversal, decaying with the way from it."""

@@ -58,6 +58,7 @@ class Stack:
         self._power = [effect for effect in self.effects if effect.signal == "power"]
         self._last_torques: _Torques | None = None
         self._last_columns: dict[int, tuple[Motion, Predicted | None, np.ndarray]] = {}
+        self._last_undecided: dict[int, tuple[Motion, np.ndarray | None]] = {}
         self._check()
 
     def _check(self) -> None:
@@ -261,11 +262,21 @@ class Stack:
         """Return (N, n) where some effect cannot say the joint's torque."""
         undecided = np.zeros(motion.dq.shape, dtype=bool)
         for effect in self._torque:
-            part = effect.undecided(motion)
+            part = self._undecided_by(effect, motion)
             if part is not None:
                 acting = [self.robot.index(joint.name) for joint in effect.acting(self.robot)]
                 undecided[:, acting] |= part[:, acting]
         return undecided
+
+    def _undecided_by(self, effect: Effect, motion: Motion) -> np.ndarray | None:
+        """Return what one effect cannot say; of one with memory the whole run is looked at once for all its parts."""
+        if not effect.memory:
+            return effect.undecided(motion)
+        whole = motion.whole or motion
+        last = self._last_undecided.get(id(effect))
+        if last is None or last[0] is not whole:
+            last = self._last_undecided[id(effect)] = whole, effect.undecided(whole)
+        return None if last[1] is None else last[1][motion.start : motion.start + len(motion.time)]
 
     def switching(self, motion: Motion) -> np.ndarray | None:
         """Return (N,) where brakes open or close, or are about to; None without brakes.
