@@ -69,11 +69,11 @@ REFUSED = {
     ),
     "reference of the other sign": (
         lambda: [*runs("reference", torque=np.negative), *runs(seeds=range(5, 9))],
-        "reference_0.parquet: in the reference runs tau_joint_1, tau_joint_2, tau_joint_3 has the other sign",
+        "reference_0.parquet: the sign of tau_joint_1, tau_joint_2, tau_joint_3 is reversed in the reference runs",
     ),
     "one joint of the other sign": (
         lambda: [*runs("reference"), *runs(seeds=range(5, 9), torque=lambda tau: tau * [1, -1, 1])],
-        "observed_5.parquet: in the observed runs tau_joint_2 has the other sign",
+        "observed_5.parquet: the sign of tau_joint_2 is reversed in the observed runs",
     ),
     "simulator in another unit": (
         lambda: [*runs("simulated", torque=lambda tau: -1000 * tau), *runs(seeds=range(5, 9))],

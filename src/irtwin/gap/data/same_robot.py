@@ -43,7 +43,7 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
             file = next(run.file for run in runs if run.role == role)
             columns = CHANNELS["torque"].columns(np.array(stack.robot.joint_names)[some])
             raise InputError(
-                f"{file}: in the {role} runs {', '.join(columns)} has the other sign, as friction drives there; "
+                f"{file}: the sign of {', '.join(columns)} is reversed in the {role} runs, as friction drives there; "
                 "change it in these runs"
             )
     if foreign.sum() > 1 or opposed.mean() >= 0.5:
