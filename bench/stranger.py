@@ -146,10 +146,16 @@ def motion(kind: str, lower: np.ndarray, upper: np.ndarray, seconds: float, rng:
     if kind == "sines":
         own = [rng.uniform(-1, 1, (2, n)) / k for k in range(1, 5)]
         beat = 2 * np.pi / rng.uniform(6, 10)
-        q = sum(a * np.sin(k * beat * grid[:, None]) + b * np.cos(k * beat * grid[:, None]) for k, (a, b) in enumerate(own, 1))
+        q = sum(
+            a * np.sin(k * beat * grid[:, None]) + b * np.cos(k * beat * grid[:, None])
+            for k, (a, b) in enumerate(own, 1)
+        )
         q = middle + reach * q / np.abs(q).max(axis=0)
     else:
-        poses, fastest = [middle + reach * rng.uniform(-1, 1, n)], rng.uniform(0.1, 0.2) if kind == "creep" else rng.uniform(0.6, 1.5)
+        poses, fastest = (
+            [middle + reach * rng.uniform(-1, 1, n)],
+            rng.uniform(0.1, 0.2) if kind == "creep" else rng.uniform(0.6, 1.5),
+        )
         pieces: list[np.ndarray] = []
         while sum(map(len, pieces)) < len(grid) + 200:
             goal = middle + reach * rng.uniform(-1, 1, n)
@@ -183,7 +189,9 @@ def play(q: np.ndarray, width: float) -> np.ndarray:
     return 2 * q - motor
 
 
-def joined(arm: Arm, trace: Trace, changes: list[Change], warmth: np.ndarray, factor: np.ndarray) -> tuple[Trace, np.ndarray]:
+def joined(
+    arm: Arm, trace: Trace, changes: list[Change], warmth: np.ndarray, factor: np.ndarray
+) -> tuple[Trace, np.ndarray]:
     """Return what motors do and give of a run: their trace, and the torque that sensors would show, (N, n) N m."""
     told = {change.effect: change for change in changes}
     size = {name: change.size * UNIT.get(name, 1.0) for name, change in told.items()}
@@ -192,7 +200,11 @@ def joined(arm: Arm, trace: Trace, changes: list[Change], warmth: np.ndarray, fa
     for name in ("joint_elasticity", "backlash"):
         if name in told:
             k = told[name].joint
-            moved = trace[0][:, k] + size[name] * bodies[:, k] * 10 / arm.scale[k] if name == "joint_elasticity" else play(trace[0][:, k], 1e-3 * size[name])
+            moved = (
+                trace[0][:, k] + size[name] * bodies[:, k] * 10 / arm.scale[k]
+                if name == "joint_elasticity"
+                else play(trace[0][:, k], 1e-3 * size[name])
+            )
             motors[0][:, k] = moved
             motors[1][:, k] = np.gradient(moved, STEP)
             motors[2][:, k] = np.gradient(motors[1][:, k], STEP)
@@ -214,7 +226,9 @@ def joined(arm: Arm, trace: Trace, changes: list[Change], warmth: np.ndarray, fa
     return seen, tau
 
 
-def _added(arm: Arm, seen: Trace, bodies: np.ndarray, dry: np.ndarray, warmth: np.ndarray, change: Change) -> np.ndarray:
+def _added(
+    arm: Arm, seen: Trace, bodies: np.ndarray, dry: np.ndarray, warmth: np.ndarray, change: Change
+) -> np.ndarray:
     """Return what an effect adds to its joint's torque, (N,) N m."""
     (q, dq, _), k, n = seen, change.joint, len(arm.joints)
     turn, scale, other = arm.turn(dq)[:, k], arm.scale[k], (k + 1) % n
@@ -230,7 +244,9 @@ def _added(arm: Arm, seen: Trace, bodies: np.ndarray, dry: np.ndarray, warmth: n
         "joint_coupling": lambda: 0.05 * scale * dq[:, k - 1],
         "torque_offset": lambda: np.full(len(q), 0.05 * scale),
         UNKNOWN[0]: lambda: 0.3 * dry[:, k] * np.sin(2 * q[:, other]),
-        UNKNOWN[1]: lambda: 0.03 * scale * np.sin(2 * np.pi * 7 * np.arange(len(q)) * STEP) * np.minimum(np.abs(dq[:, k]), 0.5),
+        UNKNOWN[1]: lambda: (
+            0.03 * scale * np.sin(2 * np.pi * 7 * np.arange(len(q)) * STEP) * np.minimum(np.abs(dq[:, k]), 0.5)
+        ),
         UNKNOWN[2]: lambda: 0.2 * scale * dq[:, other] * dq[:, k - 1],
     }
     form = forms.get(change.effect)
@@ -279,7 +295,9 @@ def drawn(models: Path, rng: np.random.Generator) -> tuple[Case, str]:
     source = read_model(models, name)
     text = urdf(source, source.compiled())
     pin.seed(int(rng.integers(2**31)))
-    arm = Arm(name, source.joints, text, pin.buildModelFromXML(text), law, rng, float(rng.choice([0, 0.01, 0.03, 0.05])))
+    arm = Arm(
+        name, source.joints, text, pin.buildModelFromXML(text), law, rng, float(rng.choice([0, 0.01, 0.03, 0.05]))
+    )
     with_references, repeated = rng.random() < 0.5, rng.random() < 0.5
     roles = ["observed"] * int(rng.integers(1, 4))
     roles = ["reference"] * (len(roles) + 1) + roles if with_references else roles
@@ -288,7 +306,17 @@ def drawn(models: Path, rng: np.random.Generator) -> tuple[Case, str]:
     traces, repeats, warmth = [], [], []
     for index in range(len(roles)):
         again = repeated and index > 0 and roles[index] == roles[index - 1] and rng.random() < 0.6
-        trace = traces[-1] if again else motion(str(rng.choice(["moves", "splines", "sines", "creep"], p=[0.4, 0.25, 0.25, 0.1])), lower, upper, seconds, rng)
+        trace = (
+            traces[-1]
+            if again
+            else motion(
+                str(rng.choice(["moves", "splines", "sines", "creep"], p=[0.4, 0.25, 0.25, 0.1])),
+                lower,
+                upper,
+                seconds,
+                rng,
+            )
+        )
         traces.append(trace)
         repeats.append(index - 1 if again else None)
         start = rng.uniform(25, 45) if index else 22.0
@@ -302,7 +330,13 @@ def drawn(models: Path, rng: np.random.Generator) -> tuple[Case, str]:
     changes = []
     for each in names:
         changed = each in CHANGING or (with_references and each in EITHER and rng.random() < 0.5)
-        joint = len(lower) - 1 if each == "joint_coupling" else 1 if each == "gravity_compensation" else int(rng.integers(len(lower)))
+        joint = (
+            len(lower) - 1
+            if each == "joint_coupling"
+            else 1
+            if each == "gravity_compensation"
+            else int(rng.integers(len(lower)))
+        )
         changes.append(Change(each, joint, "changed" if changed else "missing", shape=float(rng.uniform(-1, 1))))
     return Case(arm, changes, roles, repeats, traces, factors, warmth), kind
 
@@ -315,7 +349,11 @@ def make(models: Path, folder: Path, seed: int, number: int) -> dict[str, Any]:
     if case.changes:
         level, healthy = float(np.exp(rng.uniform(np.log(0.5), np.log(10)))), case.left(False)
         for change in case.changes:
-            own = Case(case.arm, [change], *(getattr(case, part) for part in ("roles", "repeats", "traces", "factors", "warmth")))
+            own = Case(
+                case.arm,
+                [change],
+                *(getattr(case, part) for part in ("roles", "repeats", "traces", "factors", "warmth")),
+            )
             for _ in range(3):
                 gap = np.sqrt(np.maximum(own.left(True) ** 2 - healthy**2, 1e-6))
                 change.size = float(np.clip(change.size * level / gap.max(), 1e-3, 30))
@@ -351,13 +389,19 @@ def write(folder: Path, case: Case, named: bool, rng: np.random.Generator) -> No
         given, tau = tau, shifted(tau, lag) if lag else tau
         shown = slice(0, None, every)
         signals = {"q": np.round(q[shown] / encoder) * encoder}
-        signals["tau"] = np.round((tau[shown] + arm.noise * rng.standard_normal(signals["q"].shape)) / arm.step) * arm.step
+        signals["tau"] = (
+            np.round((tau[shown] + arm.noise * rng.standard_normal(signals["q"].shape)) / arm.step) * arm.step
+        )
         if speeds:
-            signals["dq"] = shifted(dq, 2e-3)[shown] + 0.5 * encoder / 2e-3 * 0.02 * rng.standard_normal(signals["q"].shape)
+            signals["dq"] = shifted(dq, 2e-3)[shown] + 0.5 * encoder / 2e-3 * 0.02 * rng.standard_normal(
+                signals["q"].shape
+            )
         if warm:
             signals["temp"] = np.round(case.warmth[index][shown], 1)
         columns = {"time": np.round(np.arange(len(signals["q"])) * every * STEP, 6)}
-        columns |= {f"{key}_{name}": part[:, k].copy() for key, part in signals.items() for k, name in enumerate(arm.joints)}
+        columns |= {
+            f"{key}_{name}": part[:, k].copy() for key, part in signals.items() for k, name in enumerate(arm.joints)
+        }
         if power:
             drawn_power = 40 + (given * dq + resistance * given**2).sum(axis=1)[shown]
             columns["power"] = np.round(drawn_power + 0.5 * rng.standard_normal(len(drawn_power)), 1)
@@ -392,7 +436,9 @@ def score(out: Path, labels: dict[str, Any]) -> list[str]:
             healthy, blamed = healthy + 1, blamed + bool(wrong)
             gap += answer.get("verdict") != "no_gap" and not label["also"]
         truth = ", ".join(f"{e['effect']} {e['joints']} {e['gap_over_floor']:.1f}" for e in label["effects"]) or "-"
-        says = "; ".join(f"{o['effect']} ({o['scope'][0]}) {','.join(o['joints'])} {o['confidence']:.2f}" for o in causes[:5])
+        says = "; ".join(
+            f"{o['effect']} ({o['scope'][0]}) {','.join(o['joints'])} {o['confidence']:.2f}" for o in causes[:5]
+        )
         mark = "FALSE " if wrong else ""
         lines.append(
             f"{name} {label['robot']} {label['law']}{'+' if label['named'] else ''} {label['differs']:g} {label['scope']}: "
@@ -421,7 +467,9 @@ def main() -> None:
         print(*score(given.out, json.loads(given.labels.read_text(encoding="utf-8"))), sep="\n")
         return
     labels = {f"case_{k:03d}": make(given.models, given.folder, given.seed, k) for k in range(given.count)}
-    given.folder.with_name(given.folder.name + "_labels.json").write_text(json.dumps(labels, indent=1), encoding="utf-8")
+    given.folder.with_name(given.folder.name + "_labels.json").write_text(
+        json.dumps(labels, indent=1), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

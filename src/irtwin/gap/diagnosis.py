@@ -22,6 +22,7 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.common_lag import common_lag
 from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
 from irtwin.gap.isolation.finding import ChannelFinding
@@ -201,6 +202,13 @@ def diagnose(
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
         torque, floor, refusals = search.torque_causes(_tried(search, plain))
+        if lag := common_lag(case.robot, torque.finding, case.with_torque):
+            tell(f"Trying every effect on torque {1e3 * lag:.2g} ms earlier, as it lags in most joints")
+            case = case.without_lag(lag).with_friction_near_zero()
+            search = replace(search, case=case)
+            plain, twin_torque = search.plain, search.twin.torque
+            assert plain is not None
+            torque, floor, refusals = search.torque_causes(_tried(search, plain))
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)
     energies: EnergyErrors | None = None

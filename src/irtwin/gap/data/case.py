@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
@@ -153,6 +154,13 @@ class Case:
                 robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
         return replace(self, robot=robot)
 
+    def without_lag(self, lag: float) -> Case:
+        """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
+        motions = {run: _earlier(motion, lag) for run, motion in self.motions.items()}
+        said = f"torque comes {1e3 * lag:.2g} ms later than positions in most joints, as filters make it: taken out"
+        cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {said}")
+        return replace(self, motions=motions, cutoff=cutoff)
+
     def shows(self, signal: str) -> bool:
         """Return whether some observed run has the signal: "torque" or "power"."""
         return any(getattr(motion, signal) is not None for motion in self.seen)
@@ -181,6 +189,13 @@ def _turned(before: Joint, joint: Joint) -> Joint:
     if joint.friction_width is None:
         return replace(before, dry_friction=joint.dry_friction or before.dry_friction)
     return replace(joint, friction_widest=max(before.friction_width or 0.0, joint.friction_width))
+
+
+def _earlier(motion: Motion, lag: float) -> Motion:
+    if motion.torque is None:
+        return motion
+    later = np.clip(motion.time + lag, motion.time[0], motion.time[-1])
+    return replace(motion, torque=CubicSpline(motion.time, motion.torque)(later))
 
 
 def _stated(data_set: DataSet) -> Stated:
