@@ -1,4 +1,4 @@
-"""Arms of others under a plant written from the log format alone: how right is a diagnosis where no law is the catalogue's?
+"""Arms of others under a plant written from the log format alone: how right is a diagnosis where laws are not its own?
 
 In bench/: `python stranger.py make MODELS FOLDER --seed SEED --count 40`, `python -m blind.run FOLDER OUT`, `python
 stranger.py score OUT FOLDER_labels.json`. MODELS is the folder of `pip download --no-deps robosuite gymnasium-robotics
@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 import pyarrow as pa
 import pyarrow.parquet as pq
+
 from closed_loop.models import SOURCES, read_model
 from closed_loop.urdf import urdf
 
@@ -441,7 +442,8 @@ def score(out: Path, labels: dict[str, Any]) -> list[str]:
         )
         mark = "FALSE " if wrong else ""
         lines.append(
-            f"{name} {label['robot']} {label['law']}{'+' if label['named'] else ''} {label['differs']:g} {label['scope']}: "
+            f"{name} {label['robot']} {label['law']}{'+' if label['named'] else ''} {label['differs']:g} "
+            f"{label['scope']}: "
             f"{truth} | {answer.get('verdict', answer.get('error'))} | {mark}{says or '-'} | {answer['seconds']:.0f} s"
         )
     return [

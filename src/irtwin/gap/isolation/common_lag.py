@@ -1,4 +1,4 @@
-"""The lag of all joints' torque behind their positions, as filters of drives and of loggers make it: no gap of the twin.
+"""The lag of all joints' torque behind positions, as filters of drives and of loggers make it: no gap of the twin.
 
 It is found as a cause is, beside what else acts; the search is then repeated without it.
 """
