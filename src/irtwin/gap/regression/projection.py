@@ -104,8 +104,8 @@ class Projection:
     def _along(self, change: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Return (T, n) the products of columns, at some places, with what (K,) makes of the twin's terms."""
         if self._kept is not None and 2 * len(at) > len(self._asked):  # fewer are picked one by one
-            every = self._kept.reshape(-1, len(change)) @ change
-            return np.asarray(every.reshape(len(self._kept), -1)[:, at])
+            tell, asked, terms = self._kept.shape
+            return np.asarray((self._kept.reshape(tell * asked, terms) @ change).reshape(tell, asked)[:, at])
         each = [self._across(place, at) @ change for place in range(len(self._telling))]
         return np.array(each).reshape(len(each), len(at))
 
@@ -132,7 +132,7 @@ class Projection:
         left, told = -(mine @ self._inner), np.zeros((len(new), len(self._asked)))  # (R, n, K)
         for place, part in enumerate(self._telling):
             left[part] += self._across(place, at)
-        own = (left.reshape(-1, mine.shape[1]) @ -self._imitated.T).reshape(*left.shape[:2], -1)
+        own = left @ -self._imitated.T
         own[..., -1] -= self._measured @ mine.T
         for place, part in enumerate(self._telling):
             products = self._moments[place].among(np.array(new), self._asked)
