@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from irtwin.gap.regression import moments as module
-from irtwin.gap.regression.moments import Moments, Places, Products, Summed, numbers
+from irtwin.gap.regression.moments import Moments, Places, Products, Summed, Whole, numbers
 
 COLUMNS = 9  # and the measurement
 WEIGHTS = np.array([2.0, 0.5, 3.0])
@@ -47,6 +47,7 @@ def test_they_are_the_products_of_all_columns(count, used, seed):
     (one, first), (other, second) = group(rng, count, used), group(rng, 2 * count, used)
     for found, expected in (
         (one, first),
+        (Whole(one), first),
         (Summed([one, other]), first + second),
     ):
         np.testing.assert_allclose(found.of(np.arange(found.size)), expected, atol=1e-9)

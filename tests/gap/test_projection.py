@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,22 @@ def test_what_is_visible_is_what_the_twin_does_not_imitate() -> None:
     places = [list(one.columns) for one in VARIANTS]
     squares = np.array([[np.trace(products[np.ix_(k, k)]) for k in places] for products in (left, total)])
     np.testing.assert_allclose(visible.T, [squares[0] / (GROUPS * ROWS), squares[0] / squares[1]], rtol=1e-9)
+
+
+def test_the_twin_may_have_no_terms() -> None:
+    own = system(shaken=False)
+    lost, pattern = own.pattern[:, :BASE].sum(axis=1), own.pattern[:, BASE:]
+    blocks = tuple(
+        replace(block, factors=tuple(factor[:, count:] for factor, count in zip(block.factors, lost, strict=True)))
+        for block in own.blocks
+    )
+    shaken = tuple(np.eye(int(row.sum()) + 1) for row in pattern)
+    own = replace(own, terms=(), pattern=pattern, blocks=blocks, shaken=shaken)
+    some = [Variant(EFFECT, (k,), (Term("k", "1", spread=0.5),)) for k in (0, 1)]
+    found = evidence(Projection(own, NOISE, [*some, Variant(EFFECT, (2,), ())]), (2,), some)
+    total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))
+    left = total[0, 0] - total[0, 2] ** 2 / (total[2, 2] + 1)
+    assert found.information[0][0, 0] == pytest.approx(left)
 
 
 def test_nothing_may_be_asked_for() -> None:

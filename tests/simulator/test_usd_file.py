@@ -160,6 +160,7 @@ def test_names_that_usd_does_not_allow_are_kept_for_show(tmp_path):
         ("float physics:mass = 2", "", r"/arm/rod takes its mass from its shapes; give it physics:mass, physics:cen"),
         ('displayName = "pan"', "", r"has no joint pan; its joints are swing: give a model whose joints have the"),
         ('axis = "Z"', 'axis = "W"', r'joint "pan" moves along W; give X, Y or Z as its physics:axis'),
+        ("float mjc:damping = 2500", 'string mjc:damping = "1"', r'joint "pan" has no number as its mjc:damping'),
         ("mjc:damping = 2500", "mjc:damping = nan", r'joint "pan" has a number that is not finite'),
         ("physics:mass = 2", "physics:mass = inf", r'link "/arm/rod" has a number that is not finite'),
     ],
@@ -172,11 +173,12 @@ def test_what_cannot_be_read_is_refused_in_a_line(tmp_path, old, new, said, capf
     assert capfd.readouterr().err == ""
 
 
-def test_packages_and_files_of_something_else_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"arm\.usdz: is a package; unpack it"):
-        read(tmp_path, "", name="arm.usdz")
+def test_files_of_something_else_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"arm\.usdc: is no USD that can be read"):
         read(tmp_path, "PXR-USDC and nothing more", name="arm.usdc")
+    (tmp_path / "bytes.usda").write_bytes(b'#usda 1.0\ndef "a" { \xff\xfe }')
+    with pytest.raises(InputError, match=r"bytes\.usda: is no USD that can be read \(.*[a-z]"):
+        read_model(tmp_path / "bytes.usda", ONE)
     with pytest.raises(InputError, match=r"none\.usd: cannot be read \(No such file"):
         read_model(tmp_path / "none.usd", ONE)
 

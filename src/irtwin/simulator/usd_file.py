@@ -1,4 +1,7 @@
-"""A model in USD, as Isaac Sim and Newton have it: read into MuJoCo, and changed by a layer over it."""
+"""A model in USD, as Isaac Sim and Newton have it: read into MuJoCo, and changed by a layer over it.
+
+The layer stands beside the file, or in a copy of the package where that is one.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,12 @@ from irtwin.input_file import read_input, real_path
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
 from irtwin.simulator.model_file import Changes, ModelFile
+from irtwin.simulator.usd_package import PACKAGE, check_package, new_name, packed
 
 if TYPE_CHECKING:
     import mujoco
 
-ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
+ENDINGS = (".usd", ".usda", ".usdc", PACKAGE)
 _MOST = 200_000_000  # bytes; meshes are within
 _KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed"}
 _AXES = {"revolute": "angular", "prismatic": "linear"}
@@ -84,28 +88,47 @@ class UsdFile(ModelFile):
 
     def check_written(self, out: Path) -> None:
         """Raise InputError where a layer over it would not find it, or be of another kind than its name says."""
-        if out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
+        if self.is_package:
+            if out.suffix.lower() != PACKAGE:
+                raise InputError(f"{out}: is to be a package, as {self.path} is; give it the ending {PACKAGE}")
+        elif out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
             raise InputError(f"{out}: is to be a layer over {self.path}; give a file beside that, and with its ending")
 
     def changed(self, changes: Changes) -> bytes:
-        """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes."""
-        from pxr import Sdf
+        """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes.
 
+        Of a package a copy, in which such a layer comes first.
+        """
         if not changes:
             return self.content
         with tempfile.TemporaryDirectory() as folder:
-            place = Path(folder, self.path.name)
-            layer = Sdf.Layer.CreateNew(str(place))
-            root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
-            for key in set(own.ListInfoKeys()) - _OF_LAYER:
-                root.SetInfo(key, own.GetInfo(key))
-            layer.subLayerPaths.append(f"./{self.path.name}")
-            for element, said in changes.items():
-                for number, value in said.items():
-                    if value is not None:  # of a range the end, as drives have no least
-                        self._put(layer, element.attributes["path"], number, float(str(value).split()[-1]))
-            layer.Save()
-            return place.read_bytes()
+            if self.is_package:
+                names = check_package(self.path)
+                layer = Path(folder, new_name(names))
+                self._write_layer(layer, names[0], changes)
+                return packed(self.path, names, layer)
+            layer = Path(folder, self.path.name)
+            self._write_layer(layer, self.path.name, changes)
+            return layer.read_bytes()
+
+    @property
+    def is_package(self) -> bool:
+        """Whether it is a package of USD files."""
+        return self.path.suffix.lower() == PACKAGE
+
+    def _write_layer(self, place: Path, beneath: str, changes: Changes) -> None:
+        from pxr import Sdf
+
+        layer = Sdf.Layer.CreateNew(str(place))
+        root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
+        for key in set(own.ListInfoKeys()) - _OF_LAYER:
+            root.SetInfo(key, own.GetInfo(key))
+        layer.subLayerPaths.append(f"./{beneath}")
+        for element, said in changes.items():
+            for number, value in said.items():
+                if value is not None:  # of a range the end, as drives have no least
+                    self._put(layer, element.attributes["path"], number, float(str(value).split()[-1]))
+        layer.Save()
 
     def spec(self) -> mujoco.MjSpec:
         """Return MuJoCo's specification of it. Raises InputError where it cannot be told, ValueError if no tree."""
@@ -157,24 +180,32 @@ def read_usd(path: Path) -> UsdFile:
     except ModuleNotFoundError as error:
         raise InputError(f"{path}: reading USD needs its package; install irtwin[usd]") from error
     content = read_input(path, _MOST)
-    if path.suffix.lower() == ".usdz":
-        raise InputError(f"{path}: is a package; unpack it, as `unzip` does, and give the USD file that is in it")
     try:
         _check_inside(path, path.parent, set())
         file = UsdFile(path, content, ())
         return UsdFile(path, content, tuple(_elements(file.stage)))
     except Tf.ErrorException as error:
         raise InputError(f"{path}: is no USD that can be read ({_reason(error)})") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is no USD that can be read (a name in it is no UTF-8)") from error
 
 
 def _reason(error: Exception) -> str:
-    return str(error.args[0]).strip().splitlines()[-1].strip() if error.args else "no reason is given"
+    """Return the last line of words that USD says; it quotes what it reads, which may be no text."""
+    try:
+        lines = str(error.args[0]).splitlines() if error.args else []
+    except UnicodeDecodeError:
+        return "it is no UTF-8"
+    return next((line.strip() for line in reversed(lines) if any(map(str.isalpha, line))), "no reason is given")
 
 
 def _check_inside(path: Path, folder: Path, seen: set[Path]) -> None:
     from pxr import Sdf
 
     seen.add(path)
+    if path.suffix.lower() == PACKAGE:
+        check_package(path)
+        return
     for named in Sdf.Layer.FindOrOpen(str(path)).GetCompositionAssetDependencies():
         place = path.parent / named
         real = real_path(place)
@@ -293,7 +324,10 @@ def _number(file: UsdFile, prim: Any, kind: str, number: str) -> float:
     for one in _PLACES[number]:
         attribute = prim.GetAttribute(one.named(kind)[0])
         if attribute.HasAuthoredValue():
-            return float(attribute.Get()) * file.unit(number, kind, one.per_degree)
+            value = attribute.Get()
+            if not isinstance(value, int | float):
+                raise InputError(f'{file.path}: joint "{_name(prim)}" has no number as its {attribute.GetName()}')
+            return float(value) * file.unit(number, kind, one.per_degree)
     return 0.0
 
 

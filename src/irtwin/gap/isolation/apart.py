@@ -16,7 +16,7 @@ import numpy as np
 
 from irtwin.gap.regression.groups import FEWEST_GROUPS
 from irtwin.gap.regression.held_out import HeldOut, held_out
-from irtwin.gap.regression.moments import Summed
+from irtwin.gap.regression.moments import Summed, Whole
 from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
 from irtwin.identification.progress import track
 
@@ -131,7 +131,8 @@ def closed_squares(apart: Apart, seed: int) -> np.ndarray:
     """
     system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
-    weighed = {True: system.group_moments(apart.noise), False: system.group_moments(system.noise_before)}
+    noise = {True: apart.noise, False: system.noise_before}
+    weighed = {some: [Whole(one) for one in system.group_moments(level)] for some, level in noise.items()}
     totals = {some: Summed(moments) for some, moments in weighed.items()}
 
     @cache

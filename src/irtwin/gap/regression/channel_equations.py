@@ -166,14 +166,25 @@ def shaken_products(
     parts = [np.zeros((len(some), len(some))) for some in own]
     rows = np.zeros(len(parts))
     for motion, _ in pairs:  # one by one: blocks of all together take many times what their products do
-        for block in accumulate_any([motion], difference, pattern, by_products=True):
-            rows += block.apart.rows
-            for total, factor in zip(whole, block.factors, strict=True):
-                total += factor.T @ factor
-            for total, factor, some in zip(parts, block.apart.factors, own, strict=True):
-                total += factor[:, some].T @ factor[:, some]
+        blocks = accumulate_any([motion], difference, pattern, by_products=True)
+        apart = [block.apart for block in blocks]
+        rows += sum(block.rows for block in apart)
+        for total, *factors in zip(whole, *(block.factors for block in blocks), strict=True):
+            total += _products(factors)
+        for total, some, *factors in zip(parts, own, *(block.factors for block in apart), strict=True):
+            total += _products([factor[:, some] for factor in factors])
     of_both = rows.reshape(2, -1).sum(axis=0)
     return Shaking(
         tuple(total / max(count, 1.0) for total, count in zip(whole, of_both, strict=True)),
         tuple(total / max(count, 1.0) for total, count in zip(parts, rows, strict=True)),
     )
+
+
+def _products(factors: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the products of columns of all rows (N, k) each; few rows are taken together: each sum takes as long."""
+    bunches: dict[int, list[np.ndarray]] = {}
+    rows = 0
+    for factor in factors:
+        bunches.setdefault(rows // factor.shape[1], []).append(factor)
+        rows += len(factor)
+    return np.asarray(sum(stacked.T @ stacked for stacked in map(np.concatenate, bunches.values())))

@@ -142,6 +142,19 @@ class Moments:
         return self.among(rows, np.arange(self.size))
 
 
+class Whole(Moments):
+    """Those of few columns, all of them worked out once: whoever asks for some of them often has them picked."""
+
+    def __init__(self, moments: Moments):
+        """Take the products of all columns."""
+        super().__init__(moments.weighed)
+        self._products = moments.of(np.arange(self.size))
+
+    def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Pick products (r, c) of some columns with others."""
+        return self._products.take(rows, axis=0).take(columns, axis=1)
+
+
 class Summed(Moments):
     """Those of several groups; what was asked last is kept, as it is asked again beside each group left out."""
 

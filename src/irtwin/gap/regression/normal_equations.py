@@ -128,7 +128,7 @@ class System:
         """K, how many terms the twin has."""
         return len(self.terms)
 
-    @property
+    @cached_property
     def both(self) -> bool:
         """Whether there are reference runs beside the observed ones."""
         return not self.observed.all()

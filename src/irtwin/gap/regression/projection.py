@@ -21,29 +21,37 @@ from irtwin.identification.progress import track
 class Projection:
     """Products of what the twin's terms leave of variants' columns; fitted to all parts (P,), weighted by `noise` (g,).
 
-    A columns are asked for, the measurement is the last. Raises InputError where they would take too much memory.
+    A columns are asked for, the measurement is the last. In R of the parts there are rows; T of these tell of columns:
+    what changed is zero where nothing is observed. Raises InputError where they would take too much memory.
     """
 
     def __init__(self, system: System, noise: np.ndarray, variants: Sequence[Variant]):
         """Take the twin's terms off the columns of variants."""
         self.system, self._noise = system, noise
-        self._moments = system.moments(noise)
         self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
-        base, every = np.arange(system.base), track(self._moments, "parts of what the twin imitates")
-        self._all, inner = np.zeros((len(self._asked), system.base)), []
-        keeps = len(self._moments) * self._all.size <= MOST_HELD
-        self._kept: list[np.ndarray] = []  # of each part, what is asked for beside the twin's terms (A, K)
-        for own in every:
-            products = own.among(base, np.append(base, self._asked))
+        self.parts = np.array([system.rows[group, kind].any() for kind, group in system.parts])  # (P,) with rows
+        observed = system.group_observed[[group for _, group in system.parts]][self.parts]
+        self._telling = np.flatnonzero(observed | (self._asked[0] < system.changed))  # of those with rows
+        every = [own for own, some in zip(system.moments(noise), self.parts, strict=True) if some]
+        self._moments = [every[part] for part in self._telling]
+        base, size = np.arange(system.base), len(self._telling) * len(self._asked) * system.base
+        self._kept = np.empty((len(self._telling), len(self._asked), system.base)) if size <= MOST_HELD else None
+        self._all, inner, measured = np.zeros((len(self._asked), system.base)), [], []
+        places = {int(part): place for place, part in enumerate(self._telling)}
+        for part, own in enumerate(track(every, "parts of what the twin imitates")):
+            place = places.get(part)
+            products = own.among(base, np.append(base, system.size if place is None else self._asked))
             inner.append(products[:, : system.base])
-            across = np.ascontiguousarray(products[:, system.base :].T)
-            self._all += across
-            self._kept += [across] if keeps else []
-        self._inner = np.array(inner)  # (P, K, K)
+            measured.append(products[:, -1])
+            self._all[-1 if place is None else 0 :] += products[:, system.base :].T
+            if place is not None and self._kept is not None:
+                self._kept[place] = products[:, system.base :].T
+        self._inner = np.array(inner)  # (R, K, K)
+        self._measured = np.array(measured)  # (R, K)
         self._factor = factored(self._inner.sum(axis=0), system.prior())
         self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
-        self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: with all (A,), in each part (A, P)
-        self.products: list[tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = []
+        self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: with all (A,), in each part (A, R)
+        self.products: dict[int, tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = {}  # by their number
         self._squares: dict[tuple[int, ...], tuple[float, float]] = {}  # of variants: what is left, and all
         self._project(variants)
 
@@ -54,33 +62,52 @@ class Projection:
             sizes.setdefault(len(one.columns), []).append(one.columns)
         if not sizes:
             return
-        each = [self.at([[*columns, self.system.size] for columns in own]) for own in sizes.values()]
-        pairs = [np.broadcast_arrays(columns[:, :-1, None], columns[:, None, :]) for columns in each]
+        each = [self.at(own) for own in sizes.values()]
+        beside = [np.column_stack([columns, np.full(len(columns), -1)]) for columns in each]
+        pairs = [np.broadcast_arrays(one[..., None], own[:, None]) for one, own in zip(each, beside, strict=True)]
         flat = [self._asked[np.concatenate([one[side].ravel() for one in pairs])] for side in (0, 1)]
-        products = self.system.products_of(flat[0], flat[1], self._noise)
+        products = self.system.products_of(flat[0], flat[1], self._noise)[self.parts]
         ends = np.cumsum([one.size for one, _ in pairs])[:-1]
         by_part = [
             products_of.reshape(-1, *one.shape)
             for products_of, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
         ]
-        before = [left.sum(axis=0) for left in by_part]
+        whole = [left.sum(axis=0) for left in by_part]
         imitated = [self._imitated[columns] for columns in each]
+        places = {int(part): place for place, part in enumerate(self._telling)}
         for part, inner in enumerate(self._inner):
-            half = self._across(part) - self._imitated @ inner / 2  # what is left is symmetric in it
+            half = self._imitated @ (inner / -2)  # what is left is symmetric in it
+            if part in places:
+                half += self._across(places[part])
+            else:
+                half[-1] += self._measured[part]
+            measured = half @ self._imitated[-1] + self._imitated @ half[-1]
             for columns, own, left in zip(each, imitated, by_part, strict=True):
-                other = half[columns]
-                left[part] -= _pairs(own[:, :-1], other) + _pairs(other[:, :-1], own)
-        for known, columns, own, whole, left in zip(sizes.values(), each, imitated, before, by_part, strict=True):
-            after = whole - _pairs(own[:, :-1], self._all[columns])
-            squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, whole)), strict=True)
+                among = _pairs(own, half[columns])
+                left[part, ..., :-1] -= among + among.swapaxes(1, 2)
+                left[part, ..., -1] -= measured[columns]
+        for known, them, own, all_of, left in zip(sizes.values(), beside, imitated, whole, by_part, strict=True):
+            after = all_of - _pairs(own, self._all[them])
+            squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, all_of)), strict=True)
             self._squares |= zip(known, squares, strict=True)
-            self.products.append((dict(zip(known, range(len(known)), strict=True)), after, left))
+            self.products[them.shape[1] - 1] = dict(zip(known, range(len(known)), strict=True)), after, left
 
-    def _across(self, part: int, at: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Return the products (n, K) of what is asked for, at some places, with the twin's terms in a part."""
-        if self._kept:
-            return self._kept[part][at]
-        return self._moments[part].among(np.arange(self.system.base), self._asked[at]).T
+    def _across(self, place: int, at: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Return the products (n, K) of what is asked for, at some places, with the twin's terms in a part that tells.
+
+        `place`: which of those.
+        """
+        if self._kept is not None:
+            return np.asarray(self._kept[place][at])
+        return self._moments[place].among(np.arange(self.system.base), self._asked[at]).T
+
+    def _along(self, change: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Return (T, n) the products of columns, at some places, with what (K,) makes of the twin's terms."""
+        if self._kept is not None and 2 * len(at) > len(self._asked):  # fewer are picked one by one
+            tell, asked, terms = self._kept.shape
+            return np.asarray((self._kept.reshape(tell * asked, terms) @ change).reshape(tell, asked)[:, at])
+        each = [self._across(place, at) @ change for place in range(len(self._telling))]
+        return np.array(each).reshape(len(each), len(at))
 
     def visible(self, variants: Sequence[Variant]) -> np.ndarray:
         """Return (V, 2) what variants add, with coefficients as large as expected, beyond what the twin imitates.
@@ -101,12 +128,18 @@ class Projection:
         if not new:
             return
         at = self.at(new)
-        own = np.array([moments.among(np.array(new), self._asked) for moments in self._moments])
-        whole = own.sum(axis=0) - self._imitated[at] @ self._all.T
-        for part, (products, inner) in enumerate(zip(own, self._inner, strict=True)):
-            across = self._across(part)
-            left = across[at] - self._imitated[at] @ inner
-            products -= self._imitated[at] @ across.T + left @ self._imitated.T
+        mine = self._imitated[at]
+        left, told = -(mine @ self._inner), np.zeros((len(new), len(self._asked)))  # (R, n, K)
+        for place, part in enumerate(self._telling):
+            left[part] += self._across(place, at)
+        own = left @ -self._imitated.T
+        own[..., -1] -= self._measured @ mine.T
+        for place, part in enumerate(self._telling):
+            products = self._moments[place].among(np.array(new), self._asked)
+            told += products
+            products[:, :-1] -= mine @ self._across(place, slice(-1)).T
+            own[part] += products
+        whole = told - mine @ self._all.T
         self._rows |= {k: (whole[place], np.ascontiguousarray(own[:, place].T)) for place, k in enumerate(new)}
 
     def beside(self, chosen: Sequence[int]) -> Beside:
@@ -115,7 +148,7 @@ class Projection:
         at, rows = self.at(chosen), [self._rows[k] for k in chosen]
         whole = np.array([of_all for of_all, _ in rows]).reshape(-1, len(self._asked))
         parts = tuple(each for _, each in rows)
-        measured = np.array([each[-1] for each in parts]).reshape(-1, len(self._moments)).T
+        measured = np.array([each[-1] for each in parts]).reshape(-1, len(self._inner)).T
         factor = factored(whole[:, at]) if len(at) else None
         imitated = whole if factor is None else solved(factor, whole)  # (c, A)
         shaken = self._shaken(at, imitated[:, -1])
@@ -136,22 +169,24 @@ class Projection:
         coefficients[: self.system.base] = imitated @ self._imitated[at] - self._imitated[-1]
         coefficients[-1] = 1.0
         less = self.system.shaken_products(coefficients, self._noise)
-        return None if less is None else Shaken(less, solved(self._factor, less[:, : self.system.base].sum(axis=0)))
+        if less is None:
+            return None
+        return Shaken(less[self.parts], solved(self._factor, less[:, : self.system.base].sum(axis=0)))
 
     def less_noise(self, at: np.ndarray, shaken: Shaken) -> tuple[np.ndarray, np.ndarray]:
         """Return what the products of columns at places `at` (n,) with the measurement gain without noise of positions.
 
-        Over all parts (n,) and in each (P, n).
+        Over all parts (n,) and in each that has rows (R, n).
         """
         less, change = shaken
         of_base, of_own = less[:, : self.system.base] - self._inner @ change, less[:, self._asked[at]]
-        across = [self._across(part, at) @ change for part in range(len(self._inner))]
-        parts = np.array(across) - of_own + of_base @ self._imitated[at].T
+        parts = of_base @ self._imitated[at].T - of_own
+        parts[self._telling] += self._along(change, at)
         return self._all[at] @ change - of_own.sum(axis=0), parts
 
 
 class Shaken(NamedTuple):
-    """What noise of positions seems to explain: its products `less` (P, D + 1) with all columns.
+    """What noise of positions seems to explain: its products `less` (R, D + 1) with all columns.
 
     `change` (K,): by how much less the twin's terms imitate of the measurement without it.
     """
@@ -165,7 +200,7 @@ class Beside:
     """What the twin's terms and c columns, at places `at`, leave.
 
     whole, imitated (c, A): products of these columns with all, and how they imitate all; `parts`: of each column, its
-    products in each part (A, P); measured (P, c): those with the measurement.
+    products in each part that has rows (A, R); measured (R, c): those with the measurement.
     """
 
     projection: Projection
@@ -180,37 +215,55 @@ class Beside:
         """Yield of the variants of one number of columns, k, which they are (V,), the places of these columns (V, k).
 
         And the products among these and with the measurement: over all parts beside these columns (V, k, k + 1), and in
-        each part beside the twin's terms alone (P, V, k, k + 1).
+        each part that has rows beside the twin's terms alone (R, V, k, k + 1).
         """
-        for known, of_all, of_parts in self.projection.products:
-            some = [(place, known[one.columns]) for place, one in enumerate(variants) if one.columns in known]
-            if not some:
-                continue
-            which, own = np.array(some).T
-            columns = self.projection.at([variants[place].columns for place in which])
+        places: dict[int, list[int]] = {}
+        for place, one in enumerate(variants):
+            places.setdefault(len(one.columns), []).append(place)
+        if not places:
+            return
+        each = [[variants[place].columns for place in which] for which in places.values()]
+        at = [self.projection.at(columns) for columns in each]
+        less = self._less_noise(at)
+        for which, columns, own_at, gained in zip(places.values(), each, at, less, strict=True):
+            known, of_all, of_parts = self.projection.products[len(columns[0])]
+            own = [known[some] for some in columns]
             whole, parts = of_all[own], of_parts[:, own]
-            if self.shaken is not None:
-                less, less_in_parts = self.projection.less_noise(columns.ravel(), self.shaken)
-                whole[..., -1] += less.reshape(columns.shape)
-                parts[..., -1] += less_in_parts.reshape(-1, *columns.shape)
-            beside = np.column_stack([columns, np.full(len(columns), -1)])
-            whole -= np.einsum("cvi,cvj->vij", self.imitated[:, columns], self.whole[:, beside])
-            yield which, columns, whole, parts
+            whole[..., -1] += gained[0]
+            parts[..., -1] += gained[1:]
+            beside = np.column_stack([own_at, np.full(len(own_at), -1)])
+            whole -= np.einsum("cvi,cvj->vij", self.imitated[:, own_at], self.whole[:, beside])
+            yield np.array(which), own_at, whole, parts
+
+    def _less_noise(self, at: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return what the products of columns (V, k) each with the measurement gain without noise of positions.
+
+        Over all parts, then in each that has rows, (1 + R, V, k).
+        """
+        if self.shaken is None:
+            return [np.zeros((2, *one.shape)) for one in at]
+        gained = np.vstack(self.projection.less_noise(np.concatenate([one.ravel() for one in at]), self.shaken))
+        ends = np.cumsum([one.size for one in at])[:-1]
+        return [own.reshape(-1, *one.shape) for own, one in zip(np.split(gained, ends, axis=1), at, strict=True)]
 
     def in_parts(self, columns: np.ndarray, products: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the squares (P, V) of columns (V, k) times values (V, k), and their products with the measurement.
 
-        In each part beside these columns, of the `products` (P, V, k, k + 1) that `batches` gives.
+        In each part beside these columns, of the `products` (R, V, k, k + 1) that `batches` gives.
         """
-        weights = np.einsum("cvi,vi->cv", self.imitated[:, columns], values)
-        squares = np.einsum("pvij,vi,vj->pv", products[..., :-1], values, values)
-        measured = np.einsum("pvi,vi->pv", products[..., -1], values) - self.measured @ weights
-        for own, weight, imitated in zip(self.parts, weights, self.imitated[:, -1], strict=True):
-            across = np.einsum("vip,vi->pv", own.take(columns, axis=0), values)
-            inner = own.take(self.at, axis=0).T @ weights
-            squares -= weight * (2 * across - inner)
-            measured -= imitated * (across - inner)
-        return squares, measured
+        weights = np.einsum("cvi,vi->vc", self.imitated[:, columns], values)
+        squares = np.einsum("pvij,vi,vj->vp", products[..., :-1], values, values)
+        measured = np.einsum("pvi,vi->vp", products[..., -1], values) - weights @ self.measured.T
+        for own, weight, imitated in zip(self.parts, weights.T, self.imitated[:, -1], strict=True):
+            across = np.einsum("vip,vi->vp", own.take(columns, axis=0), values)
+            left = across - weights @ own.take(self.at, axis=0)
+            measured -= imitated * left
+            left += across
+            left *= weight[:, None]
+            squares -= left
+        among_all = np.zeros((2, len(self.projection.parts), len(columns)))
+        among_all[:, self.projection.parts] = squares.T, measured.T
+        return among_all[0], among_all[1]
 
 
 def _pairs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
