@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyoxigraph import Quad
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.no_network import leave_network
@@ -29,7 +30,6 @@ from irtwin.storage.database import Workspace
 if TYPE_CHECKING:  # they take seconds to import, which an update of a graph without a database can spare
     from irtwin.knowledge.asserted.edited import Edit
     from irtwin.knowledge.asserted.statements import Assertion
-    from irtwin.modelling import Announce
 
 _BUSY = "another process is writing the graph: try again later"
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from irtwin import plans, resources, rewriting, workflow
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
-from irtwin.modelling import Announce
 from irtwin.planning.plan import Plan, Task
 from irtwin.planning.poses import read_target
 from irtwin.providers.mesh_files import meshes_of_graph

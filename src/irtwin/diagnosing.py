@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.gap import diagnosis as gap
 from irtwin.gap.diagnosis import Diagnosis
 from irtwin.identification.progress import telling
 from irtwin.location import Location
-from irtwin.modelling import Announce, clocked, read_sound
+from irtwin.modelling import clocked, read_sound
 from irtwin.proposed_motion import save_motion
 from irtwin.resources import resources_of
 from irtwin.signals.log import DataSet

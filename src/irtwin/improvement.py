@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from irtwin.announce import Announce
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
-from irtwin.modelling import Announce, sound
+from irtwin.modelling import sound
 from irtwin.next_experiment import NextExperiment, next_experiment
 from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pyarrow as pa
 import pyarrow.parquet
 
+from irtwin.announce import Announce
 from irtwin.check.check import Checked, check, checked
 from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
@@ -40,8 +41,6 @@ from irtwin.twin.identify import identify as fit
 from irtwin.twin.price import Price, price
 from irtwin.twin.torque_scale import torque_scale
 from irtwin.twin.twin import Twin
-
-Announce = Callable[[str], None]
 
 
 def identify(data_set: Path | str | DataSet, effects: Sequence[str | Effect] | None = None) -> Twin:

@@ -10,9 +10,10 @@ from typing import TypeVar
 from sqlalchemy import select
 
 from irtwin import modelling
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.location import WORKSPACE, Location
-from irtwin.modelling import Announce, Expectation
+from irtwin.modelling import Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.placement import Placement, better_placement
 from irtwin.planning.plan import Plan, Task

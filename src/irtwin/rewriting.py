@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.identification.progress import telling
 from irtwin.knowledge.asserted.statements import map_facts
@@ -24,9 +24,6 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.engine import before_writing
 from irtwin.storage.tariff import read_tariff
 from irtwin.storage.turns import rewriting_alone
-
-if TYPE_CHECKING:
-    from irtwin.modelling import Announce
 
 LONGEST_SQL = 600.0  # s for the SQL of a mapping, where some do not ship
 

@@ -12,11 +12,11 @@ from sqlalchemy import select
 
 from irtwin.alarms.settings import NAME
 from irtwin.alarms.settings import asks as alarm_asks
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY
 from irtwin.location import Location
-from irtwin.modelling import Announce
 from irtwin.next_experiment import proposal_files
 from irtwin.providers.names import find_robot, find_run, run_iri
 from irtwin.resources import resources_of

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from irtwin import resources
+from irtwin.announce import Announce
 from irtwin.asking import open_graph, reading
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import Diagnosis
@@ -16,7 +17,7 @@ from irtwin.knowledge.explain.explain import Explainer
 from irtwin.knowledge.store.backup import backup as keep
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import WORKSPACE, Location
-from irtwin.modelling import Announce, clocked, read_sound
+from irtwin.modelling import clocked, read_sound
 from irtwin.next_experiment import next_experiment
 from irtwin.proposed_motion import motion_text
 from irtwin.providers.effects_of_ontology import check_effects

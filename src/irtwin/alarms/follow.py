@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from irtwin.alarms.alarm import ACTIVE, Alarm, Event, message
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.json_text import parse_json
@@ -17,7 +18,6 @@ from irtwin.storage import files
 
 EVERY = 1.0  # s between two looks
 Look = Callable[[], Sequence[Alarm]]
-Announce = Callable[[str], None]
 _FOLDER, _TOLD = "alarms", "told.json"  # in the workspace
 _MOST_BYTES = 100_000_000
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+
+from irtwin.announce import Announce
 
 MOST_WAITING = 1000  # messages that are kept for a broker that is down
 _AGAIN = 15  # s between two tries to connect, at most
@@ -37,7 +38,7 @@ class Broker:
 class BrokerConnection:
     """A connection to a broker; nobody waits for it. A fault is announced once, and again after it was over."""
 
-    def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
+    def __init__(self, broker: Broker, announce: Announce) -> None:
         self.broker, self._announce = broker, announce
         self._fault = ""
         self._client = paho.Client(CallbackAPIVersion.VERSION2)
@@ -87,7 +88,7 @@ class BrokerConnection:
 class AlarmTopic(BrokerConnection):
     """Publishes messages on a broker's topic; what waits while the broker is down is kept, and told when it is back."""
 
-    def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
+    def __init__(self, broker: Broker, announce: Announce) -> None:
         super().__init__(broker, announce)
         self._client.max_queued_messages_set(MOST_WAITING)
         self._client.on_publish = self._acknowledged

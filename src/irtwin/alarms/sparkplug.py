@@ -10,11 +10,12 @@ import re
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from itertools import count
 from typing import Any
 
 from irtwin.alarms.mqtt import Broker, BrokerConnection
+from irtwin.announce import Announce
 
 METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
@@ -29,7 +30,7 @@ Row = Mapping[str, Any]
 class EdgeNode(BrokerConnection):
     """Tells a broker of robots. Who sends its commands is answered by new births: nothing else can be commanded."""
 
-    def __init__(self, broker: Broker, announce: Callable[[str], None]) -> None:
+    def __init__(self, broker: Broker, announce: Announce) -> None:
         """Connect in the background, again and again; `broker.topic` is GROUP/NODE."""
         super().__init__(broker, announce)
         self._group, _, self._node = broker.topic.partition("/")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from irtwin.alarms.alarm import Alarm, active, alarms, sparql_of_rules
 from irtwin.alarms.follow import follow, told_in
 from irtwin.alarms.settings import NAME, asks, read_settings
+from irtwin.announce import Announce
 from irtwin.asking import checked, open_graph
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.table import AnswerTable
@@ -35,7 +36,7 @@ def tell(
     *,
     robot: str | None = None,
     config: Path | None = None,
-    announce: Callable[[str], None] = lambda line: None,
+    announce: Announce = lambda line: None,
 ) -> None:
     """Tell each alarm when it begins and when it is over, on standard output and to whom `config` names.
 
@@ -63,7 +64,7 @@ def tell(
 
 
 def _connected(
-    of_alarms: Sequence[Broker], of_robots: Sequence[Broker], announce: Callable[[str], None]
+    of_alarms: Sequence[Broker], of_robots: Sequence[Broker], announce: Announce
 ) -> tuple[list[AlarmTopic], list[EdgeNode]]:
     if not (of_alarms or of_robots):
         return [], []
@@ -73,7 +74,7 @@ def _connected(
     return [AlarmTopic(one, announce) for one in of_alarms], [EdgeNode(one, announce) for one in of_robots]
 
 
-def _of_workspace(workspace: Path, announce: Callable[[str], None]) -> tuple[list[Broker], list[Broker]]:
+def _of_workspace(workspace: Path, announce: Announce) -> tuple[list[Broker], list[Broker]]:
     """Return whom the workspace's own file may tell; say whom it would tell, too."""
     file = inside(workspace, NAME)
     if not file.exists():

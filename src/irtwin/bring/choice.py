@@ -20,8 +20,8 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 
 _TIMES = ("__time", "time", "timestamp")  # the first of these that is there
-_OF_POWER = ("power", "meter_voltage", "meter_current")
-_WORK = (*_OF_POWER, "torque", "current", "command")  # without one of these a motion says nothing of its robot
+OF_POWER = ("power", "meter_voltage", "meter_current")
+_WORK = (*OF_POWER, "torque", "current", "command")  # without one of these a motion says nothing of its robot
 _ARRAY = (frozenset(("joint", "states")), frozenset(("jointstates",)), frozenset(("field",)))  # of ROS' joint states
 
 
@@ -37,7 +37,7 @@ def meanings(recording: Recording, robot: Robot, told: UserSaid) -> list[Meaning
         choose = _per_joint if channel.per_joint else _of_robot
         chosen |= {each.column: each for each in choose(recording, field, candidates, robot)}
     _check(recording, robot, chosen, {each.joint for each in first.values() if each.field == "q"})
-    if not robot.joints and not any(each.field in _OF_POWER for each in chosen.values()):
+    if not robot.joints and not any(each.field in OF_POWER for each in chosen.values()):
         raise InputError(
             f"{recording.path}: no column was taken for power or energy; say which it is: --map COLUMN=power:kW, or "
             f"give --robot if joints were logged (there are {', '.join(recording.names)[:400]})"

@@ -25,7 +25,7 @@ class WayOut:
 class DoubtError(InputError):
     """A question to the user. Where nobody can be asked it ends the command, and its message says what to give."""
 
-    def __init__(self, question: str, answers: Sequence[WayOut], hint: str = "") -> None:
+    def __init__(self, question: str, answers: Sequence[WayOut]) -> None:
         self.question, self.answers = question, tuple(answers)
-        ways = " or ".join(answer.text for answer in answers) or hint
+        ways = " or ".join(answer.text for answer in answers)
         super().__init__(f"{question}; give {ways}")

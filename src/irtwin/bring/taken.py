@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.bring import evidence
 from irtwin.bring.aligned import Aligned
+from irtwin.bring.choice import OF_POWER
 from irtwin.bring.column_name import Meaning
 from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.evidence import MeasuredRun, UnitEvidence
@@ -27,7 +28,6 @@ _SUPPLY = (0.1, 200.0)  # A of a supply
 _WARM = (-30.0, 130.0)  # degC
 _MAINS = frozenset(["mains", "grid", "netz", "ac", "wall"])
 _BUS = frozenset(["bus", "dc", "dclink", "zwischenkreis"])
-_OF_POWER = ("power", "meter_voltage", "meter_current")
 Look = Callable[[list[np.ndarray], list[int], str], UnitEvidence]  # at values as logged, of joints, in an SI unit
 Units = dict[str, tuple[Unit, str]]  # by column: its unit, and how that was told
 
@@ -222,7 +222,7 @@ class _Taking:
         return [time for time, _ in clocks], [started for _, started in clocks]
 
     def _power_at(self) -> tuple[str | None, str]:
-        columns = [each for field in _OF_POWER for each in self._of(field)]
+        columns = [each for field in OF_POWER for each in self._of(field)]
         if not ({"power"} <= {each.field for each in columns} or len(columns) == 2):
             return None, ""
         if self.told.power_at is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 from typing import Annotated, Any
 
 from irtwin.document import form
@@ -490,16 +491,9 @@ def cause_ids(causes: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str]
     """
     ids: list[str] = []
     for effect, on in causes:
-        name = effect + (f"@{_named(on, joints)}" if on else "")
-        one, count = name, 1
-        while one in ids:
-            count += 1
-            one = f"{name}#{count}"
-        ids.append(one)
+        everywhere = len(joints) > 1 and set(on) == set(joints)
+        place = "all" if everywhere else "+".join(sorted(on, key=joints.index))
+        name = f"{effect}@{place}" if on else effect
+        numbered = (f"{name}#{number}" for number in count(2))
+        ids.append(next(one for one in chain([name], numbered) if one not in ids))
     return ids
-
-
-def _named(on: Sequence[str], joints: Sequence[str]) -> str:
-    if len(joints) > 1 and set(on) == set(joints):
-        return "all"
-    return "+".join(sorted(on, key=joints.index))

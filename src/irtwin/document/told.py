@@ -75,11 +75,11 @@ def told(
     return field(default=default, metadata={_TOLD: said} | (goes_with(with_field) if with_field else {}))
 
 
-def tells(*terms: str, column: str = "", key: bool = False) -> Callable[[Getter], Getter]:
+def tells(*terms: str, key: bool = False) -> Callable[[Getter], Getter]:
     """Keep what a property of a part returns, as `told` does for a field."""
 
     def kept(getter: Getter) -> Getter:
-        setattr(getter, _TOLD, Told(terms, tuple(column.split()), key=key))
+        setattr(getter, _TOLD, Told(terms, (), key=key))
         return getter
 
     return kept

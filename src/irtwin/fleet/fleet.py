@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.fleet.batch import DONE, FAILED, REFUSED, STOPPED, Batch, Record
 from irtwin.fleet.data_sets import find_data_sets
@@ -41,7 +42,7 @@ def work(
     batch: int,
     workers: int,
     base: str | None = None,
-    announce: Callable[[str], None] = lambda line: None,
+    announce: Announce = lambda line: None,
 ) -> FleetStatus:
     """Take every data set of a source through `run` or `diagnose`, results below `folder`.
 

@@ -61,15 +61,7 @@ class State:
         return self.values[_PLACES[field]]
 
 
-def state_of(
-    robot_id: str,
-    joints: int,
-    time: float,
-    values: Mapping[str, tuple[float, ...]],
-    payload: float | None = None,
-    *,
-    where: str,
-) -> State:
+def state_of(robot_id: str, joints: int, time: float, values: Mapping[str, tuple[float, ...]], *, where: str) -> State:
     """Return the state of a controller at `where`: values by channel's field, NaN for channels that it lacks.
 
     Raises InputError where a value, or the time, s since 1970, is none of a robot.
@@ -80,7 +72,7 @@ def state_of(
             raise InputError(f"{where}: {STREAMED[field].label} is not a number within {greatest:g}")
     absent = {field: (math.nan,) * (joints if channel.per_joint else 1) for field, channel in STREAMED.items()}
     said = tuple((absent | dict(values)).values())
-    return State(robot_id, checked_time(time, f"{where}: timestamp"), said, payload)
+    return State(robot_id, checked_time(time, f"{where}: timestamp"), said)
 
 
 class StateReader:

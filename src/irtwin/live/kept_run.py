@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.live import live_run
 from irtwin.providers import live_energy
@@ -17,8 +17,6 @@ from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import DamagedJournal, Header, left_behind, read_journal
 from irtwin.storage.rows import Tables, Values, values
 from irtwin.storage.schema import Activity, Base, Run, RunEnergy, relation_to
-
-Announce = Callable[[str], None]
 
 
 def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, announce: Announce) -> Tables:

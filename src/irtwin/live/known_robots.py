@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections import defaultdict
-from collections.abc import Callable
 from datetime import UTC
 from itertools import accumulate
 
 from sqlalchemy import select
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.live.joint_stream import State
 from irtwin.providers.live_energy import KnownTwin, known_twin
@@ -59,7 +59,7 @@ class KnownRobots:
     Twins and plans are read when they are asked for first.
     """
 
-    def __init__(self, place: Workspace, announce: Callable[[str], None]) -> None:
+    def __init__(self, place: Workspace, announce: Announce) -> None:
         """Read what is known now; `announce` is told of a twin that cannot be read."""
         self._place, self._announce = place, announce
         self.joints: dict[str, list[str]] = {}

@@ -18,6 +18,7 @@ from typing import Self
 import numpy as np
 from pyoxigraph import Quad
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live import live_run
@@ -55,7 +56,7 @@ class LiveTwin:
         self,
         place: Workspace,
         graph: KnowledgeGraph,
-        announce: Callable[[str], None] = lambda line: None,
+        announce: Announce = lambda line: None,
         broadcast: Broadcast | None = None,
         kind: str = LIVE_RUN,
     ) -> None:

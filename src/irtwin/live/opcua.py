@@ -22,13 +22,14 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.live.joint_stream import STREAMED, State, state_of
 from irtwin.robot.description import Robot
@@ -120,7 +121,7 @@ class OpcUa:
                 f"{address}: cannot be read by OPC UA ({_reason(error)}); check address, user and certificates"
             ) from error
 
-    def states(self, done: threading.Event, announce: Callable[[str], None]) -> Iterator[State | InputError]:
+    def states(self, done: threading.Event, announce: Announce) -> Iterator[State | InputError]:
         """Yield each state until `done`, and the error of one that is none.
 
         A connection that is lost is made again, and announced.

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.broadcast import Broadcast
@@ -27,7 +28,6 @@ from irtwin.storage.turns import rewriting_alone
 
 SWITCH = 0.0005  # s that a thread may keep others from running: the graph's waits after each transaction
 _MOST_REASONS = 100  # of refused lines that are told: some for each robot of a cell; further ones are counted alone
-Announce = Callable[[str], None]
 
 
 class RefusedLines:

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy import func, select
 
+from irtwin.announce import Announce
 from irtwin.effects.effect import Effect
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
@@ -32,8 +33,6 @@ from irtwin.twin.validate import validate
 WITHIN, BETTER, NO_BETTER = "within the limit", "better", "no better"
 _SAME, _CHOSEN, _DIAGNOSED = "same effects", "effects that the data show", "effects of a diagnosis"
 _ROUNDS = "improvement_round/"
-
-Announce = Callable[[str], None]
 
 
 @dataclass(frozen=True)

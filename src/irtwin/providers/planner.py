@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import UTC, datetime
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.identification.progress import track
 from irtwin.knowledge.rules.files import all_rules
@@ -38,7 +39,7 @@ def populate(
     workspace: Workspace,
     graph: KnowledgeGraph,
     refresh: Callable[[], None],
-    announce: Callable[[str], None],
+    announce: Announce,
     set_aside: SetAside | None = None,
 ) -> bool:
     """Run every provider on every individual that is ready for it, and on those that get so by that, once on each.

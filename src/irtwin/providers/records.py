@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 from sqlalchemy import select
 
+from irtwin.announce import Announce
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.json_text import parse_json
 from irtwin.planning.admission import check_motion
@@ -64,7 +65,7 @@ _HAVE_TERMS = {*log.ROBOT_KEYS} - {"torque_scale_uncertainty"}  # keys of [robot
 def ingest(
     workspace: Workspace,
     data_set: log.DataSet,
-    announce: Callable[[str], None] = lambda line: None,
+    announce: Announce = lambda line: None,
     facts: Sequence[AssertedFact] = (),
 ) -> Outcome:
     """Take a data set into the workspace, all of it or nothing; say whether it was new.

@@ -23,6 +23,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from irtwin.announce import Announce
 from irtwin.asking import checked, reading
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
@@ -60,7 +61,7 @@ def serve(
     *,
     token: str | None,
     limits: Limits,
-    announce: Callable[[str], None],
+    announce: Announce,
     origins: Sequence[str] = (),
     opcua: int | None = None,
 ) -> None:
