@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
@@ -195,7 +195,7 @@ def _earlier(motion: Motion, lag: float) -> Motion:
     if motion.torque is None:
         return motion
     later = np.clip(motion.time + lag, motion.time[0], motion.time[-1])
-    return replace(motion, torque=CubicSpline(motion.time, motion.torque)(later))
+    return replace(motion, torque=scipy.interpolate.CubicSpline(motion.time, motion.torque)(later))
 
 
 def _stated(data_set: DataSet) -> Stated:
