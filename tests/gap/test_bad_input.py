@@ -65,7 +65,7 @@ REFUSED = {
     ),
     "reference of another robot": (
         lambda: [*runs("reference", robot=HEAVY), *runs(seeds=range(5, 9), robot=SIX)],
-        "reference_0.parquet: the torque of the reference runs is nothing like that of the observed runs (on joint_1",
+        "reference_0.parquet: the torque of the reference runs is nothing like that of the observed runs (on joint_2",
     ),
     "reference of the other sign": (
         lambda: [*runs("reference", torque=np.negative), *runs(seeds=range(5, 9))],

@@ -44,7 +44,7 @@ class Data:
         "decisions/simulator.md",
     )
     foreign: Mapping[str, float] = field(
-        default_factory=lambda: {"reference": 0.06, "simulated": 0.3},
+        default_factory=lambda: {"reference": 0.03, "simulated": 0.15},
         metadata={
             "meaning": "bodies fitted to the other runs leave more in joints of another robot, by the runs' role",
             "unit": "share of the joint's mean square",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -24,19 +24,18 @@ _AS_MUCH = 2.0  # times: friction that only has another sign
 def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: Data) -> None:
     """Raise InputError where the torque of the other runs (reference, simulated) is nothing like the observed.
 
-    `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or its bodies explain it no
-    better than those of the reference runs; another robot's bodies are wrong in several, or friction drives half of its
-    joints. Where the same friction drives, the torque has the other sign.
+    `system` holds the twin's terms alone. What changes a healthy robot shows in one joint, or bodies that both sides
+    have in common explain it; of another robot they are wrong in several, or friction drives half of its joints. Where
+    the same friction drives, the torque has the other sign.
     """
     if not system.both:
         return
     others = [run for run in runs if run.role != "observed"]
     moments = system.moments(system.noise_before)
     seen = system.group_observed
-    other = system.solution((), Summed([m for m, own in zip(moments, seen, strict=True) if not own]))
-    total = Summed([m for m, own in zip(moments, seen, strict=True) if own])
-    own = system.solution((), total)
-    foreign = _foreign_share(system, total, own, other) > limits.foreign[others[0].role]
+    sides = [Summed([m for m, own in zip(moments, seen, strict=True) if own == side]) for side in (True, False)]
+    own, other = (system.solution((), side) for side in sides)
+    foreign = _foreign_share(system, sides, (own, other)) > limits.foreign[others[0].role]
     opposed, reversed_here = _opposed(stack.robot, system, own, other)
     for role, some in {"observed": reversed_here < 0, others[0].role: reversed_here > 0}.items():
         if some.any():
@@ -54,21 +53,40 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
         )
 
 
-def _foreign_share(system: System, total: Moments, own: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return how much of each observed joint's mean square (n,) the bodies of the other runs leave.
+def _foreign_share(system: System, sides: Sequence[Moments], alone: Sequence[np.ndarray]) -> np.ndarray:
+    """Return how much of each joint's mean square (n,) bodies that both sides have in common leave of either.
 
-    Friction, offsets and rotors are refitted, and a load may have come or gone; what the observed runs' own bodies
-    leave too is not counted. `own`, `other`: coefficients (D,) of either kind of run.
+    `sides`: the observed runs and the others; `alone`: coefficients (D,) of each. Friction, offsets and rotors are
+    fitted to each, and a load may have come or gone; what a side's own bodies leave too is not counted. Where one side
+    hardly shows a body, the other's may be it.
     """
-    borrowed = _refitted(system, total, other)
-    nothing = np.zeros(len(other))
+    nothing = np.zeros(len(alone[0]))
     nothing[: system.base] = -system.expected / system.scale[: system.base]
+    share = np.zeros(len(system.pattern))
+    for common, own, seen in zip(_with_common_bodies(system, sides), alone, (True, False), strict=True):
+        groups = np.flatnonzero(system.group_observed == seen)
+        left, least, most = (sum(system.squares(one, int(k)) for k in groups) for one in (common, own, nothing))
+        share += (left - least) / np.maximum(most, np.finfo(float).tiny)
+    return share
 
-    def squares(vector: np.ndarray) -> np.ndarray:
-        groups = np.flatnonzero(system.group_observed)
-        return np.asarray(np.sum([system.squares(vector, int(group)) for group in groups], axis=0))
 
-    return np.asarray((squares(borrowed) - squares(own)) / np.maximum(squares(nothing), np.finfo(float).tiny))
+def _with_common_bodies(system: System, sides: Sequence[Moments]) -> Iterator[np.ndarray]:
+    """Yield each side's coefficients (D,) of the best fit with common bodies, but for the last, which a load joins."""
+    common = np.flatnonzero([effect.bodies for effect, _ in system.terms])[:-_OF_BODY]
+    free = np.setdiff1d(np.arange(system.base), common)
+    inside, count = np.concatenate([common, free]), len(common) + len(sides) * len(free)
+    products, right, places = np.zeros((count, count)), np.zeros(count), []
+    for k, side in enumerate(sides):
+        first = len(common) + k * len(free)
+        places.append(np.concatenate([np.arange(len(common)), np.arange(first, first + len(free))]))
+        own = side.of(inside)
+        products[np.ix_(places[-1], places[-1])] += own[:, inside] + system.prior()[np.ix_(inside, inside)]
+        right[places[-1]] += own[:, -1]
+    values = solved(factored(products, np.zeros_like(products)), right)
+    for own in places:
+        vector = np.zeros(system.size)
+        vector[inside] = values[own]
+        yield vector
 
 
 def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,14 +107,3 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
         same = opposed[-1] and bool(np.all(np.abs(np.log(-seen / elsewhere)) < np.log(_AS_MUCH)))
         alike.append(np.sign(seen.sum()) if same else 0.0)
     return np.array(opposed), np.array(alike)
-
-
-def _refitted(system: System, total: Moments, start: np.ndarray) -> np.ndarray:
-    """Return coefficients (D,) that fit best near `start`, where all bodies stay but the last, which a load joins."""
-    bodies = np.flatnonzero([effect.bodies for effect, _ in system.terms])
-    free = np.setdiff1d(np.arange(system.base), bodies[:-_OF_BODY])
-    products = total.of(free)
-    right = products[:, -1] - products[:, : len(start)] @ start
-    coefficients = start.copy()
-    coefficients[free] += solved(factored(products[:, free], system.prior()[np.ix_(free, free)]), right)
-    return coefficients

@@ -1,0 +1,59 @@
+"""Reference runs of the robot are told from those of another, whatever either side shows of its bodies."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, as_run, measure, swing
+
+from irtwin.effects.catalogue import BASELINE
+from irtwin.errors import InputError
+from irtwin.gap.data.case import case_of
+from irtwin.gap.search import Search
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.robot.description import Robot
+from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.log import DataSet, Run
+from irtwin.signals.motion import Motion
+
+DRAWN = arm(6)
+
+
+def heavier(times: float) -> Robot:
+    return parse_urdf(
+        re.sub(r'mass value="(.*?)"', lambda found: f'mass value="{times * float(found[1])}"', DRAWN.urdf)
+    )
+
+
+BUILT = heavier(1.5)
+
+
+def run(role: str, motion: Motion, robot: Robot = BUILT) -> Run:
+    seen = replace(measure(robot, motion, noise=0.3, seed=len(motion.run)), power=None, current=None)
+    return replace(as_run(replace(seen, run=f"{role}_{motion.run}")), role=role)
+
+
+def checked(references: list[Run]) -> None:
+    observed = [run("observed", swing(DRAWN, seed)) for seed in (11, 12)]
+    data = DataSet(Path("arm"), DRAWN, (*references, *observed), BASELINE, None, None, False, {})
+    assert Search(case_of(data, (), DEFAULT)).twin
+
+
+def one_moving(seed: int, joint: int) -> Motion:
+    motion = swing(DRAWN, seed)
+    share = np.where(np.arange(6) == joint, 1.0, 0.01)
+    return replace(motion, q=share * motion.q, dq=share * motion.dq, ddq=share * motion.ddq)
+
+
+@pytest.mark.parametrize("joint", range(0, 6, 2))
+def test_references_that_move_one_joint_are_of_the_robot(joint: int) -> None:
+    checked([run("reference", one_moving(seed, joint)) for seed in (1, 2)])
+
+
+def test_references_of_other_bodies_are_refused() -> None:
+    with pytest.raises(InputError, match="is nothing like that of the observed runs"):
+        checked([run("reference", swing(DRAWN, seed), heavier(6.0)) for seed in (1, 2)])
