@@ -115,6 +115,14 @@ def test_two_effects_of_a_joint_are_found_though_another_explains_most_by_itself
     assert {cause.effect for cause in found.causes} == {"coulomb", "viscous"}
 
 
+def test_of_two_shapes_that_one_is_taken_which_leaves_less():
+    mix = [[0.98, 0.2], [1.0, 0.0]]
+    system, (near, true) = system_of(mix, [2.0, 0.0])
+    one = Hypothesis("effect", None, MISSING, (*near.variants, *true.variants))
+    (cause,) = causes(system, [one])
+    assert cause.variants == true.variants
+
+
 def test_a_crumb_within_the_misfit_that_no_effect_names_is_no_cause():
     assert found(np.eye(2), [0.3, 0.01]) == ["effect_0"]  # seven standard errors, a tenth of the noise
 

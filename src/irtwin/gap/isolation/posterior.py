@@ -109,8 +109,8 @@ class Posterior:
 
     @cached_property
     def shape(self) -> np.ndarray:
-        """(H,) the index of each hypothesis' variant that explains most, its freedom counted."""
-        return np.array([own[np.argmax(self._by_shape[own])] for own in self._shapes], dtype=int)
+        """(H,) the index of each hypothesis' likeliest variant."""
+        return np.array([own[np.argmax(self._beside_best(own)[0])] for own in self._shapes], dtype=int)
 
     @cached_property
     def _by_shape(self) -> np.ndarray:
@@ -155,20 +155,24 @@ class Posterior:
         return near[int(np.argmax(self.weights(near)[0]))]
 
     def weights(self, near: Sequence[int]) -> tuple[np.ndarray, float]:
-        """Return the log weights of hypotheses that compete for one place, and of none of them.
+        """Return the log weights of hypotheses that compete for one place, and of none of them."""
+        return self._beside_best(self.shape[list(near)])
+
+    def _beside_best(self, places: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return the log weights of variants of which one is there, and of none of them.
 
         Each by what it leaves of what the best explains: the best tells how well that can be explained.
         """
-        shape, seen = self.shape[list(near)], self.evidence
-        best = int(shape[np.argmax(seen.explained[shape])])
+        seen = self.evidence
+        best = int(places[np.argmax(seen.explained[places])])
         variance, rows, count = float(self.variance[best]), seen.rows_that_speak[best], len(seen.information[best])
 
         def left(squares: np.ndarray) -> np.ndarray:
             return -np.asarray(self._explaining(squares / rows, variance, count))
 
-        size = self._sizes(shape, np.full(len(shape), variance))
-        behind = seen.explained[best] - seen.explained[shape]
-        return self.prior[shape] - size + left(behind), float(left(seen.explained[best]))
+        size = self._sizes(places, np.full(len(places), variance))
+        behind = seen.explained[best] - seen.explained[places]
+        return self.prior[places] - size + left(behind), float(left(seen.explained[best]))
 
     def _explaining(
         self, gain: np.ndarray | float, variance: np.ndarray | float, count: np.ndarray | int
