@@ -65,6 +65,18 @@ def test_sharp_friction_stays_sharp() -> None:
     np.testing.assert_allclose([joint.dry_friction for joint in robot.joints], truth(ROBOT)["Fc"], rtol=0.05)
 
 
+@pytest.mark.parametrize(
+    "law", [lambda dq: np.sign(dq) * np.abs(dq) ** 0.6, lambda dq: np.sign(dq) * np.exp(-((dq / 0.1) ** 2))]
+)
+def test_sharp_friction_that_bends_as_the_joint_speeds_up_stays_sharp(law: Law) -> None:
+    motions = [measured(None, 1.0, seed) for seed in (1, 2)]
+    bent = [
+        replace(motion, torque=motion.torque + 4.0 * law(motion.dq)) for motion in motions if motion.torque is not None
+    ]
+    robot, _ = with_friction_near_zero(ROBOT, bent, EFFECTS)
+    assert all((joint.friction_width or 0.0) < 0.002 for joint in robot.joints)
+
+
 def test_joints_have_laws_of_their_own() -> None:
     sharp, soft = measured(None, 1.0, 3), measured(LAWS["root"], 0.01, 3)
     assert sharp.torque is not None and soft.torque is not None

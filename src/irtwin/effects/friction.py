@@ -414,3 +414,10 @@ class PositionDependentFriction(JointEffect):
                     quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry))
                 )
         return tuple(quantities)
+
+
+def shapes_over_speed(turned: float) -> tuple[JointEffect, ...]:
+    """Return the forms that friction may have over speed, in the shapes tried, that are not over by a speed, rad/s."""
+    fading = (shape for shape in StribeckFriction().candidates() if shape.shape["vs"] > turned)
+    every = (*fading, *NonlinearViscousFriction().candidates())
+    return tuple(shape for shape in every if isinstance(shape, JointEffect))

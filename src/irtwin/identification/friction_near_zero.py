@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect
-from irtwin.effects.friction import SLOW, CoulombFriction, sharp_sign, turn
+from irtwin.effects.friction import SLOW, CoulombFriction, shapes_over_speed, sharp_sign, turn
 from irtwin.effects.stack import Stack, side_by_side
 from irtwin.identification.accumulate import Block, Rows, accumulate, part_read, triangle
 from irtwin.identification.progress import track
@@ -60,16 +60,19 @@ def with_friction_near_zero(
         for shape in effect.candidates(plain)
         if isinstance(shape, JointEffect) and shape != effect
     ]
+    laws = [shape for shape in shapes_over_speed(_WIDEST) if shape.id not in stack.ids]
     tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
     every = part_read(measured)
-    found, blocks = _found(stack, open_shapes, measured, tried, every)
-    if any(turn for turn, _ in found):
-        tried = [[] if turn is None else _around(turn) for turn, _ in found]
-        found, blocks = _found(stack, open_shapes, measured, tried, every)
+    found, blocks = _found(stack, open_shapes, laws, measured, tried, every)
+    if any(turn for both in found for turn, _ in both):
+        tried = [_around([turn for turn, _ in both if turn]) for both in found]
+        found, blocks = _found(stack, open_shapes, laws, measured, tried, every)
     if every > 1:  # a part of the log chose, all of it says whether that is so
-        tried = [[] if turn is None else [turn] for turn, _ in found]
-        found, blocks = _found(stack, open_shapes, measured, tried)
-    turned = replace(plain, joints=tuple(_with(*both) for both in zip(plain.joints, found, strict=True)))
+        tried = [[turn for turn, _ in both if turn] for both in found]
+        found, blocks = _found(stack, open_shapes, laws, measured, tried)
+    turned = replace(
+        plain, joints=tuple(_with(joint, likelier) for joint, (likelier, *_) in zip(plain.joints, found, strict=True))
+    )
     return turned, ReducedTorque(blocks, _places(stack, open_shapes, tried, turned))
 
 
@@ -82,33 +85,37 @@ def _with(joint: Joint, found: Dry) -> Joint:
 def _found(
     stack: Stack,
     open_shapes: Sequence[JointEffect],
+    laws: Sequence[JointEffect],
     motions: Sequence[Motion],
     tried: Sequence[Sequence[Turn]],
     every: int = 1,
-) -> tuple[list[Dry], list[Block]]:
-    """Return the best of the turns that are tried in each joint, and the friction by it; None where there is none.
+) -> tuple[list[list[Dry]], list[Block]]:
+    """Return in each joint the best of the turns that are tried, alone and beside a law over speed, the likelier first.
 
-    Beside it stand the equations, reduced; `every` as in `accumulate`.
+    Each has the friction by it, and is None where there is none. Beside them stand the equations, reduced; `every` as
+    in `accumulate`.
     """
-    blocks, pattern = _reduced(stack, open_shapes, motions, tried, every)
+    blocks, pattern = _reduced(stack, open_shapes, laws, motions, tried, every)
     told = track(enumerate(tried), "friction near zero speed of each joint")
     imitating = {shape.id for shape in open_shapes}
     sure = [
         np.flatnonzero([stack.torque_terms[k][0].id not in imitating for k in np.flatnonzero(used)])
         for used in stack.pattern
     ]
-    return [_best(blocks, pattern, joint, turns, sure[joint]) for joint, turns in told], blocks
+    return [_best(blocks, pattern, joint, turns, sure[joint], len(laws)) for joint, turns in told], blocks
 
 
-def _around(found: Turn) -> list[Turn]:
-    width, exponent = found
-    near = [(min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for a, b in _FINER]
+def _around(found: Sequence[Turn]) -> list[Turn]:
+    near = [
+        (min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for width, exponent in found for a, b in _FINER
+    ]
     return list(dict.fromkeys(near))
 
 
 def _reduced(
     stack: Stack,
     open_shapes: Sequence[JointEffect],
+    laws: Sequence[JointEffect],
     motions: Sequence[Motion],
     tried: Sequence[Sequence[Turn]],
     every: int,
@@ -116,23 +123,28 @@ def _reduced(
     """Reduce the equations of torque.
 
     Beside the stack's columns stand those of shapes that are open, then each joint's dry friction, sharp and by each
-    turn.
+    turn, then the laws over speed of which one may be there.
     """
     robot = stack.robot
     counts = [
-        sum(len(shape.joint_terms(joint)) for shape in open_shapes) + 1 + len(turns)
+        sum(len(shape.joint_terms(joint)) for shape in open_shapes) + 1 + len(turns) + len(laws)
         for joint, turns in zip(robot.joints, tried, strict=True)
     ]
     of_one_joint = np.repeat(np.eye(len(counts), dtype=bool), counts, axis=1)
     pattern = np.concatenate([stack.pattern, of_one_joint], axis=1)
     sticking = CoulombFriction()
 
+    def of_joint(samples: Sequence[np.ndarray], joint: int) -> list[np.ndarray]:
+        return [sample[:, joint : joint + 1] for sample in samples]
+
     def equations(motion: Motion) -> Rows:
         assert motion.torque is not None
         own = stack.sparse_by_joint(motion)
-        shapes = [sample for shape in open_shapes for sample in shape.samples(robot, motion, None)]
+        shapes, bent = (
+            [sample for one in some for sample in one.samples(robot, motion, None)] for some in (open_shapes, laws)
+        )
         columns = [  # single columns take ten times as long to filter
-            [*some, side_by_side([*(sample[:, k : k + 1] for sample in shapes), *_friction(motion.dq[:, k], tried[k])])]
+            [*some, side_by_side([*of_joint(shapes, k), *_friction(motion.dq[:, k], tried[k]), *of_joint(bent, k)])]
             for k, some in enumerate(own)
         ]
         undecided = stack.undecided(motion) | sticking.undecided(motion)
@@ -173,24 +185,37 @@ def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
         yield turn(dq, width, exponent, powers[exponent])[:, None]
 
 
-def _best(blocks: Sequence[Block], pattern: np.ndarray, joint: int, shapes: Sequence[Turn], sure: np.ndarray) -> Dry:
+def _best(
+    blocks: Sequence[Block], pattern: np.ndarray, joint: int, turns: Sequence[Turn], sure: np.ndarray, laws: int
+) -> list[Dry]:
     """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always.
 
+    The likelier of two comes first: alone, or beside the one of the `laws` over speed, the last columns, that leaves
+    least of sharp friction. What thins as a joint speeds up bends near zero, too: a turn alone would stand for it.
     Effects whose shape is open imitate friction, so how large that is, is asked beside the `sure` columns alone.
     """
-    own = int(pattern[joint].sum()) - len(shapes) - 1
+    end = int(pattern[joint].sum()) - laws
+    own = end - len(turns) - 1
     seen = [block for block in blocks if block.rows[joint]]
     if not seen:
-        return None, None
+        return [(None, None)]
     factors = _weighted([block.factors[joint] for block in seen], np.array([block.rows[joint] for block in seen]), own)
     whole = triangle(np.concatenate(factors))
-    left, friction = _left(whole, factors, own)
-    if len(sure) < own:
-        _, friction = _left(triangle(whole[:, [*sure, *range(own, whole.shape[1])]]), [], len(sure))
-    best = int(np.argmin(left.sum(axis=1)))
-    if not _everywhere(left[0] - left[best]):
-        best = 0
-    return shapes[best - 1] if best else None, max(float(friction[best]), 0.0)
+
+    def beside(columns: Sequence[int], blocks: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        every = [*columns, *range(own, end), -1]
+        return _left(triangle(whole[:, every]), [one[:, every] for one in blocks], len(columns))
+
+    _, friction = beside(list(sure), [])
+    alone = beside(range(own), factors)[0]
+    bent = [beside([*range(own), law], factors)[0] for law in range(end, end + laws)]
+    both = [alone, *sorted(bent, key=lambda left: float(left[0].sum()))[:1]]
+    best = [int(np.argmin(left.sum(axis=1))) for left in both]
+    if _everywhere(alone[best[0]] - both[-1][0]):
+        both.reverse()
+        best.reverse()
+    best = [place if _everywhere(left[0] - left[place]) else 0 for place, left in zip(best, both, strict=True)]
+    return [(turns[place - 1] if place else None, max(float(friction[place]), 0.0)) for place in dict.fromkeys(best)]
 
 
 def _weighted(factors: Sequence[np.ndarray], rows: np.ndarray, own: int) -> list[np.ndarray]:
