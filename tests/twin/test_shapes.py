@@ -28,27 +28,33 @@ def of_stribeck(effects):
 
 
 def test_an_effect_that_is_named_gets_the_shape_that_the_motions_show():
-    effects = shaped(ROBOT, [sticking(1), sticking(2)], [*BASELINE, "stribeck_friction"])
+    effects = shaped(ROBOT, [[sticking(1), sticking(2)]], [*BASELINE, "stribeck_friction"])
     assert set(BASELINE) <= set(effects)
     assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(effects))
 
 
 def test_a_shape_lies_between_those_that_are_tried_where_motions_say_so():
     effects = of_stribeck(
-        shaped(ROBOT, [sticking(1, 0.14, 1.4), sticking(2, 0.14, 1.4)], [*BASELINE, "stribeck_friction"])
+        shaped(ROBOT, [[sticking(1, 0.14, 1.4), sticking(2, 0.14, 1.4)]], [*BASELINE, "stribeck_friction"])
     )
     assert {name for one in effects for name in one.joints} == set(ROBOT.joint_names)
     assert all(one.vs == pytest.approx(0.14, rel=0.1) and one.d == pytest.approx(1.4, rel=0.1) for one in effects)
 
 
+def test_sides_of_other_friction_share_the_shape_that_one_of_them_shows():
+    never_sticks = replace(measure(ROBOT, swing(ROBOT, 3), noise=0.1, seed=3), power=None)
+    found = of_stribeck(shaped(ROBOT, [[never_sticks], [sticking(1)]], [*BASELINE, "stribeck_friction"]))
+    assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in found)
+
+
 def test_what_is_given_in_a_shape_keeps_it():
     given = [*BASELINE, StribeckFriction(vs=0.02, d=1.0)]
-    assert shaped(ROBOT, [sticking(1)], given) == tuple(given)
+    assert shaped(ROBOT, [[sticking(1)]], given) == tuple(given)
 
 
 def test_motions_without_torque_leave_shapes_open():
     silent = replace(sticking(1), torque=None, current=None)
-    assert shaped(ROBOT, [silent], ["stribeck_friction"]) == ("stribeck_friction",)
+    assert shaped(ROBOT, [[silent]], ["stribeck_friction"]) == ("stribeck_friction",)
 
 
 def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
@@ -58,5 +64,5 @@ def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
 
     named = [*BASELINE, "nonlinear_viscous_friction", "stribeck_friction"]
     for effects in (named, [*BASELINE, *named[:-3:-1]]):
-        found = shaped(ROBOT, [curved(1), curved(2)], effects)
+        found = shaped(ROBOT, [[curved(1), curved(2)]], effects)
         assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(found))

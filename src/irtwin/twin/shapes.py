@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -24,68 +24,101 @@ _PASSES = 2  # over the numbers of a shape, of all joints at once: each stands o
 _SWEEPS = 4  # over effects that share a joint, at most: the shape of one stands on the other's
 
 
-def shaped(robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> tuple[str | Effect, ...]:
+@dataclass(frozen=True)
+class _Side:
+    """Motions with torque, of a robot whose friction near zero speed is theirs; `reduced`: equations of torque."""
+
+    robot: Robot
+    motions: Sequence[Motion]
+    reduced: ReducedTorque | None
+
+    def torque(self, trial: Stack) -> Estimate:
+        return fit_torque(Stack(self.robot, trial.effects), self.motions, self.reduced)[1]
+
+    def power(self, trial: Stack, torque_values: np.ndarray) -> Estimate:
+        with_power = [motion for motion in self.motions if motion.power is not None]
+        return _of_power(Stack(self.robot, trial.effects), with_power, torque_values)
+
+
+def shaped(
+    robot: Robot, sides: Sequence[Sequence[Motion]], effects: Sequence[str | Effect]
+) -> tuple[str | Effect, ...]:
     """Return effects of open shape, those given by id, in the shapes that motions show, and all others as they are.
 
-    One may then be several, each at some joints. Motions without torque tell nothing.
+    One may then be several, each at some joints. `sides` are motions of which each has coefficients of its own, as of a
+    robot in which something changed; they share the shapes. Motions without torque tell nothing.
     """
-    with_torque = [motion for motion in motions if motion.torque is not None]
-    with_power = [motion for motion in with_torque if motion.power is not None]
+    with_torque = [own for side in sides if (own := [motion for motion in side if motion.torque is not None])]
+    powered = [own for own in with_torque if any(motion.power is not None for motion in own)]
     named, stack = {effect for effect in effects if isinstance(effect, str)}, Stack(robot, effects)
     of_torque, of_power = (
         {one.id for one in stack.effects if one.id in named and _has_open_shape(one, signal, robot)}
         for signal in ("torque", "power")
     )
-    tried = (of_torque if with_torque else set()) | (of_power if with_power else set())
+    tried = (of_torque if with_torque else set()) | (of_power if powered else set())
     if not tried:
         return tuple(effects)
-    turned, reduced = with_friction_near_zero(robot, with_torque, effects)
-    stack = shaped_for_torque(Stack(turned, effects), tried, with_torque, reduced)
+    parts = [
+        _Side(turned, own, of) for own in with_torque for turned, of in [with_friction_near_zero(robot, own, effects)]
+    ]
+    stack = Stack(parts[0].robot, effects)
+    stack = _shaped(stack, tried, "torque", lambda trial: _together(parts, [part.torque(trial) for part in parts]))
     if tried & of_power:
-        stack = shaped_for_power(stack, tried, with_power, fit_torque(stack, with_torque, reduced)[1].values)
+        values = [(part, part.torque(stack).values) for part in parts if part.motions in powered]
+        parts = [part for part, _ in values]
+        stack = _shaped(
+            stack, tried, "power", lambda trial: _together(parts, [part.power(trial, own) for part, own in values])
+        )
     return (*(one for one in effects if one not in tried), *(one for one in stack.effects if one.id in tried))
+
+
+def _together(parts: Sequence[_Side], fits: Sequence[Estimate]) -> np.ndarray:
+    """Return (g,) RMS of what is left in all parts."""
+    samples = [sum(len(motion.time) for motion in part.motions) for part in parts]
+    return np.asarray(np.sqrt(np.average([fit.noise**2 for fit in fits], axis=0, weights=samples)))
 
 
 def shaped_for_torque(
     stack: Stack, open_shapes: Set[str], motions: Sequence[Motion], reduced: ReducedTorque | None
 ) -> Stack:
     """Return a stack with the effects of torque, whose shape is open, in that which leaves least of measured torque."""
-    return _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, motions, reduced)[1])
+    return _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, motions, reduced)[1].noise)
 
 
 def shaped_for_power(
     stack: Stack, open_shapes: Set[str], motions: Sequence[Motion], torque_values: np.ndarray
 ) -> Stack:
     """Return the same of power, on top of torque by coefficients that were found; a part of a long log is read."""
-    every = part_read(motions)
-    return _shaped(
-        stack, open_shapes, "power", lambda trial: fit_power(trial, motions, torque_values, every, switching=True)[1]
-    )
+    return _shaped(stack, open_shapes, "power", lambda trial: _of_power(trial, motions, torque_values).noise)
+
+
+def _of_power(trial: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
+    return fit_power(trial, motions, torque_values, part_read(motions), switching=True)[1]
 
 
 def _has_open_shape(effect: Effect, signal: str, robot: Robot) -> bool:
     return effect.signal == signal and len(effect.candidates(robot)) > 1
 
 
-def _shaped(stack: Stack, open_shapes: Set[str], signal: str, fit: Callable[[Stack], Estimate]) -> Stack:
+def _shaped(stack: Stack, open_shapes: Set[str], signal: str, left: Callable[[Stack], np.ndarray]) -> Stack:
     """Give each effect of the signal, whose shape is open, the one that leaves least beside the others' shapes."""
     opened = [one for one in stack.effects if one.id in open_shapes and _has_open_shape(one, signal, stack.robot)]
     for _ in range(_SWEEPS if len(opened) > 1 else 1):
         before = stack.effects
         for effect in opened:
-            stack = _with_best_shape(stack, effect, fit)
+            stack = _with_best_shape(stack, effect, left)
         if stack.effects == before:
             break
     for effect in opened:
-        stack = _with_shape_between(stack, effect, fit)
+        stack = _with_shape_between(stack, effect, left)
     return stack
 
 
-def _with_best_shape(stack: Stack, effect: Effect, fit: Callable[[Stack], Estimate]) -> Stack:
+def _with_best_shape(stack: Stack, effect: Effect, left: Callable[[Stack], np.ndarray]) -> Stack:
     """Give an effect the best of the shapes that are tried: joint by joint where it acts so."""
     before, _, after = _around(stack, effect.id)
     shapes = effect.candidates(stack.robot)
-    noise = np.array([fit(stack.with_effects([*before, shape, *after])).noise for shape in shapes])
+    noise = np.array([left(stack.with_effects([*before, shape, *after])) for shape in shapes])
     if not (isinstance(effect, JointEffect) and effect.signal == "torque"):
         return stack.with_effects([*before, shapes[int(np.argmin(np.log(noise).sum(axis=1)))], *after])
     places = {joint.name: stack.robot.index(joint.name) for joint in effect.acting(stack.robot)}
@@ -93,20 +126,20 @@ def _with_best_shape(stack: Stack, effect: Effect, fit: Callable[[Stack], Estima
     return stack.with_effects([*before, *_by_shape(best, stack.robot), *after])
 
 
-def _with_shape_between(stack: Stack, effect: Effect, fit: Callable[[Stack], Estimate]) -> Stack:
+def _with_shape_between(stack: Stack, effect: Effect, left: Callable[[Stack], np.ndarray]) -> Stack:
     """Give an effect the shape between those that were tried that leaves least."""
     before, own, after = _around(stack, effect.id)
     shapes = effect.candidates(stack.robot)
 
-    def left(some: Sequence[Effect]) -> np.ndarray:
-        return fit(stack.with_effects([*before, *some, *after])).noise
+    def left_by(some: Sequence[Effect]) -> np.ndarray:
+        return left(stack.with_effects([*before, *some, *after]))
 
     if not isinstance(effect, JointEffect):
-        best = _between(own[0], shapes, lambda shape: float(np.log(left([shape])).sum()))
+        best = _between(own[0], shapes, lambda shape: float(np.log(left_by([shape])).sum()))
         return stack.with_effects([*before, best, *after])
     if effect.signal == "torque":
         of_joint = {joint.name: replace(one, joints=None) for one in own for joint in one.acting(stack.robot)}
-        of_joint = _between_by_joint(of_joint, shapes, stack.robot, lambda some: left(_by_shape(some, stack.robot)))
+        of_joint = _between_by_joint(of_joint, shapes, stack.robot, lambda some: left_by(_by_shape(some, stack.robot)))
         return stack.with_effects([*before, *_by_shape(of_joint, stack.robot), *after])
     return stack
 

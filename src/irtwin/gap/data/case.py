@@ -180,8 +180,8 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     known_of = begun.prior, _stated(data_set)
     case = Case(robot, begun.effects, data_set.runs, motions, (begun.robot, given), thresholds, *known_of, cutoff)
     case = case.with_friction_near_zero()
-    held_against = case.others if case.against == "reference" else case.seen
-    return replace(case, effects=shaped(case.robot, held_against, case.effects))
+    sides = [case.others, case.seen] if case.against == "reference" else [case.seen]
+    return replace(case, effects=shaped(case.robot, sides, case.effects))
 
 
 def _turned(before: Joint, joint: Joint) -> Joint:
