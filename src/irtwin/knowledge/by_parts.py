@@ -124,15 +124,11 @@ def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
 
 def _alone(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
     """Conclude of a part without what clashes; nothing of a part whose clashes have no end."""
-    conclude = partial(infer, ontology, asserted)
     robots = parts.spoken_for(ontology, asserted)
     try:
-        try:
-            concluded = conclude()
-        except Contradiction as clash:
-            aside, concluded = contain(clash, ontology.triples, asserted, conclude)
-            concluded.made_by = aside.notes(robots)
+        aside, concluded = contain(ontology.triples, asserted, partial(infer, ontology, asserted))
     except Contradiction as endless:
         return Conclusions(made_by={Triple(robot, CONTRADICTION, Literal(str(endless))) for robot in robots})
+    concluded.made_by = aside.notes(robots)
     concluded.contents[GRAPH_OWL_RL] = concluded.contents[GRAPH_OWL_RL] - ontology.schema.kept
     return concluded
