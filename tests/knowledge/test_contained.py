@@ -124,7 +124,7 @@ def second_payload(workspace: Path) -> str:
 
 def concluded(workspace: Path) -> set[Quad]:
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
-        return {quad for name in graph.graphs(GRAPH_INFERRED) for quad in graph.quads_in(name)}
+        return {quad for name in graph.graphs(GRAPH_INFERRED) for quad in graph.store.quads_in(name)}
 
 
 @pytest.mark.nightly
@@ -151,7 +151,7 @@ def test_a_contradiction_is_over_when_what_is_wrong_goes(workspace: Path) -> Non
     second_payload(workspace)
     assert irtwin("workspace", "reason", "--workspace", workspace).status == 3
     with Workspace.existing(workspace) as place, rewriting(place) as graph:
-        graph.change(set(graph.quads_in(MINE)), ())
+        graph.change(set(graph.store.quads_in(MINE)), ())
         assert reason(graph).set_aside == ()
     assert concluded(workspace) == before
     assert irtwin("workspace", "status", "--workspace", workspace).status == 0

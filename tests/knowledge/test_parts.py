@@ -133,7 +133,7 @@ def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
         patch.setattr(by_parts, "conclude", refused)
         copy = KnowledgeGraph()
         names = [name for name in graph.graphs() if not name.startswith((GRAPH_INFERRED, GRAPH_REASONED))]
-        copy.replace((it for name in names for it in graph.quads_in(name)), *names)
+        copy.replace((it for name in names for it in graph.store.quads_in(name)), *names)
         assert reason(copy).joined_by == "for comparison"
         return conclusions(copy)
 

@@ -13,7 +13,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.engines import HERMIT
 from irtwin.knowledge.explain import provenance
 from irtwin.knowledge.explain.explanation import Explanation
-from irtwin.knowledge.explain.mapping import mapping_of
+from irtwin.knowledge.explain.mapping import says
 from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
 from irtwin.knowledge.parts import Ontology
@@ -135,7 +135,7 @@ class Explainer:
             return Explanation(what, fact)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
-            maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
+            maker = says(triple, self._graph.resources.of("mappings"), self._graph.base) or "a mapping"
             subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
             behind = provenance.behind(self._graph, subject) if not near and subject is not None else []
             return Explanation(what, maker, tuple(map(self.individual, behind)), **near)
