@@ -17,7 +17,7 @@ from pyoxigraph import Literal, Quad, Triple
 from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
-from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Contradiction, show
 from irtwin.knowledge.parts import EQUALITIES, TYPE, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
@@ -83,7 +83,7 @@ def _minted(ontology: Ontology, region: Region, added: Iterable[Quad]) -> set[Na
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
-    """Conclude of some parts as of one; of a part that Beside does not take all but what follows from a clash."""
+    """Conclude of some parts as of one; of a part that FactsClosure does not take all but what follows from a clash."""
     region = regions[0] if len(regions) == 1 else parts.one(regions)
     if not region.nodes:
         yield region, Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
@@ -118,7 +118,7 @@ def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
     """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
     if any(it.predicate in EQUALITIES for it in asserted):
         raise Equality
-    closure = Beside(ontology.schema, set(asserted))
+    closure = FactsClosure(ontology.schema, set(asserted))
     return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)
 
 

@@ -17,7 +17,7 @@ class Equality(Exception):
     """Two terms are the same: what follows of that is not in an ontology's table."""
 
 
-class Beside(Closure):
+class FactsClosure(Closure):
     """Facts and what follows of them beside a closed ontology, but nothing that follows from the ontology alone.
 
     What the facts may say is told in `irtwin.knowledge.parts`: statements that model are not followed. Raises Equality
