@@ -18,7 +18,7 @@ from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
-from irtwin.knowledge.owl_rl.closure import Contradiction, show
+from irtwin.knowledge.owl_rl.closure import Contradiction, say
 from irtwin.knowledge.parts import EQUALITIES, TYPE, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -110,7 +110,7 @@ def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
     for it in statements:
         is_of_models = it.predicate in properties or (it.predicate == TYPE and it.object in classes)
         if is_of_models or it.subject in ontology.terms:
-            raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
+            raise Joined(say(it))
 
 
 @lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph

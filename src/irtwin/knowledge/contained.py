@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pyoxigraph import Literal, NamedNode, Triple
 
-from irtwin.knowledge.owl_rl.closure import Contradiction, show
+from irtwin.knowledge.owl_rl.closure import Contradiction, say
 from irtwin.knowledge.vocabulary import term
 
 T = TypeVar("T")
@@ -61,6 +61,6 @@ def contain(
 
 
 def _in_words(reason: str, statements: AbstractSet[Triple]) -> str:
-    shown = sorted(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}" for it in statements)
+    shown = sorted(map(say, statements))
     more = f" and {len(shown) - _MOST_NAMED} more" if len(shown) > _MOST_NAMED else ""
     return f"{reason.partition(': ')[0]}: {'; '.join(shown[:_MOST_NAMED])}{more}; nothing is concluded from these"

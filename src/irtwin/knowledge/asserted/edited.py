@@ -9,7 +9,7 @@ from pathlib import Path
 from pyoxigraph import NamedNode, Quad, Store, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.owl_rl.closure import say
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.export import exported
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -55,7 +55,7 @@ def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
     removed = {
         quad for triple in gone for quad in graph.store.said(triple.subject, triple.predicate) if quad.triple == triple
     }
-    words = [f"{sign} {' '.join(show(term, graph.base) for term in triple)}" for sign, triple in _in_order(gone, came)]
+    words = [f"{sign} {say(triple, graph.base)}" for sign, triple in _in_order(gone, came)]
     return Edit(frozenset(removed), frozenset(in_graph(came, GRAPH_ASSERTED)), tuple(words))
 
 

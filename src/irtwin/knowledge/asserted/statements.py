@@ -18,7 +18,7 @@ from irtwin.knowledge.explain.mapping import maps_of, says
 from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap
 from irtwin.knowledge.mapping.terms import values_in
-from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.owl_rl.closure import say
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH,
@@ -154,7 +154,7 @@ def _fill(
     said: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
-    what = " ".join(show(term, graph.base) for term in about)
+    what = say(about, graph.base)
     if len({quad.object for quad in new}) > 1:
         raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
     value = next(iter(new)).object if new else None
@@ -212,20 +212,19 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
     name = getattr(quad.graph_name, "value", "")
     if not ids and name.startswith(GRAPH):
         why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
-        raise InputError(f"{_show(quad, graph)}: cannot be taken out: {why}; nothing changed")
+        raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
     assertion.withdrawn += ids
     assertion.removed.add(quad)
 
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     """Raise InputError where a statement is one that irtwin makes itself."""
-    name = getattr(quad.graph_name, "value", "")
+    what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{_show(quad, graph)}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+        raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
     if quad.predicate != _TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
-            f"{_show(quad, graph)}: cannot be asserted: irtwin takes it from logs and files, or works it out; "
-            "nothing changed"
+            f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )
 
 
@@ -234,7 +233,3 @@ def _free(quad: Quad) -> dict[str, str]:
     term = quad.object
     of_literal = isinstance(term, Literal) and (f"@{term.language}" if term.language else term.datatype.value)
     return {"value": term.value, "kind": of_literal or "IRI", "graph": quad.graph_name.value}  # type: ignore[union-attr]
-
-
-def _show(quad: Quad, graph: KnowledgeGraph) -> str:
-    return " ".join(show(term, graph.base) for term in quad.triple)

@@ -294,8 +294,7 @@ class Closure:
         derivation, given = self._why(same[0]), self._grounds(same)
         if derivation is None:
             return contradiction("dt-diff", " is the same as ".join(map(self._name, same[0][::2])), given)
-        premises = (" ".join(map(show, premise)) for premise in derivation.premises)
-        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises), given)
+        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(map(say, derivation.premises)), given)
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
@@ -330,6 +329,11 @@ def show(term: Node, base: str = ID) -> str:
     if isinstance(term, Literal) and term.datatype.value != XSD + "string" and term.language is None:
         return f'"{term.value}"^^{shorten(term.datatype.value)}'
     return str(term)
+
+
+def say(statement: Iterable[Node], base: str = ID) -> str:
+    """Return a triple, or some of its terms, as people write it."""
+    return " ".join(show(term, base) for term in statement)
 
 
 def contradiction(rule: str, what: str, given: Iterable[Triple] = ()) -> Contradiction:
