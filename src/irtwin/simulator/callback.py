@@ -92,7 +92,7 @@ class _Torque:
                 getattr(model, f"dof_{number}")[self._dq[twin.robot.index(str(term.joint))]] = max(value, 0.0)
         self._within = [effect for effect in rest if isinstance(effect, JointEffect)]
         self._across = [effect for effect in rest if not isinstance(effect, JointEffect)]
-        rubs = [twin.robot.index(one.name) for effect in self._within for one in effect.acting(twin.robot)]
+        rubs = [place for effect in self._within for place in effect.places(twin.robot)]
         friction = model.dof_frictionloss
         friction[self._dq[rubs]] = np.maximum(friction[self._dq[rubs]], _LEAST)
 
