@@ -92,11 +92,6 @@ class KnowledgeGraph:
         self.answers = answers_of(self.store)
 
     @property
-    def shown(self) -> str:
-        """Where it is, as messages may say it: never with a password."""
-        return self.store.shown
-
-    @property
     def resources(self) -> Resources:
         """The ontology, rules, shapes, mappings, questions and reports that hold for it: its workspace's too."""
         if self._resources is None:
