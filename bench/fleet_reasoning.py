@@ -72,7 +72,7 @@ def compare(graph: KnowledgeGraph) -> None:
     ontology = Ontology(graph)
     whole = reasoning.infer(ontology, reasoning.asserted(graph) - ontology.triples)
     of_whole = {it for it in whole.quads() if reasoning.graph_of(it).startswith(GRAPH_INFERRED)}
-    by_parts = {it for name in graph.graphs(GRAPH_INFERRED) for it in graph.quads_in(name)}
+    by_parts = {it for name in graph.graphs(GRAPH_INFERRED) for it in graph.store.quads_in(name)}
     print(f"  {len(by_parts)} triples by parts, {len(of_whole)} of the whole; differ: {len(by_parts ^ of_whole)}")
 
 

@@ -15,7 +15,7 @@ from irtwin.asking import ask, explain, export
 from irtwin.asserting import follow, keep
 from irtwin.errors import InputError
 from irtwin.knowledge import by_parts
-from irtwin.knowledge.owl_rl.beside import Beside
+from irtwin.knowledge.owl_rl.beside import FactsClosure
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot
@@ -88,12 +88,12 @@ def test_it_is_reasoned_over_once_and_the_graph_is_that_of_rows_read_anew(
 ) -> None:
     closed: list[int] = []
 
-    class Counted(Beside):
+    class Counted(FactsClosure):
         def __init__(self, *given: Any) -> None:
             closed.append(1)
             super().__init__(*given)
 
-    monkeypatch.setattr(by_parts, "Beside", Counted)
+    monkeypatch.setattr(by_parts, "FactsClosure", Counted)
     told = f'<{RUN}> irt:Product "bolts" ; a <urn:plant/Night_Shift> . <urn:a> rdfs:label "elsewhere"'
     update(workspace, f"INSERT DATA {{ {told} }}")
     assert closed == [1]
@@ -232,4 +232,4 @@ def test_a_file_that_says_nothing_of_the_workspace_is_refused(workspace: Path, t
     other.write_text("<urn:a> <urn:b> <urn:c> .")
     said = irtwin("import", workspace, "--owl", other, "--yes")
     assert said.status == 2 and "says nothing that this workspace says" in said.err
-    assert irtwin("import", workspace, "--owl", tmp_path / "x.doc").err.count("its name must end in") == 1
+    assert irtwin("import", workspace, "--owl", tmp_path / "x.doc").err.count("no RDF format has this suffix") == 1

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.live import watch
+from irtwin.live.joint_stream import feed
 from irtwin.live.opcua import OpcUa
 from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
@@ -141,7 +141,7 @@ def test_a_full_disk_ends_what_follows_a_server_and_is_no_lost_connection() -> N
     try:
         followed = OpcUa(served.address, arm(6), "arm")
         with pytest.raises(OSError, match="No space left"):
-            watch._receive(followed.states(threading.Event(), said.append), full, print, lambda: None)
+            feed(followed.states(threading.Event(), said.append), full, print)
     finally:
         served.stop()
     assert not any("lost" in line for line in said)

@@ -14,7 +14,7 @@ from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
 from irtwin.providers.names import check_run_name, find_robot
 from irtwin.providers.records import keep_run, load_robot, load_twin
-from irtwin.rewriting import conclude, map_rows, populate_others, rewriting
+from irtwin.rewriting import fill, rewriting
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
@@ -71,9 +71,7 @@ def improve(
                     keep_run(apart, robot_id, known.joint_names, run)
                 improved = improve_twin(apart, robot_id, [run.name for run in runs], limit, announce)
                 populate_apart(apart, announce)
-            map_rows(place, graph)
-            populate_others(place, graph, announce)  # live runs by the new twin
-            conclude(graph, announce)
+            fill(place, graph, announce)  # live runs by the new twin
             following = next_experiment(place, graph, robot_id)
         report = write_report(place, robot_id)
         return Improvement(improved.rounds, improved.within, limit, following, report)

@@ -31,7 +31,7 @@ from irtwin.providers.robot_of_graph import robot_of_graph
 from irtwin.report.energy.page import render
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.gap.page import render_gap
-from irtwin.rewriting import check_before, conclude, map_rows, populate_others, renew, rewriting
+from irtwin.rewriting import check_before, conclude, fill, map_rows, populate_others, renew, rewriting
 from irtwin.signals.log import DataSet
 from irtwin.simulator.playing import Playing
 from irtwin.storage.database import Workspace
@@ -118,10 +118,7 @@ def adopt(robot: str, workspace: Location | Path | str = WORKSPACE, *, announce:
             with staged(place, robot_id) as apart:
                 adopt_twin(apart, robot_id)
                 populate_apart(apart, announce)
-            graph.load_ontology()
-            map_rows(place, graph)
-            populate_others(place, graph, announce)  # live runs by the new twin
-            conclude(graph, announce)
+            fill(place, graph, announce)  # live runs by the new twin
             next_experiment(place, graph, robot_id)
         return write_report(place, robot_id)
 

@@ -128,7 +128,7 @@ def test_a_process_that_never_begins_is_not_tried_for_ever(tmp_path: Path) -> No
         )
 
 
-@pytest.mark.parametrize("name", ["records", "lock", "records/a"])
+@pytest.mark.parametrize("name", ["records", "records/a"])
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(name: str, tmp_path: Path, capfd) -> None:
     (batch,) = batches(tmp_path, ("a",))
     place = batch.folder / name.replace("/a", f"/{key(batch.sets.data_sets[0])}.json/x")

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Quad, RdfFormat, Triple, parse
 
-from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -64,7 +64,7 @@ def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
         schema = Schema(ontology)
         if schema.unfit is not None:  # it makes terms of its own the same
             raise Equality
-        return (Beside(schema, facts).worth_keeping() | schema.kept) - facts
+        return (FactsClosure(schema, facts).worth_keeping() | schema.kept) - facts
     except Contradiction:
         return None
 
@@ -85,7 +85,7 @@ def test_facts_that_come_later(two_robots: list[Quad]) -> None:
     graph.load_ontology()
     ontology, facts = graph.triples(), sorted((quad.triple for quad in two_robots), key=str)
     schema = Schema(ontology)
-    closure = Beside(schema, facts[::2])
+    closure = FactsClosure(schema, facts[::2])
     closure.add(facts[1::2])
     assert closure.worth_keeping() | schema.kept == Closure([*ontology, *facts]).worth_keeping()
 
@@ -94,4 +94,4 @@ def test_terms_that_are_the_same_are_told() -> None:
     assert Schema(triples(["ex:C owl:sameAs ex:D ."])).unfit is not None
     assert Schema(triples(["owl:sameAs rdfs:domain ex:C ."])).unfit is not None
     with pytest.raises(Equality):
-        Beside(Schema(triples(["ex:p a owl:FunctionalProperty ."])), triples(["ex:a ex:p ex:b , ex:c ."]))
+        FactsClosure(Schema(triples(["ex:p a owl:FunctionalProperty ."])), triples(["ex:a ex:p ex:b , ex:c ."]))

@@ -137,7 +137,7 @@ def test_pattern_that_cannot_be_explained_is_refused(reasoned: KnowledgeGraph, p
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_every_triple_of_the_graph_is_found_as_it_is_written(reasoned: KnowledgeGraph, data: st.DataObject) -> None:
-    quads = sorted((quad for name in reasoned.graphs() for quad in reasoned.quads_in(name)), key=str)
+    quads = sorted((quad for name in reasoned.graphs() for quad in reasoned.store.quads_in(name)), key=str)
     triple = data.draw(st.sampled_from(quads)).triple
     if any(isinstance(term, BlankNode) for term in triple):
         return

@@ -14,7 +14,7 @@ from tests.knowledge.graphs import DRAWN, inferred, quad
 from irtwin import rewriting
 from irtwin.alarms.alarm import alarms
 from irtwin.knowledge import by_parts, parts, reasoning
-from irtwin.knowledge.owl_rl.beside import Beside
+from irtwin.knowledge.owl_rl.beside import FactsClosure
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.reasoning import reason
@@ -133,7 +133,7 @@ def as_one_part(graph: KnowledgeGraph) -> dict[str, set]:
         patch.setattr(by_parts, "conclude", refused)
         copy = KnowledgeGraph()
         names = [name for name in graph.graphs() if not name.startswith((GRAPH_INFERRED, GRAPH_REASONED))]
-        copy.replace((it for name in names for it in graph.quads_in(name)), *names)
+        copy.replace((it for name in names for it in graph.store.quads_in(name)), *names)
         assert reason(copy).joined_by == "for comparison"
         return conclusions(copy)
 
@@ -195,8 +195,8 @@ def test_what_joins_robots_is_seen(joining: Quad) -> None:
 def test_only_the_part_that_changed_is_reasoned_over(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = anew(FACTS)
     given: set[Triple] = set()
-    add = Beside.add
-    monkeypatch.setattr(Beside, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
+    add = FactsClosure.add
+    monkeypatch.setattr(FactsClosure, "add", lambda self, triples: (given.update(triples), add(self, triples))[1])
     share = quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.2))
     graph.change({share}, {quad(individual("run", "r.2"), term("Idle_Share"), Literal(0.9))})
     reason(graph)

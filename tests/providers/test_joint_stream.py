@@ -87,7 +87,7 @@ def test_a_bad_line_stops_nothing() -> None:
     taken: list[State] = []
     refused: list[str] = []
     stream = io.BytesIO(line(time=1) + b"\n\nnonsense\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + line(time=2))
-    feed(lines_of(stream), READER, taken.append, lambda error: refused.append(str(error)))
+    feed(READER.states(lines_of(stream)), taken.append, lambda error: refused.append(str(error)))
     assert [state.time for state in taken] == [1.0, 2.0]
     assert refused == ["a line is not JSON", f"a line is longer than {LONGEST_LINE} bytes"]
 
@@ -97,7 +97,7 @@ def test_clients_on_a_port() -> None:
     done = threading.Semaphore(0)
 
     def handle(lines) -> None:
-        feed(lines, READER, taken.append, lambda reason: None)
+        feed(READER.states(lines), taken.append, lambda reason: None)
         done.release()
 
     with listening(0, handle) as port:
@@ -117,7 +117,7 @@ def test_an_http_request_ends_its_connection_before_its_body_is_read() -> None:
     body = line() + b"\n" + line(time=6.5) + b"\n"
     head = f"POST / HTTP/1.1\r\nOrigin: http://evil.example\r\nContent-Length: {len(body)}\r\n\r\n".encode()
     with listening(
-        0, lambda lines: feed(lines, READER, taken.append, lambda error: refused.append(str(error)))
+        0, lambda lines: feed(READER.states(lines), taken.append, lambda error: refused.append(str(error)))
     ) as port:
         with socket.create_connection(("127.0.0.1", port)) as browser:
             browser.sendall(head + body)

@@ -57,7 +57,7 @@ def test_odd_names_are_made_valid_and_told() -> None:
 
 def test_what_ros_asks_for_is_filled_in_and_told() -> None:
     made = described(parse_urdf(ODD))
-    root = ElementTree.fromstring(made.urdf)
+    root = ElementTree.fromstring(made.robot.urdf)
     kinds = {joint.get("name"): joint.get("type") for joint in root.iter("joint")}
     assert kinds == {"Achse_1_2": "continuous", "Achse_1": "prismatic", "jaw turn": "fixed"}
     limit = root.find("joint[@name='Achse_1']/limit")

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, swing
+from tests.synthetic import arm, rigid_torque, swing
 
-from irtwin.effects.rigid_body import inverse_dynamics
 from irtwin.robot.body_regressor import body_regressor
 from irtwin.signals.filter import decimate
 from irtwin.signals.sparse import at_all, at_some, decimate_sparse, factor_at_some, sparse_step, thinning
@@ -45,10 +44,10 @@ def test_some_samples_tell_the_others_up_to_both_ends(count):
 
     def torque(motion):
         asked.append(len(motion.time))
-        return inverse_dynamics(ROBOT.model, motion)
+        return rigid_torque(ROBOT, motion)
 
     found = at_all(torque, part)
-    expected = inverse_dynamics(ROBOT.model, part)
+    expected = rigid_torque(ROBOT, part)
     np.testing.assert_allclose(found, expected, atol=2e-6 * np.abs(expected).max())
     assert sum(asked) == count if count < 100 else sum(asked) < 0.8 * count
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from functools import cache
+from math import isfinite
 from sys import float_info
 from types import NoneType, UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -67,11 +68,13 @@ def goes_with(other: str) -> dict[str, str]:
 
 
 def to_json(value: Any) -> Any:
-    """Return a part, or what it is made of, as JSON."""
+    """Return a part, or what it is made of, as JSON, which has no number that is not finite: null."""
     if is_dataclass(value):
         return {one.name: to_json(getattr(value, one.name)) for one in fields(value) if _written(value, one)}
     if isinstance(value, Mapping):
         return {key: to_json(one) for key, one in value.items()}
+    if isinstance(value, float):
+        return value if isfinite(value) else None
     return [to_json(one) for one in value] if isinstance(value, tuple | list) else value
 
 

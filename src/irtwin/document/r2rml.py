@@ -57,16 +57,9 @@ def _predicate(term: str, value: str) -> str:
 
 
 def _object(column: Column) -> str:
-    return (
-        f'rr:column "{column.name}"{_DATATYPES.get(column.kind, "")}'
-        if column.names is None
-        else _template(_iri(column))
-    )
-
-
-def _iri(column: Column) -> str:
-    assert column.names is not None
-    return column.names.iri.replace("{}", f"{{{column.name}}}")
+    if column.names is None:
+        return f'rr:column "{column.name}"{_DATATYPES.get(column.kind, "")}'
+    return _template(column.names.iri.replace("{}", f"{{{column.name}}}"))
 
 
 def _template(iri: str) -> str:

@@ -23,8 +23,9 @@ from irtwin.effects.effect import (
     quantity,
     ratio,
 )
-from irtwin.effects.rigid_body import inverse_dynamics, model_of
+from irtwin.effects.rigid_body import model_of
 from irtwin.robot.description import Joint, Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.conditioning import differentiate
 from irtwin.signals.motion import Motion
 
@@ -46,7 +47,8 @@ def load_torque(robot: Robot, motion: Motion, predicted: Predicted | None) -> np
     """Return (N, n) the torque that the links take beyond the gears."""
     if predicted is not None and predicted.load is not None:
         return predicted.load
-    return inverse_dynamics(model_of(robot, None if predicted is None else predicted.bodies), motion)
+    model = model_of(robot, None if predicted is None else predicted.bodies)
+    return inverse_dynamics(model, motion.q, motion.dq, motion.ddq)
 
 
 def load_inertia(robot: Robot, motion: Motion, predicted: Predicted | None) -> np.ndarray:
@@ -203,9 +205,6 @@ class _Compliance(JointEffect):
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
 
-    def _places(self, robot: Robot) -> list[int]:
-        return [robot.index(joint.name) for joint in self.acting(robot)]
-
     def _among(
         self,
         predicted: Predicted | None,
@@ -264,7 +263,7 @@ class Backlash(_Compliance):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what passes the gap beyond what passes a stiff gear."""
-        acting = self._places(robot)
+        acting = self.places(robot)
         load = load_torque(robot, motion, predicted)[:, acting]
         if self.by_way:
             free = _free(load, motion.q[:, acting], motion.dq[:, acting], motion.rate, self.b)
@@ -315,7 +314,7 @@ class JointElasticity(_Compliance):
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return what a unit of the coefficient adds."""
-        acting = self._places(robot)
+        acting = self.places(robot)
         load = load_torque(robot, motion, predicted)[:, acting]
         if self.antiresonance == 0:
             return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
@@ -346,7 +345,7 @@ class JointElasticity(_Compliance):
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how soft the acting joint that moves least can be."""
-        inertia = _mean_inertia(robot)[self._places(robot)]
+        inertia = _mean_inertia(robot)[self.places(robot)]
         softest = (2 * np.pi * _SLOWEST) ** 2 * float(inertia.min())
         return {"K": Possible(softest, np.inf, f"softer, the link would swing at less than {_SLOWEST:g} Hz")}
 

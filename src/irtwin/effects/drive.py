@@ -55,20 +55,25 @@ class RotorInertia(JointEffect):
         return (motion.ddq,)
 
 
+class _DriveLoss(JointEffect):
+    """What all of them share: power that a joint's drive turns into heat."""
+
+    family: ClassVar[str] = "drive"
+    electrical_loss: ClassVar[bool] = True
+    channel: ClassVar[str] = "power"
+    signal: ClassVar[str] = "power"
+
+
 @dataclass(frozen=True)
-class CopperLoss(JointEffect):
+class CopperLoss(_DriveLoss):
     """R i^2, the current i being predicted torque by torque constant.
 
     Where no torque constant is known the coefficient multiplies the torque squared, W/(N m)^2.
     """
 
     id: ClassVar[str] = "copper_loss"
-    family: ClassVar[str] = "drive"
-    electrical_loss: ClassVar[bool] = True
     of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power while holding loaded poses, then unloaded ones, brakes open"
-    channel: ClassVar[str] = "power"
-    signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -84,7 +89,7 @@ class CopperLoss(JointEffect):
 
 
 @dataclass(frozen=True)
-class WindingTemperature(JointEffect):
+class WindingTemperature(_DriveLoss):
     """R 0.0039 (T - T0) i^2: copper that is warmer than its data sheet. The coefficient is R (T - T0), ohm K.
 
     Where temperatures were measured, the rise of the winding goes with them, and the coefficient is that where the
@@ -92,12 +97,8 @@ class WindingTemperature(JointEffect):
     """
 
     id: ClassVar[str] = "winding_temperature"
-    family: ClassVar[str] = "drive"
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
-    electrical_loss: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power and temperatures from a cold start"
-    channel: ClassVar[str] = "power"
-    signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
 
     T0: float = 25.0  # degC
@@ -128,16 +129,12 @@ class WindingTemperature(JointEffect):
 
 
 @dataclass(frozen=True)
-class IronLoss(JointEffect):
+class IronLoss(_DriveLoss):
     """k1 |w| + k2 w^2: hysteresis and eddy currents; w is the motor's speed, the joint's where no gear is known."""
 
     id: ClassVar[str] = "iron_loss"
-    family: ClassVar[str] = "drive"
-    electrical_loss: ClassVar[bool] = True
     of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power at constant speeds up to the limit in poses without load"
-    channel: ClassVar[str] = "power"
-    signal: ClassVar[str] = "power"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k1 and k2."""
@@ -154,16 +151,12 @@ class IronLoss(JointEffect):
 
 
 @dataclass(frozen=True)
-class InverterLoss(JointEffect):
+class InverterLoss(_DriveLoss):
     """V0 |i|: the voltage that transistors and diodes drop."""
 
     id: ClassVar[str] = "inverter_loss"
-    family: ClassVar[str] = "drive"
-    electrical_loss: ClassVar[bool] = True
     of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log power while holding poses of rising load, brakes open"
-    channel: ClassVar[str] = "power"
-    signal: ClassVar[str] = "power"
     needs: ClassVar[str | None] = "torque"
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -281,6 +281,10 @@ class Effect(ABC):
         """Return the joints that the effect acts on, in the robot's order."""
         return tuple(joint for joint in robot.joints if self.joints is None or joint.name in self.joints)
 
+    def places(self, robot: Robot) -> list[int]:
+        """Return the columns of `q` of the joints that the effect acts on."""
+        return [robot.index(joint.name) for joint in self.acting(robot)]
+
     def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
         """Return the joints on which a coefficient acts that is named by a joint."""
         return (joint,)
@@ -302,6 +306,14 @@ class JointEffect(Effect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return m columns, (N, n) each: that of each joint."""
 
+    def shape_of_joints(self, robot: Robot, **units: str) -> tuple[Quantity, ...]:
+        """Return fields of the shape as parameters of each acting joint; {} in a unit is that of its position."""
+        return tuple(
+            Quantity(name, joint.name, getattr(self, name), unit.format(joint.unit))
+            for joint in self.acting(robot)
+            for name, unit in units.items()
+        )
+
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return m coefficients per joint, joint by joint."""
         return tuple(term for joint in self.acting(robot) for term in self.joint_terms(joint))
@@ -309,7 +321,7 @@ class JointEffect(Effect):
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, k): each joint's own, zero elsewhere; where the signal is power (N, k)."""
         parts = self.samples(robot, motion, predicted)
-        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        acting = self.places(robot)
         if self.signal == "power":
             stacked = np.stack([part[:, acting] for part in parts], axis=2)
             return stacked.reshape(len(motion.time), len(acting) * len(parts))
@@ -325,7 +337,7 @@ class JointEffect(Effect):
         """Return columns @ values (k,), without the zeros of other joints."""
         parts = self.samples(robot, motion, predicted)
         weights = np.zeros((len(parts), motion.dq.shape[1]))
-        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        acting = self.places(robot)
         weights[:, acting] = values.reshape(len(acting), len(parts)).T
         if self.signal == "power":
             return np.asarray(sum(part @ weight for part, weight in zip(parts, weights, strict=True)))
@@ -336,7 +348,7 @@ class JointEffect(Effect):
     ) -> np.ndarray:
         """Return (N, k): each joint's own columns times its `along` (N, n)."""
         parts = [part * along for part in self.samples(robot, motion, predicted)]
-        acting = [robot.index(joint.name) for joint in self.acting(robot)]
+        acting = self.places(robot)
         return np.array([part[:, joint] for joint in acting for part in parts]).reshape(-1, len(along)).T
 
 

@@ -151,16 +151,7 @@ class StribeckFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fs, vs and d."""
-        quantities = super().parameters(robot, given)
-        shapes = [
-            shape
-            for joint in self.acting(robot)
-            for shape in (
-                Quantity("vs", joint.name, self.vs, f"{joint.unit}/s"),
-                Quantity("d", joint.name, self.d, "1"),
-            )
-        ]
-        return (*quantities, *shapes)
+        return (*super().parameters(robot, given), *self.shape_of_joints(robot, vs="{}/s", d="1"))
 
 
 @dataclass(frozen=True)
@@ -187,8 +178,7 @@ class NonlinearViscousFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k and d."""
-        quantities = super().parameters(robot, given)
-        return (*quantities, *(Quantity("d", joint.name, self.d, "1") for joint in self.acting(robot)))
+        return (*super().parameters(robot, given), *self.shape_of_joints(robot, d="1"))
 
 
 @dataclass(frozen=True)
@@ -349,7 +339,7 @@ class PreslidingHysteresis(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return z - s, at the acting joints."""
         column, slides = np.zeros_like(motion.dq), direction(robot, motion.dq)
-        for joint in (robot.index(each.name) for each in self.acting(robot)):
+        for joint in self.places(robot):
             signs = sharp_sign(motion.dq[:, joint])
             column[:, joint] = signs + self._lag(motion.q[:, joint], signs) - slides[:, joint]
         return (column,)
@@ -382,7 +372,7 @@ class PreslidingHysteresis(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return d."""
-        return tuple(Quantity("d", joint.name, self.d, joint.unit) for joint in self.acting(robot))
+        return self.shape_of_joints(robot, d="{}")
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,10 @@ from irtwin.effects.effect import (
     quantity,
     ratio,
 )
-from irtwin.effects.rigid_body import flange_frame, inverse_dynamics, last_body_columns, model_of, to_body
+from irtwin.effects.rigid_body import flange_frame, last_body_columns, model_of, to_body
 from irtwin.robot.body_regressor import point_jacobian
 from irtwin.robot.description import Joint, Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.motion import Motion
 
 _HEAVIEST = 20.0  # kg: a load that any arm may carry, as data sheets have it,
@@ -219,11 +220,11 @@ class BaseTilt(Effect):
         """Return (N, n, 2): the torque of gravity's change, turned by a unit."""
         model = model_of(robot, None if predicted is None else predicted.bodies)
         down = model.gravity.linear.copy()
-        still = replace(motion, dq=np.zeros_like(motion.dq), ddq=np.zeros_like(motion.ddq))
+        still = np.zeros_like(motion.dq)
         columns = np.empty((*motion.q.shape, 2))
         for axis in range(2):
             model.gravity.linear = np.cross(np.eye(3)[axis], down)
-            columns[:, :, axis] = inverse_dynamics(model, still)
+            columns[:, :, axis] = inverse_dynamics(model, motion.q, still, still)
         return columns
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:

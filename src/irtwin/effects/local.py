@@ -76,9 +76,7 @@ class LocalEffect(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return the coefficient, the place, and what else is the shape's."""
-        quantities = super().parameters(robot, given)
-        shapes = [Quantity("q0", joint.name, self.q0, joint.unit) for joint in self.acting(robot)]
-        return (*quantities, *shapes)
+        return (*super().parameters(robot, given), *self.shape_of_joints(robot, q0="{}"))
 
 
 @dataclass(frozen=True)
@@ -118,8 +116,7 @@ class LocalWear(LocalEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return Fw, q0 and w."""
-        quantities = super().parameters(robot, given)
-        return (*quantities, *(Quantity("w", joint.name, self.w, joint.unit) for joint in self.acting(robot)))
+        return (*super().parameters(robot, given), *self.shape_of_joints(robot, w="{}"))
 
 
 @dataclass(frozen=True)
@@ -159,8 +156,7 @@ class JointLimitSpring(LocalEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, q0 and the side."""
-        quantities = super().parameters(robot, given)
-        return (*quantities, *(Quantity("side", joint.name, self.side, "1") for joint in self.acting(robot)))
+        return (*super().parameters(robot, given), *self.shape_of_joints(robot, side="1"))
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return that it pulls back."""

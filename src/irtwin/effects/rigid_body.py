@@ -14,6 +14,7 @@ from irtwin.errors import InputError
 from irtwin.robot.body_regressor import body_regressor, carried_bodies
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.motion import Motion
 
 # Pinocchio's order; first moments and inertias about the joint's frame
@@ -56,7 +57,7 @@ class RigidBody(Effect):
         self, robot: Robot, motion: Motion, values: np.ndarray, predicted: Predicted | None = None
     ) -> np.ndarray:
         """Return the (N, n) torque of bodies of these inertial parameters (10 n,), by recursive Newton-Euler."""
-        return inverse_dynamics(model_of(robot, values), motion)
+        return inverse_dynamics(model_of(robot, values), motion.q, motion.dq, motion.ddq)
 
     def carried(
         self, robot: Robot, motion: Motion, along: np.ndarray, predicted: Predicted | None = None
@@ -109,13 +110,6 @@ def model_of(robot: Robot, bodies: np.ndarray | None) -> pin.Model:
             mass = values[0] if abs(values[0]) > _LIGHT else _LIGHT
             model.inertias[index] = pin.Inertia.FromDynamicParameters(np.append(mass, values[1:]))
     return model
-
-
-def inverse_dynamics(model: pin.Model, motion: Motion) -> np.ndarray:
-    """Return the (N, n) joint torque, N m, that the model's bodies take in the motion."""
-    q, dq, ddq = (np.asfortranarray(each.T) for each in (motion.q, motion.dq, motion.ddq))
-    torque = np.ascontiguousarray(pin.rneaInParallel(1, pin.ModelPool(model, 1), q, dq, ddq).T)  # half a loop's time
-    return np.asarray(torque.reshape(motion.q.shape))  # of one joint it is a plain vector
 
 
 def torque_slope(robot: Robot, bodies: np.ndarray | None, motion: Motion) -> np.ndarray:

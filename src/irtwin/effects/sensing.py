@@ -118,8 +118,8 @@ class EncoderOffset(Effect):
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, k) slopes of every joint's torque over the position of each acting one."""
-        acting = [robot.index(joint.name) for joint in self.acting(robot)]
-        return torque_slope(robot, None if predicted is None else predicted.bodies, motion)[:, :, acting]
+        slopes = torque_slope(robot, None if predicted is None else predicted.bodies, motion)
+        return slopes[:, :, self.places(robot)]
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how far a joint's zero may be off."""

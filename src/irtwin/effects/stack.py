@@ -264,7 +264,7 @@ class Stack:
         for effect in self._torque:
             part = self._undecided_by(effect, motion)
             if part is not None:
-                acting = [self.robot.index(joint.name) for joint in effect.acting(self.robot)]
+                acting = effect.places(self.robot)
                 undecided[:, acting] |= part[:, acting]
         return undecided
 

@@ -108,8 +108,12 @@ class JointCoupling(Effect):
         if places:
             rubs = sharp_sign(motion.dq[:, places].sum(axis=1))
             for joint, other in (places, places[::-1]):
-                columns[:, joint] = np.column_stack([motion.ddq[:, other], motion.dq[:, other], rubs])
+                columns[:, joint] = np.column_stack([*self._turned(motion, joint, other), rubs])
         return columns
+
+    def _turned(self, motion: Motion, joint: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return acceleration and speed (N,) of what turns with the other joint and is felt at this one."""
+        return motion.ddq[:, other], motion.dq[:, other]
 
     def changes(self) -> tuple[Effect, ...]:
         """Return the change of what turns with both joints: no friction of a joint beside it has to bring its part."""
@@ -126,11 +130,5 @@ class ChangedJointCoupling(JointCoupling):
         """Return it in a twin, whose rotors and friction have each joint's own part."""
         return JointCoupling(joints=self.joints, runs=self.runs)
 
-    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
-        """Return (N, n, 3)."""
-        places = [robot.index(joint.name) for joint in self.pair(robot)]
-        columns = np.zeros((*motion.dq.shape, 3 if places else 0))
-        if places:
-            speed, acceleration = (each[:, places].sum(axis=1) for each in (motion.dq, motion.ddq))
-            columns[:, places] = np.column_stack([acceleration, speed, sharp_sign(speed)])[:, None, :]
-        return columns
+    def _turned(self, motion: Motion, joint: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+        return motion.ddq[:, joint] + motion.ddq[:, other], motion.dq[:, joint] + motion.dq[:, other]

@@ -8,7 +8,6 @@ import json
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +17,7 @@ from irtwin.errors import InputError, WorkspaceFault
 from irtwin.fleet.data_sets import checksum
 from irtwin.input_file import read_input
 from irtwin.json_text import parse_json
-from irtwin.storage.files import InsidePath, inside, write
+from irtwin.storage.files import InsidePath, inside, locked, write
 
 RUN, DIAGNOSE = "run", "diagnose"
 BEGUN, DONE, REFUSED, FAILED = "begun", "done", "refused", "failed"
@@ -119,19 +118,10 @@ class Batch:
 
         A data set that is refused or fails costs no other. Where the process ends, the next one goes on from there.
         """
-        with self._alone():
-            for place in self.sets.data_sets:
+        places = self.sets.data_sets
+        with locked(self.folder, fcntl.LOCK_EX):  # the same command may be given twice
+            for place in places:
                 self._take(place)
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        try:
-            lock = self._inside("lock").open("w")
-        except OSError as error:
-            raise InputError(f"{self.folder / 'lock'}: cannot be written ({error.strerror}); remove it") from error
-        with lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # the same command may be given twice
-            yield
 
     def _take(self, place: str) -> None:
         before, began = self.record(place), time.monotonic()

@@ -17,8 +17,8 @@ from pyoxigraph import Literal, Quad, Triple
 from irtwin.knowledge import parts
 from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
-from irtwin.knowledge.owl_rl.beside import Beside, Equality
-from irtwin.knowledge.owl_rl.closure import Contradiction, show
+from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
+from irtwin.knowledge.owl_rl.closure import Contradiction, say
 from irtwin.knowledge.parts import EQUALITIES, TYPE, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -83,7 +83,7 @@ def _minted(ontology: Ontology, region: Region, added: Iterable[Quad]) -> set[Na
 
 
 def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Region, Conclusions]]:
-    """Conclude of some parts as of one; of a part that Beside does not take all but what follows from a clash."""
+    """Conclude of some parts as of one; of a part that FactsClosure does not take all but what follows from a clash."""
     region = regions[0] if len(regions) == 1 else parts.one(regions)
     if not region.nodes:
         yield region, Conclusions({GRAPH_OWL_RL: ontology.schema.kept})
@@ -110,7 +110,7 @@ def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
     for it in statements:
         is_of_models = it.predicate in properties or (it.predicate == TYPE and it.object in classes)
         if is_of_models or it.subject in ontology.terms:
-            raise Joined(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}")
+            raise Joined(say(it))
 
 
 @lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
@@ -118,21 +118,17 @@ def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
     """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
     if any(it.predicate in EQUALITIES for it in asserted):
         raise Equality
-    closure = Beside(ontology.schema, set(asserted))
+    closure = FactsClosure(ontology.schema, set(asserted))
     return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)
 
 
 def _alone(ontology: Ontology, asserted: set[Triple]) -> Conclusions:
     """Conclude of a part without what clashes; nothing of a part whose clashes have no end."""
-    conclude = partial(infer, ontology, asserted)
     robots = parts.spoken_for(ontology, asserted)
     try:
-        try:
-            concluded = conclude()
-        except Contradiction as clash:
-            aside, concluded = contain(clash, ontology.triples, asserted, conclude)
-            concluded.made_by = aside.notes(robots)
+        aside, concluded = contain(ontology.triples, asserted, partial(infer, ontology, asserted))
     except Contradiction as endless:
         return Conclusions(made_by={Triple(robot, CONTRADICTION, Literal(str(endless))) for robot in robots})
+    concluded.made_by = aside.notes(robots)
     concluded.contents[GRAPH_OWL_RL] = concluded.contents[GRAPH_OWL_RL] - ontology.schema.kept
     return concluded

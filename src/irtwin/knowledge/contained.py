@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from pyoxigraph import Literal, NamedNode, Triple
 
-from irtwin.knowledge.owl_rl.closure import Contradiction, show
+from irtwin.knowledge.owl_rl.closure import Contradiction, say
 from irtwin.knowledge.vocabulary import term
 
 T = TypeVar("T")
@@ -24,44 +24,43 @@ _MOST_NAMED = 3  # statements, in words
 
 @dataclass(frozen=True)
 class Aside:
-    """The asserted statements that nothing is concluded from, and why."""
+    """The asserted statements that nothing is concluded from, and why; none where nothing clashes."""
 
-    statements: frozenset[Triple]
-    why: str
+    statements: frozenset[Triple] = frozenset()
+    why: str = ""
 
     def notes(self, nodes: Iterable[object] = ()) -> set[Triple]:
         """Return what is to be said of whom the statements are about, and of other nodes that stand for these."""
-        about = {*nodes, *(triple.subject for triple in self.statements)}
+        about = {*nodes, *(triple.subject for triple in self.statements)} if self.statements else ()
         return {Triple(node, CONTRADICTION, Literal(self.why)) for node in about if isinstance(node, NamedNode)}
 
 
 def contain(
-    clash: Contradiction,
-    common: AbstractSet[Triple],
-    premises: AbstractSet[Triple],
-    infer: Callable[[AbstractSet[Triple]], T],
+    common: AbstractSet[Triple], premises: AbstractSet[Triple], infer: Callable[[AbstractSet[Triple]], T]
 ) -> tuple[Aside, T]:
     """Return the statements that clash, and what `infer` concludes without them; it is told what to leave out.
 
     common: what is not to be doubted, the ontology. Raises Contradiction where nothing else clashes, or where there is
     no end of clashes.
     """
-    aside, reason = set[Triple](), str(clash)
-    for _ in range(_MOST_LOOKS):
+    aside, first = set[Triple](), None
+    for _ in range(1 + _MOST_LOOKS):
         try:
             inferred = infer(aside)
-        except Contradiction as more:
-            clashing = more.given - common - aside
+        except Contradiction as clash:
+            first = first or clash
+            clashing = clash.given - common - aside
             if not clashing:
                 raise
             aside |= clashing
         else:
             statements = frozenset(aside & premises)
-            return Aside(statements, _in_words(reason, statements)), inferred
-    raise clash
+            return (Aside() if first is None else Aside(statements, _in_words(str(first), statements))), inferred
+    assert first is not None
+    raise first
 
 
 def _in_words(reason: str, statements: AbstractSet[Triple]) -> str:
-    shown = sorted(f"{show(it.subject)} {show(it.predicate)} {show(it.object)}" for it in statements)
+    shown = sorted(map(say, statements))
     more = f" and {len(shown) - _MOST_NAMED} more" if len(shown) > _MOST_NAMED else ""
     return f"{reason.partition(': ')[0]}: {'; '.join(shown[:_MOST_NAMED])}{more}; nothing is concluded from these"

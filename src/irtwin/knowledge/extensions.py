@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 import rdflib
-from pyoxigraph import NamedNode, QuerySolutions, Store
+from pyoxigraph import NamedNode, Store
 from pyshacl.entrypoints import meta_validate
 from rdflib.namespace import SH
 from sqlalchemy import Engine
@@ -79,12 +79,6 @@ def sparql_fault(text: str) -> tuple[int, str] | None:
         line, said = next(found)
         return line, f"column {said.start() + 1}: SERVICE asks another server, which is not allowed here"
     return None
-
-
-def columns(text: str) -> tuple[str, ...]:
-    """Return what a query selects."""
-    answer = Store().query(text, base_iri=ID, prefixes=PREFIXES)
-    return tuple(it.value for it in answer.variables) if isinstance(answer, QuerySolutions) else ()
 
 
 def _check_ontology(file: Resource) -> None:

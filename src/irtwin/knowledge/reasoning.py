@@ -177,12 +177,10 @@ def _made_by(engine: str) -> Triple:
 
 def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from the ontology and all parts but the statements that contradict each other; note which these are."""
-    try:
-        return infer(ontology, premises)
-    except Contradiction as clash:
-        aside, inferred = contain(clash, ontology.triples, premises, partial(infer, ontology, premises))
+    aside, inferred = contain(ontology.triples, premises, partial(infer, ontology, premises))
+    if aside.statements:
         inferred.made_by = aside.notes(parts.robots_about(ontology, premises, aside.statements))
-        return inferred
+    return inferred
 
 
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclusions:

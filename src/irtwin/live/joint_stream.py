@@ -88,6 +88,15 @@ class StateReader:
         self._joints = {robot: tuple(names) for robot, names in joints.items()}
         self._orders: dict[tuple[str, tuple[str, ...]], tuple[int, ...]] = {}
 
+    def states(self, lines: Iterable[bytes]) -> Iterator[State | InputError]:
+        """Yield the state of each line that is not empty, or the error of one that says none."""
+        for line in lines:
+            if line.strip():
+                try:
+                    yield self.read(line)
+                except InputError as error:
+                    yield error
+
     def read(self, line: bytes) -> State:
         """Return the state that a line says. Raises InputError where it says none."""
         if len(line) > LONGEST_LINE:
@@ -136,15 +145,16 @@ class StateReader:
 
 
 def feed(
-    lines: Iterable[bytes], reader: StateReader, take: Callable[[State], None], refuse: Callable[[InputError], None]
+    states: Iterable[State | InputError], take: Callable[[State], None], refuse: Callable[[InputError], None]
 ) -> None:
-    """Give each line's state on; a line that says none is refused by its error and stops nothing."""
-    for line in lines:
-        if line.strip():
-            try:
-                take(reader.read(line))
-            except InputError as error:
-                refuse(error)
+    """Give each state on; what is none, or is not taken, is refused by its error and stops nothing."""
+    for state in states:
+        try:
+            if isinstance(state, InputError):
+                raise state
+            take(state)
+        except InputError as error:
+            refuse(error)
 
 
 def lines_of(stream: BinaryIO) -> Iterator[bytes]:

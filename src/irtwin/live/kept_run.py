@@ -15,8 +15,8 @@ from irtwin.providers.live_energy import KnownTwin, LiveEnergy
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import DamagedJournal, Header, left_behind, read_journal
-from irtwin.storage.rows import Tables, Values, values
-from irtwin.storage.schema import Activity, Base, Run, RunEnergy, relation_to
+from irtwin.storage.rows import Tables, Values, tables_of
+from irtwin.storage.schema import Activity, Run, RunEnergy, relation_to
 
 
 def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, announce: Announce) -> Tables:
@@ -109,12 +109,5 @@ def _keep_energy(place: Workspace, header: Header, watched: Values) -> Tables:
     activity_id = live_run.activities(header.run_id)[1]
     about = {**watched, "activity_id": activity_id, "provider": "energy"}
     place.replace_activity(Activity(**about), made.used, made.rows, made.series)
-    tables: Tables = {"activity": [about]}
-    tables["activity_use"] = [_use(activity_id, entity) for entity in sorted(set(made.used))]
-    for row in made.rows:
-        tables.setdefault(row.__tablename__, []).append(_values(row))
-    return tables
-
-
-def _values(row: Base) -> Values:
-    return {name: value for name, value in values(row).items() if value is not None}
+    uses = [_use(activity_id, entity) for entity in sorted(set(made.used))]
+    return {"activity": [about], "activity_use": uses, **tables_of(made.rows)}

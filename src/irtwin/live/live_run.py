@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from itertools import chain
 
 import numpy as np
@@ -14,6 +13,7 @@ import pyarrow as pa
 from irtwin.live.joint_stream import STREAMED, State
 from irtwin.providers.live_energy import watching
 from irtwin.providers.names import run_iri
+from irtwin.providers.provider import software
 from irtwin.signals.channels import CHANNELS, Signals, from_columns
 from irtwin.signals.motion import STILL_SHARE, STILL_SPEED
 from irtwin.storage.journal import Header
@@ -131,7 +131,7 @@ def activity(header: Header, activity_id: str, provider: str, began: float) -> V
         "provider": provider,
         "subject": run_iri(header.run_id),
         "started": moment_of(began),
-        "software": f"irtwin {version('irtwin')}",
+        "software": software(),
     }
 
 

@@ -9,7 +9,7 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, Quad, QuerySolutions, Triple
 
 from irtwin.knowledge.mapping import RowMapper, refresh
-from irtwin.knowledge.owl_rl.beside import Beside, Equality
+from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.rules.files import read_rules
@@ -71,7 +71,7 @@ class ShownRuns:
         run = NamedNode(self._graph.iri(run_iri(run_id)))
         ontology = self._ontology or Ontology.of(self._graph)
         try:
-            concluded = Beside(ontology.schema, {quad.triple for quad in quads}).worth_keeping()
+            concluded = FactsClosure(ontology.schema, {quad.triple for quad in quads}).worth_keeping()
         except (Contradiction, Equality):  # told by `irtwin run`, which sets aside what clashes
             return set()
         return set(in_graph((it for it in concluded if run in (it.subject, it.object)), GRAPH_OWL_RL))

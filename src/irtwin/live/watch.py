@@ -87,7 +87,7 @@ def watch(
     ):
         if robot is None:
             reader = StateReader(twin.robots.joints, twin.robots.names)
-            _read(lambda lines: feed(lines, reader, twin.receive, refusals.refuse), port, twin, done, announce)
+            _read(lambda it: feed(reader.states(it), twin.receive, refusals.refuse), port, twin, done, announce)
         else:
             robot_id = find_robot(place, robot)
             described = load_robot(place, robot_id)
@@ -107,7 +107,12 @@ def watch(
                 source = OpcUa(str(opcua), described, robot_id, nodes)
                 announce(f"Following {source.address}: {source.what}")
                 states = source.states(done, announce)
-            _receive(states, take, refusals.refuse, twin.check)
+
+            def refuse(error: InputError) -> None:
+                refusals.refuse(error)
+                twin.check()  # whether it was refused as nothing can be stored any more
+
+            feed(states, take, refuse)
     announce(f"{twin.stored} samples stored, {refusals.count} lines refused")
     announce(f"the graph skipped {twin.superseded} states for newer ones; the source waited for {twin.waited:.1f} s")
 
@@ -132,23 +137,6 @@ def _read(
         announce("Reading standard input" if actual is None else f"Listening on 127.0.0.1:{actual}")
         while not done.wait(0.2):
             twin.check()
-
-
-def _receive(
-    states: Iterable[State | InputError],
-    take: Callable[[State], None],
-    refuse: Callable[[InputError], None],
-    check: Callable[[], None],
-) -> None:
-    """Give each state on; what is none, or is not taken, is refused by its error."""
-    for state in states:
-        try:
-            if isinstance(state, InputError):
-                raise state
-            take(state)
-        except InputError as error:
-            refuse(error)
-            check()  # whether it was refused as nothing can be stored any more
 
 
 def _performing(take: Callable[[State], None], plan: str) -> Callable[[State], None]:

@@ -12,6 +12,7 @@ import scipy
 
 from irtwin.planning.timing import MotionLimits, States, Timed, Torque, along, shares
 from irtwin.robot.collision import CollisionModel
+from irtwin.signals.motion import trapezoid
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -198,8 +199,7 @@ class _Search:
 
     def _energy(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
         """Return the energy, J, and its slope over each sample's q, dq, ddq, from differences sample by sample."""
-        weights = np.gradient(self._time)
-        weights[[0, -1]] /= 2
+        weights = trapezoid(self._time)
         power = self._power(self._time, *states)
         slopes = [np.empty_like(state) for state in states]
         for order, joint, change in self._changes(lambda *moved: self._power(self._time, *moved), states):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.planning.programme import SectionedMotion
-from irtwin.signals.motion import Motion
-from irtwin.twin.price import Figure, balance, saving, trapezoid
+from irtwin.signals.motion import Motion, trapezoid
+from irtwin.twin.price import Figure, balance, saving
 from irtwin.twin.twin import Twin
 
 _WORTH = 1.0  # s: of a shorter pause nothing is said

@@ -214,14 +214,8 @@ def _run_energy(
         power_rmse_w=None if role.part == APART else judged.power_rmse,
         standby_energy_j=standby if twin.at_rest else None,
         standby_share=standby / whole.modelled_energy if twin.at_rest and whole.modelled_energy > 0 else None,
-        returned_energy_j=returned_energy(twin, motion),
+        returned_energy_j=twin.returned_energy(motion),
     )
-
-
-def returned_energy(twin: Twin, motion: Motion) -> float:
-    """Return the mechanical energy that the joints gave back while they braked, J, positive."""
-    given = np.maximum(-twin.joint_torque(motion) * motion.dq, 0.0)
-    return float(np.trapezoid(given.sum(axis=1), motion.time))
 
 
 def _per_joint(shares: Sequence[Share]) -> dict[str, float]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any
 
 from sqlalchemy import select
 
@@ -22,7 +20,7 @@ from irtwin.providers.gap_rows import Of
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
 from irtwin.providers.names import identifier, robot_iri
-from irtwin.providers.provider import Made, activity
+from irtwin.providers.provider import Made, activity, keep
 from irtwin.providers.records import inputs, rows_of
 from irtwin.signals.log import DataSet
 from irtwin.storage import gap_schema, schema
@@ -57,7 +55,7 @@ def record(
     row, parts, documents = _rows(robot_id, joints, runs, diagnosis, curves, twin, motion)
     used = inputs(workspace, robot_id, [run.run_id for run in runs])
     diagnosis_id = row.diagnosis_id
-    _keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)
+    keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)
     with workspace.reading() as session:
         return session.get_one(gap_schema.GapDiagnosis, diagnosis_id)
 
@@ -101,16 +99,10 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     known = robot_motions(workspace, robot_id)
     parts = split([motion for motion in known.motions.values() if motion.run in twin.fitted], known.repeats)
     parts = replace(parts, rule=f"{parts.rule}; which effects, a diagnosis of all these runs had said")
-    made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known, parts)
-    used = [*made.used, f"gap_diagnosis/{diagnosis.diagnosis_id}"]
-    twin_id = next(row.twin_id for row in made.rows if isinstance(row, schema.Twin))
-    _keep(workspace, "adoption", Made(robot_id, used, made.rows, documents=made.documents), started, "identification")
+    twin_id, made = twin_made(workspace, robot_id, identify(known.robot, parts.fit, twin.effects), known, parts)
+    adopted = replace(made, used=[*made.used, f"gap_diagnosis/{diagnosis.diagnosis_id}"])
+    keep(workspace, "adoption", adopted, started, instead_of="identification")
     return twin_id
-
-
-def _keep(workspace: Workspace, provider: str, made: Made, started: datetime, instead_of: str | None = None) -> None:
-    done = activity(provider, made.robot_id, robot_iri(made.robot_id), started)
-    workspace.replace_activity(done, made.used, made.rows, documents=made.documents, instead_of=instead_of)
 
 
 def _rows(
@@ -165,13 +157,4 @@ def _run_id(runs: Mapping[str, str], name: str) -> str:
 
 
 def _text(value: object) -> str:
-    return json.dumps(_finite(value), sort_keys=True, ensure_ascii=False, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    """Return the value with None for numbers that JSON does not have."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(one) for key, one in value.items()}
-    return [_finite(one) for one in value] if isinstance(value, list | tuple) else value
+    return json.dumps(value, sort_keys=True, ensure_ascii=False, allow_nan=False)

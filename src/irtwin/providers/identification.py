@@ -33,7 +33,7 @@ def provide(workspace: Workspace, robot_id: str) -> Made:
     known = robot_motions(workspace, robot_id)
     parts = split(known.own, known.repeats)
     twin = identified(fitted_data_set(workspace, robot_id, known, parts), parts.fit)
-    return twin_made(workspace, robot_id, twin, known, parts)
+    return twin_made(workspace, robot_id, twin, known, parts)[1]
 
 
 def fitted_data_set(workspace: Workspace, robot_id: str, known: RobotMotions, parts: Split) -> DataSet:
@@ -50,8 +50,8 @@ def _fitted(run: Run, until: float | None, names: set[str]) -> Run:
     return replace(run, signals=signals, repeat_of=run.repeat_of if run.repeat_of in names else None)
 
 
-def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotions, parts: Split) -> Made:
-    """Return the rows and the file of a robot's twin, which was fitted to `parts` of the known motions."""
+def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotions, parts: Split) -> tuple[str, Made]:
+    """Return the twin_id, rows and file of a robot's twin, which was fitted to `parts` of the known motions."""
     keys = known.keys
     stored = stored_data_set(workspace, robot_id, twin.robot)
     twin = replace(twin, torque_scale=torque_scale(stored, parts.fit, twin.joint_torque))
@@ -72,7 +72,7 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
         torque_scale_uncertainty=twin.torque_scale and twin.torque_scale.uncertainty,
         torque_scale_why=twin.torque_scale and twin.torque_scale.why,
     )
-    return Made(
+    return twin_id, Made(
         robot_id=robot_id,
         used=inputs(workspace, robot_id, keys.values()),
         rows=[

@@ -20,8 +20,8 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.identification.validation import FIT_SHARE, Split
 from irtwin.providers.identification import fitted_data_set, twin_made
 from irtwin.providers.motions import RobotMotions, robot_motions
-from irtwin.providers.names import robot_iri, twin_iri
-from irtwin.providers.provider import Made, activity
+from irtwin.providers.names import twin_iri
+from irtwin.providers.provider import Made, keep
 from irtwin.providers.records import inputs, load_twin
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
@@ -95,7 +95,8 @@ def improve(
             effects = None if diagnosis.twin is None else diagnosis.twin.effects
             if effects is not None and effects != loop.best.twin.effects:
                 loop.try_out(_DIAGNOSED, lambda: fit(effects), parts)
-    _keep_twin(workspace, robot_id, known, loop.best)
+    _, made = twin_made(workspace, robot_id, loop.best.twin, known, loop.best.parts)  # the parts that runs now take
+    keep(workspace, "identification", made, datetime.now(UTC), instead_of="adoption")
     return Improved(tuple(loop.rounds), loop.within)
 
 
@@ -121,7 +122,7 @@ class _Loop:
         started = datetime.now(UTC)
         self.announce(f"  fitting the {tried}")
         twin = fit()
-        fitted = _Twin(_made(self.workspace, self.robot_id, self.known, twin, parts)[0], twin, parts)
+        fitted = _Twin(twin_made(self.workspace, self.robot_id, twin, self.known, parts)[0], twin, parts)
         before, after = _worst(self.best.twin, parts.held_out), _worst(twin, parts.held_out)
         earlier = self.best.twin_id
         if after < before:
@@ -135,8 +136,7 @@ class _Loop:
         read = {motion.run for motion in (*parts.fit, *parts.held_out)}
         run_ids = [run_id for name, run_id in self.known.keys.items() if name in read]
         used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
-        done = activity("improvement", self.robot_id, f"{_ROUNDS}{row.round_id}", started)
-        self.workspace.replace_activity(done, used, [row])
+        keep(self.workspace, "improvement", Made(self.robot_id, used, [row]), started, f"{_ROUNDS}{row.round_id}")
 
     def _row(self, tried: Round, earlier: str, fitted: _Twin) -> schema.ImprovementRound:
         of_robot = schema.ImprovementRound.robot_id == self.robot_id
@@ -198,15 +198,3 @@ def _worst(twin: Twin, motions: Sequence[Motion]) -> float:
     if not errors:
         raise InputError(f"{twin.robot.name}: no run outside the fit has measured power to judge by; log power")
     return max(errors)
-
-
-def _made(workspace: Workspace, robot_id: str, known: RobotMotions, twin: Twin, parts: Split) -> tuple[str, Made]:
-    made = twin_made(workspace, robot_id, twin, known, parts)
-    return next(row.twin_id for row in made.rows if isinstance(row, schema.Twin)), made
-
-
-def _keep_twin(workspace: Workspace, robot_id: str, known: RobotMotions, best: _Twin) -> None:
-    """Make a twin the robot's, with the parts that runs now take in it."""
-    _, made = _made(workspace, robot_id, known, best.twin, best.parts)
-    done = activity("identification", robot_id, robot_iri(robot_id), datetime.now(UTC))
-    workspace.replace_activity(done, made.used, made.rows, documents=made.documents, instead_of="adoption")

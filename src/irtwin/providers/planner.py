@@ -11,9 +11,8 @@ from irtwin.identification.progress import track
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import shorten
-from irtwin.providers.provider import activity, load_provider, software_of
+from irtwin.providers.provider import keep, load_provider, software_of
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import METER
 
 _READY_FOR = "https://w3id.org/irtwin/rules/ready_for"
 
@@ -124,10 +123,7 @@ def _provide(workspace: Workspace, graph: KnowledgeGraph, name: str, subject: st
     below = subject.removeprefix(graph.base)
     kind, _, key = below.partition("/")
     made = provide(workspace, key if kind in ("robot", "run") else below)
-    worked = activity(name, made.robot_id, below, started, package)
-    meter = activity(METER, made.robot_id, below, started, package)
-    metered = (meter, made.metered) if made.metered else None
-    workspace.replace_activity(worked, made.used, made.rows, made.series, made.documents, metered=metered)
+    keep(workspace, name, made, started, below, package)
 
 
 def _robot_id(graph: KnowledgeGraph, subject: str) -> str:

@@ -11,8 +11,9 @@ from importlib.metadata import EntryPoint, entry_points, version
 import pyarrow as pa
 
 from irtwin.errors import InputError
+from irtwin.providers.names import robot_iri
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Activity, Base
+from irtwin.storage.schema import METER, Activity, Base
 
 GROUP = "irtwin.providers"
 
@@ -71,6 +72,25 @@ def activity(provider: str, robot_id: str, subject: str, started: datetime, by: 
         ended=datetime.now(UTC),
         software=by or software(),
     )
+
+
+def keep(
+    workspace: Workspace,
+    provider: str,
+    made: Made,
+    started: datetime,
+    subject: str | None = None,
+    by: str | None = None,
+    instead_of: str | None = None,
+) -> None:
+    """Keep what a provider made, in place of what it, or the provider `instead_of`, made of the same subject.
+
+    subject: its IRI below the base, the robot's if None; by: as of `activity`.
+    """
+    of = made.robot_id, subject or robot_iri(made.robot_id), started, by
+    metered = (activity(METER, *of), made.metered) if made.metered else None
+    result = made.used, made.rows, made.series, made.documents
+    workspace.replace_activity(activity(provider, *of), *result, instead_of=instead_of, metered=metered)
 
 
 @cache  # all installed packages are looked through: as long as a small run takes in a provider

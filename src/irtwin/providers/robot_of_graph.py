@@ -12,8 +12,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure, Three
-from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_text import urdf_text
+from irtwin.robot.urdf_text import robot_of
 
 Row = Mapping[str, Any]
 
@@ -75,12 +74,9 @@ def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
     )
     name = of_robot[0]["name"]
     moving = [_joint(row) for row in joints if row["axis_x"] is not None]
-    robot = parse_urdf(urdf_text(name, structure, moving), source=f"{name} in the graph")
-    accelerations = {row["name"]: row["acceleration"] for row in joints}  # of these a URDF has no word
     return replace(
-        robot,
+        robot_of(name, structure, moving, f"{name} in the graph"),
         name=name,
-        joints=tuple(replace(joint, acceleration=accelerations[joint.name]) for joint in robot.joints),
         manufacturer=of_robot[0]["manufacturer"],
         type=of_robot[0]["type"],
         weight=of_robot[0]["weight"],
@@ -102,7 +98,8 @@ def _joint(row: Row) -> Joint:
         return otherwise if row[key] is None else float(row[key])
 
     lower, upper = value("lower", -np.inf), value("upper", np.inf)
-    return Joint(row["name"], row["kind"], lower, upper, value("velocity", np.inf), value("effort", np.inf))
+    most = value("velocity", np.inf), value("effort", np.inf), row["acceleration"]
+    return Joint(row["name"], row["kind"], lower, upper, *most)
 
 
 def _solid(row: Row) -> Solid:

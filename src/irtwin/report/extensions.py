@@ -9,6 +9,7 @@ import jinja2
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge import extensions
+from irtwin.knowledge.questions.queries import columns_of
 from irtwin.report.questions import read_questions
 from irtwin.report.templates import environment
 from irtwin.resources import MOST_BYTES, Files, Resource, Resources, shipped
@@ -52,7 +53,7 @@ def _check_question(file: Resource, bound: set[str]) -> None:
         ((replaced,),) = (
             read_questions([one.path]).values() for one in shipped().of("reports") if one.name == file.name
         )
-        lost = set(extensions.columns(replaced.text)) - set(extensions.columns(question.text))
+        lost = set(columns_of(replaced.text)) - set(columns_of(question.text))
         if lost:
             raise InputError(f"{file.path}: does not select ?{min(lost)}, which the page takes from what it replaces")
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from irtwin.input_file import read_text
 from irtwin.report.wording import local_name
-from irtwin.resources import MOST_BYTES, Resources
+from irtwin.resources import MOST_BYTES, Resource, Resources
 
 Row = Mapping[str, Any]  # a variable's Python value, None where it is unbound
 
@@ -52,13 +52,16 @@ Answers = Mapping[str, Answer]
 
 def questions_of(resources: Resources, report: str) -> dict[str, PageQuestion]:
     """Return the questions of a report, by file stem."""
-    return read_questions(file.path for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/"))
+    return read_questions(file.path for file in _files(resources, report))
 
 
 def added_to(resources: Resources, report: str) -> list[str]:
     """Return the names of a report's questions that do not ship, so that its page has no place of theirs."""
-    files = [file for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/")]
-    return [file.path.stem for file in files if file.is_extension and not file.replaces]
+    return [file.path.stem for file in _files(resources, report) if file.is_extension and not file.replaces]
+
+
+def _files(resources: Resources, report: str) -> list[Resource]:
+    return [file for file in resources.of("reports", ".rq") if file.name.startswith(f"{report}/")]
 
 
 def read_questions(files: Iterable[Path]) -> dict[str, PageQuestion]:

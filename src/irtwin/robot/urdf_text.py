@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from irtwin.robot.description import Joint
+from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import MOMENTS, Body, Connection, Origin, Solid, Structure
+from irtwin.robot.urdf import parse_urdf
 from irtwin.robot.xml_elements import words
 
 
@@ -22,6 +24,16 @@ def urdf_text(name: str, structure: Structure, joints: Iterable[Joint]) -> str:
         _joint(root, connection, limits.get(connection.name))
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
+
+
+def robot_of(name: str, structure: Structure, joints: Iterable[Joint], source: str) -> Robot:
+    """Return the robot of a structure with its moving joints; `source` names it in messages. Raises InputError."""
+    moving = list(joints)
+    robot = parse_urdf(urdf_text(name, structure, moving), source)
+    accelerations = {joint.name: joint.acceleration for joint in moving}  # of these a URDF has no word
+    return replace(
+        robot, joints=tuple(replace(joint, acceleration=accelerations[joint.name]) for joint in robot.joints)
+    )
 
 
 def _link(root: Element, body: Body, solids: Sequence[Solid]) -> None:

@@ -9,19 +9,17 @@ from dataclasses import dataclass, replace
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.ros_names import ros_joints, ros_names
 from irtwin.robot.structure import Body, Connection, Solid, Structure, structure_of
-from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_text import urdf_text
+from irtwin.robot.urdf_text import robot_of
 
 _FAR = 1000.0  # m: limits of a joint that slides without any
 
 
 @dataclass(frozen=True)
 class Described:
-    """A robot under ROS' names, its structure, its URDF, and a line for each thing that had to be changed."""
+    """A robot under ROS' names, its structure, and a line for each thing that had to be changed."""
 
     robot: Robot
     structure: Structure
-    urdf: str
     said: tuple[str, ...]
 
 
@@ -43,17 +41,10 @@ def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Descri
         tuple(_solid(solid, links, meshes) for solid in structure.solids),
     )
     moved = [_limited(replace(joint, name=joints[joint.name])) for joint in robot.joints]
-    text = urdf_text(name, renamed, moved)
-    accelerations = {joint.name: joint.acceleration for joint in moved}
-    again = parse_urdf(text, source=f"{robot.name} for ROS")
-    again = replace(
-        again,
-        manufacturer=robot.manufacturer,
-        joints=tuple(replace(joint, acceleration=accelerations[joint.name]) for joint in again.joints),
-    )
+    again = replace(robot_of(name, renamed, moved, f"{robot.name} for ROS"), manufacturer=robot.manufacturer)
     changed = [("robot", {robot.name: name}), ("joint", joints), ("link", links)]
     said = [f'{what} "{old}" is {new} in ROS' for what, names in changed for old, new in names.items() if old != new]
-    return Described(again, renamed, text, (*said, *_changes(robot), *_meshes(structure, meshes)))
+    return Described(again, renamed, (*said, *_changes(robot), *_meshes(structure, meshes)))
 
 
 def _fixed(structure: Structure, moving: dict[str, str]) -> dict[str, str]:

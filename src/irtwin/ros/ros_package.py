@@ -59,7 +59,7 @@ def write_package(robot: Robot, folder: Path, meshes: Mapping[str, bytes] | None
     }
     for mesh, place in places.items():
         write(folder / place, contents[mesh])
-    write(folder / "urdf" / f"{made.robot.name}.urdf", made.urdf.encode())
+    write(folder / "urdf" / f"{made.robot.name}.urdf", made.robot.urdf.encode())
     for place, template in _files(made.robot.name).items():
         write(folder / place, _templates().get_template(template).render(said).encode())
     return [*made.said, *_unchecked(model)]

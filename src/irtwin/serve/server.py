@@ -124,7 +124,7 @@ def _base(location: Location) -> str:
         graph = current(False)
         if knows and not graph.graphs(GRAPH_SOURCE):
             raise InputError(
-                f"{graph.shown}: the graph is empty, though the database knows of robots; "
+                f"{graph.store.shown}: the graph is empty, though the database knows of robots; "
                 f"`irtwin workspace repair --workspace {location.folder}` with the same --database and --graph fills it"
             )
         return graph.base

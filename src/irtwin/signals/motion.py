@@ -54,6 +54,12 @@ class Motion(Signals):
         return Motion(time, q, dq, ddq, run=self.run, payload_mass=self.payload_mass, payload_com=self.payload_com)
 
 
+def trapezoid(time: np.ndarray) -> np.ndarray:
+    """Return the weights of the trapezoidal rule, (N,) s."""
+    steps = np.diff(time)
+    return np.asarray((np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / 2)
+
+
 def standstill(motion: Motion) -> np.ndarray:
     """Return where no joint moves, (N,) bool."""
     speed = np.abs(motion.dq)

@@ -19,7 +19,7 @@ _MOST = 500  # links, base to flange: MuJoCo goes down the tree by recursion
 
 
 @dataclass(frozen=True)
-class Link:
+class ModelLink:
     """A body: kg, its centre (3,), m, and the inertia (3, 3) about that, kg m^2, in its own axes.
 
     `place` (4, 4): where it is in the world, if no joint moves it. `frames`: points (3,) of it that have a name.
@@ -34,7 +34,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Connection:
+class ModelJoint:
     """A joint: "revolute", "prismatic" or "fixed"; rad, N m and the like, or m and N.
 
     `origin` (4, 4): the child in its parent, the joint at zero; `anchor` and `axis` (3,) in the child. `numbers`: those
@@ -54,7 +54,7 @@ class Connection:
     servo: tuple[float, float] | None = None
 
 
-def assembled(links: Iterable[Link], connections: Sequence[Connection], gravity: np.ndarray) -> mujoco.MjSpec:
+def assembled(links: Iterable[ModelLink], connections: Sequence[ModelJoint], gravity: np.ndarray) -> mujoco.MjSpec:
     """Return the specification of links; those that no joint connects to another stand fixed in the world.
 
     gravity: (3,) m/s^2. Raises ValueError, saying why, where joints make no tree, or a number is not finite.
@@ -64,7 +64,7 @@ def assembled(links: Iterable[Link], connections: Sequence[Connection], gravity:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
-    above: dict[str, Connection] = {}
+    above: dict[str, ModelJoint] = {}
     for one in connections:
         _check_finite(
             f'joint "{one.name}"', one.origin, one.anchor, one.axis, *one.numbers.values(), *(one.servo or ())
@@ -72,7 +72,7 @@ def assembled(links: Iterable[Link], connections: Sequence[Connection], gravity:
         if one.child in above:
             raise ValueError(f'link "{one.child}" is the child of two joints, {above[one.child].name} and {one.name}')
         above[one.child] = one
-    below: dict[str, list[Link]] = {}
+    below: dict[str, list[ModelLink]] = {}
     for link in links:
         _check_finite(f'link "{link.name}"', link.place, link.mass, link.centre, link.inertia)
         below.setdefault(above[link.name].parent if link.name in above else WORLD, []).append(link)
@@ -96,7 +96,7 @@ def _check_finite(what: str, *values: np.ndarray | float) -> None:
         raise ValueError(f"{what} has a number that is not finite")
 
 
-def _body(parent: mujoco.MjsBody, link: Link, joint: Connection | None) -> mujoco.MjsBody:
+def _body(parent: mujoco.MjsBody, link: ModelLink, joint: ModelJoint | None) -> mujoco.MjsBody:
     place = link.place if joint is None else joint.origin
     body = parent.add_body(name=link.name, pos=place[:3, 3], quat=_quaternion(place))
     if link.mass:
@@ -109,7 +109,7 @@ def _body(parent: mujoco.MjsBody, link: Link, joint: Connection | None) -> mujoc
     return body
 
 
-def _joint(body: mujoco.MjsBody, one: Connection) -> None:
+def _joint(body: mujoco.MjsBody, one: ModelJoint) -> None:
     import mujoco
 
     kind = mujoco.mjtJoint.mjJNT_SLIDE if one.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE

@@ -86,13 +86,13 @@ class _Torque:
         joints, _ = joints_of(model, twin.robot.joint_names, _MODEL)
         self._q, self._dq = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self._stack = Stack(twin.robot, known)
-        self._values = np.array([twin.value(effect.id, term) for effect, term in self._stack.torque_terms])
+        self._values = twin.values(self._stack.torque_terms)
         for (effect, term), value in zip(self._stack.torque_terms, self._values, strict=True):
             if number := effect.in_mjcf.get(term.name):
                 getattr(model, f"dof_{number}")[self._dq[twin.robot.index(str(term.joint))]] = max(value, 0.0)
         self._within = [effect for effect in rest if isinstance(effect, JointEffect)]
         self._across = [effect for effect in rest if not isinstance(effect, JointEffect)]
-        rubs = [twin.robot.index(one.name) for effect in self._within for one in effect.acting(twin.robot)]
+        rubs = [place for effect in self._within for place in effect.places(twin.robot)]
         friction = model.dof_frictionloss
         friction[self._dq[rubs]] = np.maximum(friction[self._dq[rubs]], _LEAST)
 

@@ -13,7 +13,7 @@ from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
 from irtwin.simulator.model import Model
 from irtwin.simulator.servos import NAMES, Servos
-from irtwin.simulator.variant import Variant
+from irtwin.simulator.variant import PlayedModel
 
 if TYPE_CHECKING:
     import mujoco
@@ -157,7 +157,7 @@ def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Play
 
 
 def _played(
-    servos: Servos, variant: Variant, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]
+    servos: Servos, variant: PlayedModel, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]
 ) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     import mujoco
@@ -212,7 +212,7 @@ def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(time, times, each) for each in values.T])
 
 
-def _efforts(variant: Variant) -> np.ndarray:
+def _efforts(variant: PlayedModel) -> np.ndarray:
     """Return where among the sensors' values are the torques of the joints' actuators (n,)."""
     import mujoco
 
@@ -226,7 +226,12 @@ def _efforts(variant: Variant) -> np.ndarray:
 
 
 def _state(
-    servos: Servos, variant: Variant, compiled: mujoco.MjModel, stretch: PlayedStretch, size: int, on_links: np.ndarray
+    servos: Servos,
+    variant: PlayedModel,
+    compiled: mujoco.MjModel,
+    stretch: PlayedStretch,
+    size: int,
+    on_links: np.ndarray,
 ) -> np.ndarray:
     """Return the state of a variant with numbers: time, positions, speeds, then what its actuators remember.
 

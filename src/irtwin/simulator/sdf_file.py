@@ -22,7 +22,7 @@ from irtwin.identification.progress import tell
 from irtwin.robot.structure import inertia_of
 from irtwin.robot.xml_elements import Element as XmlElement
 from irtwin.robot.xml_elements import numbers, outermost, with_child
-from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
+from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.model_file import Changes, ModelFile
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def _controllers(within: Element) -> Iterator[Element]:
     return (one for one in within.iter("plugin") if _is_controller(one.get("name", "")))
 
 
-def _driven(joint: Connection, controller: Element, source: str) -> Connection:
+def _driven(joint: ModelJoint, controller: Element, source: str) -> ModelJoint:
     """Return a joint with its controller as its servo; one that sets speeds is none."""
     where = f'{source}: controller of joint "{joint.name}"'
     stiffness, damping, most = (_number(controller, name, value, where) for name, value in _BY_ITSELF.items())
@@ -214,7 +214,7 @@ def _pose(element: Element, where: str) -> np.ndarray:
     return np.asarray(pin.SE3(pin.rpy.rpyToMatrix(angles), np.array(xyz)).homogeneous)
 
 
-def _link(link: Element, frames: _Frames, source: str) -> Link:
+def _link(link: Element, frames: _Frames, source: str) -> ModelLink:
     name = str(link.get("name"))
     where, place = f'{source}: link "{name}"', frames.place(name)
     inertial = link.find("inertial")
@@ -225,7 +225,7 @@ def _link(link: Element, frames: _Frames, source: str) -> Link:
     turn = within[:3, :3]
     six = [_number(body, f"inertia/i{axes}", float(axes[0] == axes[1]), where) for axes in _SIX]
     own = np.linalg.inv(place)
-    return Link(
+    return ModelLink(
         name,
         place,
         _number(body, "mass", 1.0, where),
@@ -235,7 +235,7 @@ def _link(link: Element, frames: _Frames, source: str) -> Link:
     )
 
 
-def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> Connection:
+def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> ModelJoint:
     name, kind = str(joint.get("name")), str(joint.get("type"))
     where = f'{source}: joint "{name}"'
     if kind not in _KINDS:
@@ -247,7 +247,7 @@ def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> Conn
     origin = np.linalg.inv(beside) @ place
     axis = joint.find("axis")
     if axis is None or kind == "fixed":
-        return Connection(name, "fixed", parent, child, origin, within[:3, 3], np.array([0.0, 0.0, 1.0]))
+        return ModelJoint(name, "fixed", parent, child, origin, within[:3, 3], np.array([0.0, 0.0, 1.0]))
     xyz = axis.find("xyz")
     said = None if xyz is None else xyz.get("expressed_in")
     of_model = axis.findtext("use_parent_model_frame", str(of_model)).strip().lower() in ("true", "1")
@@ -257,7 +257,7 @@ def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> Conn
         _number(axis, f"limit/{end}", end_of, where) for end, end_of in (("lower", -np.inf), ("upper", np.inf))
     )
     effort = _number(axis, "limit/effort", np.inf, where)
-    return Connection(
+    return ModelJoint(
         name,
         _KINDS[kind],
         parent,

@@ -15,7 +15,7 @@ from irtwin.errors import InputError
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.model import Model
 from irtwin.simulator.payload import load, loaded_tag
-from irtwin.simulator.variant import Variant, variant
+from irtwin.simulator.variant import PlayedModel, variant
 
 if TYPE_CHECKING:
     import mujoco
@@ -69,7 +69,7 @@ class Servos:
     actuators: np.ndarray  # (n,)
     numbers: np.ndarray  # (k, n), the model's own
     scale: np.ndarray  # (k, n), below which a number is as good as zero
-    variants: dict[tuple[bool, tuple[str, ...]], Variant] = field(default_factory=dict)
+    variants: dict[tuple[bool, tuple[str, ...]], PlayedModel] = field(default_factory=dict)
 
     def chart(self, numbers: np.ndarray) -> np.ndarray:
         """Return numbers (..., k, n) in coordinates in which equal steps matter alike: logarithms, but near zero.
@@ -142,7 +142,7 @@ class Servos:
         """Return whether positions of joints (n,) are measured at their links."""
         return np.asarray(numbers[_SOFT[1]] > 0)
 
-    def variant(self, needs: tuple[bool, tuple[str, ...]]) -> Variant:
+    def variant(self, needs: tuple[bool, tuple[str, ...]]) -> PlayedModel:
         """Return the model with dead bands, and soft joints, that numbers need."""
         if needs not in self.variants:
             self.variants[needs] = variant(self.model, *needs)
@@ -155,7 +155,7 @@ class Servos:
         changed = torque_limit != self.numbers[NAMES.index("torque_limit")]
         return np.array([np.where(changed, side * torque_limit, end) for side, end in zip((-1, 1), own, strict=True)])
 
-    def compiled(self, numbers: np.ndarray, of: Variant) -> mujoco.MjModel:
+    def compiled(self, numbers: np.ndarray, of: PlayedModel) -> mujoco.MjModel:
         """Return a variant of the model with numbers (k, n) of its own; offset and delay are the commands' to have."""
         import mujoco
 

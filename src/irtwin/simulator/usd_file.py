@@ -18,7 +18,7 @@ import scipy
 from irtwin.errors import InputError
 from irtwin.input_file import read_input, real_path
 from irtwin.robot.xml_elements import Element
-from irtwin.simulator.assembly import WORLD, Connection, Link, assembled
+from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.model_file import Changes, ModelFile
 from irtwin.simulator.usd_package import PACKAGE, check_package, new_name, packed
 
@@ -283,7 +283,7 @@ def _end(file: UsdFile, prim: Any, end: int) -> tuple[str, np.ndarray]:
     return str(body.GetPath()), np.linalg.inv(_world(file, body)[0]) @ frame
 
 
-def _connection(file: UsdFile, prim: Any) -> Connection | None:
+def _connection(file: UsdFile, prim: Any) -> ModelJoint | None:
     (parent, above), (child, below) = _end(file, prim, 0), _end(file, prim, 1)
     kind = _KINDS.get(prim.GetTypeName())
     if kind is None:
@@ -296,7 +296,7 @@ def _connection(file: UsdFile, prim: Any) -> Connection | None:
         (parent, above), (child, below) = (child, below), (parent, above)
     origin = above @ np.linalg.inv(below)
     if child == WORLD or kind == "fixed":
-        fixed = Connection(_name(prim), "fixed", parent, child, origin, below[:3, 3], below[:3, 2])
+        fixed = ModelJoint(_name(prim), "fixed", parent, child, origin, below[:3, 3], below[:3, 2])
         return None if child == WORLD else fixed
     along = prim.GetAttribute("physics:axis").Get()
     if along not in tuple("XYZ"):
@@ -305,7 +305,7 @@ def _connection(file: UsdFile, prim: Any) -> Connection | None:
     unit = 1 / _DEGREES if kind == "revolute" else file.units[0]
     lower, upper = (unit * prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper"))
     servo, effort = _servo(file, prim, kind)
-    return Connection(
+    return ModelJoint(
         _name(prim),
         kind,
         parent,
@@ -340,7 +340,7 @@ def _servo(file: UsdFile, prim: Any, kind: str) -> tuple[tuple[float, float] | N
     return ((stiffness, damping) if stiffness > 0 and is_force else None), limit
 
 
-def _link(file: UsdFile, prim: Any, moves: bool) -> Link:
+def _link(file: UsdFile, prim: Any, moves: bool) -> ModelLink:
     from pxr import UsdPhysics
 
     place, stretch = _world(file, prim)
@@ -355,11 +355,11 @@ def _link(file: UsdFile, prim: Any, moves: bool) -> Link:
                 f"{file.path}: {name} takes its mass from its shapes; give it physics:mass, physics:centerOfMass and "
                 "physics:diagonalInertia"
             )
-        return Link(name, place)
+        return ModelLink(name, place)
     length, unit = file.units
     turn = _frame((0, 0, 0), own.GetPrincipalAxesAttr().Get(), stretch)[:3, :3]
     inertia = turn * np.array(moments) @ turn.T * unit * length**2
-    return Link(name, place, mass * unit, np.array(centre) * stretch, inertia)
+    return ModelLink(name, place, mass * unit, np.array(centre) * stretch, inertia)
 
 
 def _has_shapes(body: Any) -> bool:

@@ -19,7 +19,7 @@ _FIRMEST = 0.9999  # impedance that MuJoCo takes
 
 
 @dataclass(frozen=True)
-class Variant:
+class PlayedModel:
     """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
 
     `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `soft`: places
@@ -72,7 +72,7 @@ class Variant:
         one.dof_solimp[dof, :2] = ends.T
 
 
-def variant(model: Model, banded: bool, soft: Sequence[str]) -> Variant:
+def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
     """Return a model with second actuators where dead bands are played, and with joints soft behind their motors."""
 
     def add(spec: mujoco.MjSpec) -> None:
@@ -87,7 +87,7 @@ def variant(model: Model, banded: bool, soft: Sequence[str]) -> Variant:
     joints = [compiled.joint(joint).id for joint in model.joints]
     places = [model.joints.index(joint) for joint in soft]
     at = (np.array(one, dtype=int) for one in (joints, second, places, behind))
-    return Variant(model, compiled, *at)
+    return PlayedModel(model, compiled, *at)
 
 
 def _add_second(spec: mujoco.MjSpec, joint: str) -> None:

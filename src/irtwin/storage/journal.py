@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from irtwin.json_text import parse_json
-from irtwin.storage.files import InsidePath, inside
+from irtwin.storage.files import InsidePath, inside, is_locked
 from irtwin.storage.schema import LIVE_RUN, WATCHED_RUNS
 
 _ENDING = ".journal"
@@ -102,13 +102,7 @@ def of_robot(folder: Path, robot_id: str) -> list[InsidePath]:
 
 def left_behind(folder: Path) -> Iterator[InsidePath]:
     """Yield the journals that nobody writes: those of processes that crashed."""
-    for path in _all(folder):
-        with path.open("rb") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # several may look at once
-            except BlockingIOError:
-                continue
-        yield path
+    yield from (path for path in _all(folder) if not is_locked(path))
 
 
 def _all(folder: Path) -> list[InsidePath]:

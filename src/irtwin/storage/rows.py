@@ -91,10 +91,15 @@ def part_tables() -> list[Table]:
 
 def insert_rows(session: Session, rows: Iterable[Base]) -> None:
     """Insert rows, those first that others refer to."""
+    insert_values(session, tables_of(rows))
+
+
+def tables_of(rows: Iterable[Base]) -> Tables:
+    """Return the values of rows, table by table."""
     by_table: Tables = {}
     for row in rows:
         by_table.setdefault(row.__tablename__, []).append(values(row))
-    insert_values(session, by_table)
+    return by_table
 
 
 def insert_values(session: Session, rows: Tables) -> None:

@@ -17,7 +17,7 @@ from sqlalchemy import Engine, text
 
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.storage import engine as engines
-from irtwin.storage.files import inside
+from irtwin.storage.files import inside, is_locked
 
 _KEY = 0x6972746772  # "irtgr": the advisory lock on PostgreSQL, beside that of writers of rows
 _FILE = ".graph.turn"
@@ -46,16 +46,7 @@ def rewriting_alone(engine: Engine, folder: Path) -> Iterator[None]:
 
 def is_rewritten(folder: Path) -> bool:
     """Whether some process rewrites the graph of the workspace in `folder` just now."""
-    try:
-        file = open(inside(folder, _FILE), "rb", opener=_at_once)  # noqa: SIM115
-    except FileNotFoundError:
-        return False
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
+    return is_locked(inside(folder, _FILE))
 
 
 def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:

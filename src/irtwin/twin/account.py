@@ -10,8 +10,8 @@ import numpy as np
 
 from irtwin.effects.effect import NORMAL, JointEffect
 from irtwin.identification.power_line import power_rise, power_slope, rise_over_axes
-from irtwin.signals.motion import Motion
-from irtwin.twin.price import cost, trapezoid
+from irtwin.signals.motion import Motion, trapezoid
+from irtwin.twin.price import cost
 from irtwin.twin.twin import LedgerEntry, Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
@@ -133,13 +133,7 @@ def _slopes(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.nda
         for row, torque, power in chain(_of_losses(about, rows), _of_burnt(about, rows)):
             over_torque[row] += torque
             over_power[row] += power
-    places = {(each.effect, each.joint, each.link, each.name): place for place, each in enumerate(twin.parameters)}
-    slopes = np.zeros((len(ledger), len(places)))
-    for terms, over in ((stack.torque_terms, over_torque), (stack.power_terms, over_power)):
-        for k, (effect, term) in enumerate(terms):
-            if not term.fixed:
-                slopes[:, places[effect.id, term.joint, term.link, term.name]] += over[:, k]
-    return slopes
+    return twin.over_parameters(over_torque, over_power)
 
 
 @dataclass(frozen=True)
@@ -161,9 +155,7 @@ class _About:
     @classmethod
     def of(cls, twin: Twin, piece: Motion, weights: np.ndarray) -> _About:
         stack = twin.stack
-        of_torque, of_power = (
-            np.array([twin.value(e.id, t) for e, t in terms]) for terms in (stack.torque_terms, stack.power_terms)
-        )
+        of_torque, of_power = twin.torque_values, twin.power_values
         columns, torque = stack.torque_columns(piece, of_torque), stack.real_torque(piece, of_torque)
         flows = stack.predicted_power_columns(piece, of_torque, of_power, torque)
         return cls(twin, piece, weights, of_power, columns, torque, flows)
@@ -207,7 +199,7 @@ def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
         row = rows.get((effect.id, None))
         if row is None or effect.needs != "power" or effect.memory:
             continue
-        own = np.array([about.twin.value(effect.id, term) for term in effect.terms(about.twin.robot)])
+        own = about.twin.values((effect, term) for term in effect.terms(about.twin.robot))
         rise = about.weights * rise_over_axes(stack, effect, piece, about.torque, axes, own)
         over_torque = rise[:, None] * power_slope(stack, piece, about.torque, on_bus)
         torque = np.einsum("tj,tjk->k", over_torque, about.columns) * stack.real

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,40 +89,19 @@ def load(path: Path) -> Twin:
 def to_json(twin: Twin) -> str:
     """Return a twin as JSON text: the same twin, the same text."""
     robot, sheet = twin.robot, [each.name for each in fields(_Sheet)]
-    document = {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "robot": {
-            "name": robot.name,
-            "manufacturer": robot.manufacturer,
-            "type": robot.type,
-            "weight": robot.weight,
-            "joints": {joint.name: {key: getattr(joint, key) for key in sheet} for joint in robot.joints},
-            "urdf": robot.urdf,
-        },
-        "effects": [_effect_document(effect) for effect in twin.stack.effects],
-        "unidentified": list(twin.unidentified),
-        "fitted": list(twin.fitted),
-        "cutoff": twin.cutoff,
-        "condition_number": twin.condition_number,
-        "parameters": [asdict(parameter) for parameter in twin.parameters],
-        "base_parameters": [asdict(parameter) for parameter in twin.base_parameters],
-    }
+    sheets = {joint.name: _Sheet(*(getattr(joint, key) for key in sheet)) for joint in robot.joints}
+    said = {each.name: getattr(twin, each.name) for each in fields(_Twin) if each.name not in ("robot", "covariance")}
     if twin.covariance is not None:
-        document["covariance"] = [" ".join(map(repr, row[: k + 1])) for k, row in enumerate(twin.covariance.tolist())]
-    if twin.torque_scale is not None:
-        document["torque_scale"] = asdict(twin.torque_scale)
-    if twin.body_change is not None:
-        document["body_change"] = twin.body_change
-    if twin.quantities:
-        document["quantities"] = [asdict(quantity) for quantity in twin.quantities]
-    if twin.remainder is not None:
-        document["remainder"] = asdict(twin.remainder)
-    if twin.choices:
-        document["choices"] = [asdict(choice) for choice in twin.choices]
-    if twin.odd_stretches:
-        document["odd_stretches"] = [asdict(stretch) for stretch in twin.odd_stretches]
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+        rows = enumerate(twin.covariance.tolist(), start=1)
+        said["covariance"] = tuple(" ".join(map(repr, row[:length])) for length, row in rows)
+    whole = _Twin(robot=_Robot(robot.name, robot.manufacturer, robot.type, robot.weight, sheets, robot.urdf), **said)
+    known = {
+        each.name: each.default is MISSING or getattr(whole, each.name) not in (None, ()) for each in fields(_Twin)
+    }
+    document = {name: value for name, value in asdict(whole).items() if known[name]}
+    head = {"format": _FORMAT, "version": _VERSION, "robot": document.pop("robot")}
+    effects = [_effect_document(effect) for effect in twin.stack.effects]
+    return json.dumps({**head, "effects": effects, **document}, indent=1, allow_nan=False) + "\n"
 
 
 def from_json(text: str | bytes, path: Path) -> Twin:

@@ -107,8 +107,7 @@ def _load(twin: Twin, states: Sequence[Motion]) -> np.ndarray:
             if effect.channel == "torque" and effect.family != "friction" and not effect.memory and effect.stage == 0
         ],
     )
-    values = np.array([twin.value(effect.id, term) for effect, term in stack.torque_terms], dtype=float)
-    return np.concatenate([stack.real_torque(state, values) for state in states])
+    return np.concatenate([stack.real_torque(state, twin.values(stack.torque_terms)) for state in states])
 
 
 def _residual(twin: Twin, motion: Motion) -> np.ndarray:

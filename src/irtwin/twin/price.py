@@ -9,7 +9,7 @@ import numpy as np
 
 from irtwin.effects.effect import NORMAL
 from irtwin.identification.power_line import power_slope
-from irtwin.signals.motion import Motion, standstill, stretches
+from irtwin.signals.motion import Motion, standstill, stretches, trapezoid
 from irtwin.twin.twin import Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
@@ -139,10 +139,7 @@ def _left(twin: Twin, parts: Sequence[tuple[Motion, np.ndarray]]) -> list[float]
 def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
     """Return the slope of the weighted (N,) sum of power over each of the twin's p parameters, (p,)."""
     stack = twin.stack
-    torque_values, power_values = (
-        np.array([twin.value(effect.id, term) for effect, term in terms], dtype=float)
-        for terms in (stack.torque_terms, stack.power_terms)
-    )
+    torque_values, power_values = twin.torque_values, twin.power_values
     over_torque, over_power = np.zeros(len(torque_values)), np.zeros(len(power_values))
     for piece in motion.pieces(_PIECE):
         own = weights[piece.start - motion.start : piece.start - motion.start + len(piece.time)]
@@ -152,13 +149,7 @@ def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
         slope = own[:, None] * power_slope(stack, piece, torque, power_values)
         over_torque[stack.real] += stack.carried(piece, slope, torque_values).sum(axis=0)
         over_power += own @ stack.predicted_power_columns(piece, torque_values, power_values)
-    places = {(p.effect, p.joint, p.link, p.name): place for place, p in enumerate(twin.parameters)}
-    result = np.zeros(len(twin.parameters))
-    for terms, slopes in ((stack.torque_terms, over_torque), (stack.power_terms, over_power)):
-        for (effect, term), value in zip(terms, slopes, strict=True):
-            if not term.fixed:
-                result[places[effect.id, term.joint, term.link, term.name]] += value
-    return result
+    return twin.over_parameters(over_torque, over_power)
 
 
 def _half_width(twin: Twin, slope: np.ndarray, *left: float) -> float:
@@ -169,9 +160,3 @@ def _half_width(twin: Twin, slope: np.ndarray, *left: float) -> float:
 
 def _seconds(motion: Motion) -> float:
     return float(motion.time[-1] - motion.time[0])
-
-
-def trapezoid(time: np.ndarray) -> np.ndarray:
-    """Return the weights of the trapezoidal rule, (N,) s."""
-    steps = np.diff(time)
-    return np.asarray((np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / 2)

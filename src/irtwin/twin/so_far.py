@@ -197,8 +197,7 @@ class EnergySoFar:
         self.modelled += float(np.trapezoid(stretch.power, time))
         self.peak = max(self.peak, float(stretch.power.max()))
         self._meter(motion.power, time)
-        given = np.maximum(-self._twin.joint_torque(motion) * motion.dq, 0.0)
-        self.returned += float(np.trapezoid(given.sum(axis=1), time))
+        self.returned += self._twin.returned_energy(motion)
         for entry in self._twin.ledger(motion):
             key = (entry.effect, entry.joint)
             self.ledger[key] = self.ledger.get(key, 0.0) + entry.energy

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from irtwin.signals.motion import Motion, standstill
-from irtwin.twin.price import Figure, mean_power, trapezoid
+from irtwin.signals.motion import Motion, standstill, trapezoid
+from irtwin.twin.price import Figure, mean_power
 from irtwin.twin.twin import Twin
 
 _OFF = 0.1  # of the power that is drawn at rest

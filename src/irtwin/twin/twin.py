@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,7 +15,7 @@ from irtwin.effects.stack import Stack
 from irtwin.identification.remainder import Remainder
 from irtwin.identification.validation import energy
 from irtwin.robot.description import Robot
-from irtwin.signals.motion import Motion
+from irtwin.signals.motion import Motion, trapezoid
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 _PIECE = 8192  # samples whose regressor is held at once
@@ -143,13 +144,13 @@ class Twin:
 
     def torque(self, motion: Motion) -> np.ndarray:
         """Return the torque that a measurement would show, (N, n) N m: real torque and what the sensing adds."""
-        values = self._torque_values + self.stack.shift(motion)
+        values = self.torque_values + self.stack.shift(motion)
         pieces = motion.pieces(_PIECE)
-        return np.concatenate([self.stack.torque_columns(piece, self._torque_values) @ values for piece in pieces])
+        return np.concatenate([self.stack.torque_columns(piece, self.torque_values) @ values for piece in pieces])
 
     def joint_torque(self, motion: Motion) -> np.ndarray:
         """Return the real torque in the joints, (N, n) N m (Yan 2018, eqs. 1 to 3)."""
-        return np.concatenate([self._joint_torque(piece) for piece in motion.pieces(_PIECE)])
+        return np.concatenate([self.stack.real_torque(piece, self.torque_values) for piece in motion.pieces(_PIECE)])
 
     def measured_torque(self, motion: Motion) -> np.ndarray | None:
         """Return the torque that was measured, (N, n) N m; else current times torque constant where both are known."""
@@ -160,11 +161,15 @@ class Twin:
 
     def power(self, motion: Motion) -> np.ndarray:
         """Return the electrical power, (N,) W (Yan 2018, eqs. 7, 8). Without an effect of power: zero."""
-        return np.concatenate([self._power_columns(piece) @ self._power_values for piece in motion.pieces(_PIECE)])
+        return np.concatenate([self._power_columns(piece) @ self.power_values for piece in motion.pieces(_PIECE)])
 
     def energy(self, motion: Motion) -> float:
         """Return the energy over the motion, J (Yan 2018, eq. 9)."""
         return energy(motion.time, self.power(motion))
+
+    def returned_energy(self, motion: Motion) -> float:
+        """Return the mechanical energy that the joints gave back while they braked, J, positive."""
+        return energy(motion.time, np.maximum(-self.joint_torque(motion) * motion.dq, 0.0).sum(axis=1))
 
     def ledger(self, motion: Motion) -> tuple[LedgerEntry, ...]:
         """Return where the energy goes: per effect and joint, J; the entries sum to `energy`.
@@ -177,15 +182,12 @@ class Twin:
         def enter(effect: str, joint: str | None, value: float) -> None:
             entries[effect, joint] = entries.get((effect, joint), 0.0) + value
 
-        values = np.where(self.stack.real, self._torque_values + self.stack.shift(motion), 0.0)
-        durations = np.gradient(motion.time) if len(motion.time) > 1 else np.zeros(1)
-        durations[[0, -1]] /= 2  # weights of the trapezoidal rule
-        start = 0
+        values = np.where(self.stack.real, self.torque_values + self.stack.shift(motion), 0.0)
+        durations = trapezoid(motion.time)
         for piece in motion.pieces(_PIECE):
-            weights = durations[start : start + len(piece.time)]
-            start += len(piece.time)
-            columns = self.stack.torque_columns(piece, self._torque_values)
-            watts = weights @ self._power_columns(piece) * self._power_values  # (L,)
+            weights = durations[piece.start - motion.start :][: len(piece.time)]
+            columns = self.stack.torque_columns(piece, self.torque_values)
+            watts = weights @ self._power_columns(piece) * self.power_values  # (L,)
             for value, (effect, term) in zip(watts, self.stack.power_terms, strict=True):
                 if not effect.carries_torque:
                     enter(effect.id, term.joint, float(value))
@@ -203,26 +205,36 @@ class Twin:
         """Return the identified value of an effect's coefficient."""
         return term.expected if term.fixed else self._values[effect, term.joint, term.link, term.name]
 
-    def _power_columns(self, motion: Motion) -> np.ndarray:
-        return self.stack.predicted_power_columns(motion, self._torque_values, self._power_values)
+    def values(self, terms: Iterable[tuple[Effect, Term]]) -> np.ndarray:
+        """Return the values of coefficients, (K,)."""
+        return np.array([self.value(effect.id, term) for effect, term in terms], dtype=float)
 
-    def _joint_torque(self, motion: Motion) -> np.ndarray:
-        return self.stack.real_torque(motion, self._torque_values)
+    @cached_property
+    def torque_values(self) -> np.ndarray:
+        """The coefficients of torque, (K,)."""
+        return self.values(self.stack.torque_terms)
+
+    @cached_property
+    def power_values(self) -> np.ndarray:
+        """The coefficients of power, (L,)."""
+        return self.values(self.stack.power_terms)
+
+    def over_parameters(self, of_torque: np.ndarray, of_power: np.ndarray) -> np.ndarray:
+        """Return slopes over the coefficients of torque and power, (..., K) and (..., L), over the p parameters."""
+        places = {(each.effect, each.joint, each.link, each.name): k for k, each in enumerate(self.parameters)}
+        slopes = np.zeros((*of_torque.shape[:-1], len(self.parameters)))
+        for terms, own in ((self.stack.torque_terms, of_torque), (self.stack.power_terms, of_power)):
+            for k, (effect, term) in enumerate(terms):
+                if not term.fixed:
+                    slopes[..., places[effect.id, term.joint, term.link, term.name]] += own[..., k]
+        return slopes
+
+    def _power_columns(self, motion: Motion) -> np.ndarray:
+        return self.stack.predicted_power_columns(motion, self.torque_values, self.power_values)
 
     @cached_property
     def _values(self) -> dict[tuple[str, str | None, str | None, str], float]:
         return {(p.effect, p.joint, p.link, p.name): p.value for p in self.parameters}
-
-    @cached_property
-    def _torque_values(self) -> np.ndarray:
-        return self._vector(self.stack.torque_terms)
-
-    @cached_property
-    def _power_values(self) -> np.ndarray:
-        return self._vector(self.stack.power_terms)
-
-    def _vector(self, terms: tuple[tuple[Effect, Term], ...]) -> np.ndarray:
-        return np.array([self.value(effect.id, term) for effect, term in terms], dtype=float)
 
 
 def _deviation(parameter: Parameter, spread: float) -> float:

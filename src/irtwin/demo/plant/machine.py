@@ -24,12 +24,9 @@ Data = TypeVar("Data", DriveData, FrictionData)
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class Tolerance(LinkTolerance):
     """Standard deviations of the built robot from its drawings: relative, com in m."""
 
-    mass: float
-    inertia: float
-    com: float
     rotor_inertia: float
     torque_constant: float
     resistance: float
@@ -86,10 +83,7 @@ class Machine:
     def arm(self, payload: PlantPayload) -> Arm:
         """Return the arm as built."""
         arm = Arm(self.drawings.urdf, self.drive.joint_inertia, payload, self.drawings.step)
-        tolerance = self.drawings.tolerance
-        arm.perturb(
-            LinkTolerance(tolerance.mass, tolerance.inertia, tolerance.com), np.random.default_rng([self.seed, 1])
-        )
+        arm.perturb(self.drawings.tolerance, np.random.default_rng([self.seed, 1]))
         return arm
 
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyoxigraph import NamedNode, Quad, RdfFormat, Store, Triple, parse
+from pyoxigraph import NamedNode, Quad, Store, Triple
 
 from irtwin.errors import InputError
-from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.owl_rl.closure import say
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.export import exported
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.rdf_input import parsing, read_rdf
+from irtwin.knowledge.store.rdf_input import read_triples
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
 
 _TYPE = NamedNode(f"{RDF}type")
@@ -25,7 +25,6 @@ _OF_BOTH_ENDS = {
         *("sameAs", "differentFrom"),
     )
 }
-_FORMATS = {".owl": RdfFormat.RDF_XML, ".rdf": RdfFormat.RDF_XML, ".xml": RdfFormat.RDF_XML, ".ttl": RdfFormat.TURTLE}
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
     Axioms of unnamed classes, rules and other statements without names are not compared: editors write them anew.
     Raises InputError where the file cannot be read, or is no export of this graph.
     """
-    new, old = _named(_parsed(path)), _named(exported(graph))
+    new, old = _named(read_triples(path)), _named(exported(graph))
     if not new & old:
         raise InputError(f"{path}: says nothing that this workspace says; give a file that `irtwin export --owl` wrote")
     gone = {triple for triple in old - new if _turned(triple) not in new}
@@ -56,16 +55,8 @@ def edit_of(graph: KnowledgeGraph, path: Path) -> Edit:
     removed = {
         quad for triple in gone for quad in graph.store.said(triple.subject, triple.predicate) if quad.triple == triple
     }
-    words = [f"{sign} {' '.join(show(term, graph.base) for term in triple)}" for sign, triple in _in_order(gone, came)]
+    words = [f"{sign} {say(triple, graph.base)}" for sign, triple in _in_order(gone, came)]
     return Edit(frozenset(removed), frozenset(in_graph(came, GRAPH_ASSERTED)), tuple(words))
-
-
-def _parsed(path: Path) -> Iterator[Triple]:
-    form = _FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise InputError(f"{path}: its name must end in {', '.join(_FORMATS)}; save it as RDF/XML or Turtle")
-    with parsing(path):
-        yield from (quad.triple for quad in parse(read_rdf(path, form), format=form))
 
 
 def _named(triples: Iterable[Triple]) -> set[Triple]:

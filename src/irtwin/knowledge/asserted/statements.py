@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import secrets
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
-from urllib.parse import unquote
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store, Triple
 from sqlalchemy import Column, Engine, select
@@ -18,10 +16,9 @@ from sqlalchemy.orm import Session
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.mapping import maps_of, says
 from irtwin.knowledge.mapping import RowMapper
-from irtwin.knowledge.mapping.document import TermMap, TriplesMap
-from irtwin.knowledge.mapping.identifiers import Identifier
-from irtwin.knowledge.mapping.terms import absolute
-from irtwin.knowledge.owl_rl.closure import show
+from irtwin.knowledge.mapping.document import TermMap
+from irtwin.knowledge.mapping.terms import values_in
+from irtwin.knowledge.owl_rl.closure import say
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH,
@@ -119,7 +116,7 @@ def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     kept = Store()  # which gives literals back as the graph does
     kept.extend(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
     names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}
-    there = {quad for name in names for quad in graph.quads_in(name)}
+    there = {quad for name in names for quad in graph.store.quads_in(name)}
     graph.change(there - set(kept), set(kept) - there)
 
 
@@ -135,7 +132,7 @@ def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set
 def _cell(graph: KnowledgeGraph, subject: NamedNode, predicate: NamedNode) -> _Cell | None:
     for _, triples_map in maps_of(graph.resources.of("mappings")):
         table = triples_map.table.table[-1].name if triples_map.table.table else ""
-        key = _key(triples_map, subject, graph.base) if table in FILLED else None
+        key = values_in(subject.value, triples_map.subject.template, graph.base) if table in FILLED else None
         for pair in triples_map.properties if key is not None else ():
             column = pair.objects[0].column if isinstance(pair.objects[0], TermMap) else None
             if column is None or column.name not in FILLED[table] or pair.predicates[0].constant != predicate:
@@ -145,15 +142,6 @@ def _cell(graph: KnowledgeGraph, subject: NamedNode, predicate: NamedNode) -> _C
             of_column = Base.metadata.tables[table].columns[column.name]
             return _Cell(of_column, key, constant, pair.objects[0].datatype)
     return None
-
-
-def _key(triples_map: TriplesMap, subject: NamedNode, base: str) -> dict[str, str] | None:
-    """Return the values of the columns that a subject's IRI is made of; None where it is no such IRI."""
-    parts = absolute(triples_map.subject.template, base)
-    form = "".join(re.escape(part) if isinstance(part, str) else "([^/]+)" for part in parts)
-    fits = re.fullmatch(form, subject.value)
-    names = [part.name for part in parts if isinstance(part, Identifier)]
-    return None if fits is None else dict(zip(names, map(unquote, fits.groups()), strict=True))
 
 
 def _fill(
@@ -166,7 +154,7 @@ def _fill(
     said: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
-    what = " ".join(show(term, graph.base) for term in about)
+    what = say(about, graph.base)
     if len({quad.object for quad in new}) > 1:
         raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
     value = next(iter(new)).object if new else None
@@ -224,20 +212,19 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
     name = getattr(quad.graph_name, "value", "")
     if not ids and name.startswith(GRAPH):
         why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
-        raise InputError(f"{_show(quad, graph)}: cannot be taken out: {why}; nothing changed")
+        raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
     assertion.withdrawn += ids
     assertion.removed.add(quad)
 
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     """Raise InputError where a statement is one that irtwin makes itself."""
-    name = getattr(quad.graph_name, "value", "")
+    what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{_show(quad, graph)}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+        raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
     if quad.predicate != _TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
-            f"{_show(quad, graph)}: cannot be asserted: irtwin takes it from logs and files, or works it out; "
-            "nothing changed"
+            f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )
 
 
@@ -246,7 +233,3 @@ def _free(quad: Quad) -> dict[str, str]:
     term = quad.object
     of_literal = isinstance(term, Literal) and (f"@{term.language}" if term.language else term.datatype.value)
     return {"value": term.value, "kind": of_literal or "IRI", "graph": quad.graph_name.value}  # type: ignore[union-attr]
-
-
-def _show(quad: Quad, graph: KnowledgeGraph) -> str:
-    return " ".join(show(term, graph.base) for term in quad.triple)

@@ -13,9 +13,9 @@ from irtwin.errors import InputError
 from irtwin.knowledge.engines import HERMIT
 from irtwin.knowledge.explain import provenance
 from irtwin.knowledge.explain.explanation import Explanation
-from irtwin.knowledge.explain.mapping import mapping_of
+from irtwin.knowledge.explain.mapping import says
 from irtwin.knowledge.explain.rules import premises
-from irtwin.knowledge.owl_rl.closure import Closure, Statement, show
+from irtwin.knowledge.owl_rl.closure import Closure, Statement, say
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
@@ -83,7 +83,7 @@ class Explainer:
 
     def triple(self, triple: Triple) -> Explanation:
         """Explain a triple that the graph holds."""
-        what = self._show(triple)
+        what = self._say(triple)
         if triple in self._told:
             return Explanation(what, _ABOVE)
         self._told.add(triple)
@@ -125,7 +125,7 @@ class Explainer:
         return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
 
     def _stated(self, triple: Triple, name: str) -> Explanation:
-        what = self._show(triple)
+        what = self._say(triple)
         if name.startswith(GRAPH_ACTIVITY):
             activity = self._graph.iri(f"activity/{name.removeprefix(GRAPH_ACTIVITY)}")
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
@@ -135,7 +135,7 @@ class Explainer:
             return Explanation(what, fact)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
-            maker = mapping_of(triple, self._graph.resources.of("mappings"), self._graph.base)
+            maker = says(triple, self._graph.resources.of("mappings"), self._graph.base) or "a mapping"
             subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
             behind = provenance.behind(self._graph, subject) if not near and subject is not None else []
             return Explanation(what, maker, tuple(map(self.individual, behind)), **near)
@@ -153,11 +153,13 @@ class Explainer:
             if derivation is not None:
                 premises = _without_helpers(closure, derivation.premises)
                 return Explanation(
-                    self._show(statement), f"OWL 2 RL, rule {derivation.rule}", tuple(map(self._premise, premises))
+                    self._say(statement),
+                    f"OWL 2 RL, rule {derivation.rule}",
+                    tuple(map(self._premise, premises)),
                 )
         if self._is_of_hermit(statement):
-            return Explanation(self._show(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
-        return Explanation(self._show(statement), "OWL 2 RL: so it is with everything")
+            return Explanation(self._say(statement), "OWL 2 DL, by HermiT: no rule of OWL 2 RL concludes it")
+        return Explanation(self._say(statement), "OWL 2 RL: so it is with everything")
 
     def _is_of_hermit(self, statement: Statement) -> bool:
         subject, predicate, object = statement
@@ -188,7 +190,7 @@ class Explainer:
 
     def _premise(self, statement: Statement) -> Explanation:
         if statement in self._told:
-            return Explanation(self._show(statement), _ABOVE)
+            return Explanation(self._say(statement), _ABOVE)
         subject, predicate, object = statement
         if not isinstance(subject, Literal) and isinstance(predicate, NamedNode):
             triple = Triple(subject, predicate, object)
@@ -197,8 +199,8 @@ class Explainer:
         self._told.add(statement)
         return self._inferred(statement)
 
-    def _show(self, statement: Triple | Statement) -> str:
-        return " ".join(show(term, self._graph.base) for term in statement)
+    def _say(self, statement: Triple | Statement) -> str:
+        return say(statement, self._graph.base)
 
     def _is_individual(self, term: object) -> TypeGuard[NamedNode]:
         return isinstance(term, NamedNode) and term.value.startswith(self._graph.base)

@@ -9,20 +9,18 @@ from pyoxigraph import NamedNode, Triple
 
 from irtwin.knowledge.mapping.document import LogicalTable, TermMap, TriplesMap
 from irtwin.knowledge.mapping.reader import read_document
-from irtwin.knowledge.mapping.terms import absolute
+from irtwin.knowledge.mapping.terms import values_in
 from irtwin.knowledge.vocabulary import RDF
 from irtwin.resources import Files
 
 _TYPE = NamedNode(RDF + "type")
 
 
-def mapping_of(triple: Triple, files: Files, base: str) -> str:
-    """Return, in words, the first triples map of the mappings that may have made a triple of a graph with a base."""
-    return says(triple, files, base) or "a mapping"
-
-
 def says(triple: Triple, files: Files, base: str) -> str | None:
-    """Return as `mapping_of`; None where no mapping makes such a triple."""
+    """Return, in words, the first triples map of the mappings that may have made a triple of a graph with a base.
+
+    None where no mapping makes such a triple.
+    """
     for where, triples_map in maps_of(files):
         if _says(triples_map, triple, base):
             return f"mapping {where}, {_table(triples_map.table)}"
@@ -50,8 +48,7 @@ def _says(triples_map: TriplesMap, triple: Triple, base: str) -> bool:
 def _fits(term_map: TermMap, name: object, base: str) -> bool:
     if term_map.constant is not None:
         return name == term_map.constant
-    parts = (re.escape(part) if isinstance(part, str) else "[^/]+" for part in absolute(term_map.template, base))
-    return isinstance(name, NamedNode) and re.fullmatch("".join(parts), name.value) is not None
+    return isinstance(name, NamedNode) and values_in(name.value, term_map.template, base) is not None
 
 
 def _table(table: LogicalTable) -> str:

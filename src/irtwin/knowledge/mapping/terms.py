@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 from pyoxigraph import BlankNode, Literal, NamedNode
 
@@ -96,6 +96,15 @@ def absolute(template: Template, base_iri: str) -> Template:
     """Return a template of IRIs with the base before it, where it is relative whatever a row holds."""
     first = template[0] if template else ""
     return (base_iri + first, *template[1:]) if isinstance(first, str) and _RELATIVE.match(first) else template
+
+
+def values_in(iri: str, template: Template, base_iri: str) -> dict[str, str] | None:
+    """Return the values of the columns that a template makes an IRI of; None where it makes no such IRI."""
+    parts = absolute(template, base_iri)
+    form = "".join(re.escape(part) if isinstance(part, str) else "([^/]+)" for part in parts)
+    fits = re.fullmatch(form, iri)
+    names = [part.name for part in parts if isinstance(part, Identifier)]
+    return None if fits is None else dict(zip(names, map(unquote, fits.groups()), strict=True))
 
 
 def _percent_encoded(match: re.Match[str]) -> str:

@@ -17,7 +17,7 @@ class Equality(Exception):
     """Two terms are the same: what follows of that is not in an ontology's table."""
 
 
-class Beside(Closure):
+class FactsClosure(Closure):
     """Facts and what follows of them beside a closed ontology, but nothing that follows from the ontology alone.
 
     What the facts may say is told in `irtwin.knowledge.parts`: statements that model are not followed. Raises Equality
@@ -43,9 +43,9 @@ class Beside(Closure):
             self._refuse_equal(fresh)
             new = Facts(self._looked_at(fresh))
             for fact in new:
-                self._facts.add(fact)
+                self.facts.add(fact)
             self._refuse_clashes(fresh, new)
-            by_joins = (fact for join in self._schema.joins for fact in join(self._facts, new))
+            by_joins = (fact for join in self._schema.joins for fact in join(self.facts, new))
             fresh = self._unknown(chain(self._of_one(fresh), by_joins))
 
     def _of_one(self, fresh: list[Fact]) -> Iterator[Fact]:
@@ -81,7 +81,7 @@ class Beside(Closure):
 
     def _types_of_values(self) -> Iterator[Fact]:
         """Say of each new literal which of the datatypes that rules ask for contain it (dt-type2)."""
-        values, asked = self._terms.values, self._schema.datatypes
+        values, asked = self.terms.values, self._schema.datatypes
         if asked:
             for number, value in list(islice(values.items(), self._typed, None)):
                 for iri in datatypes.datatypes_of(value) & asked.keys():
@@ -99,7 +99,7 @@ class Beside(Closure):
 
     def _refuse_clashes(self, fresh: list[Fact], new: Facts) -> None:
         for rule, join in self._schema.contradictions:
-            for culprits in join(self._facts, new):
+            for culprits in join(self.facts, new):
                 raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
-        values = self._terms.values
+        values = self.terms.values
         self._refuse_other_datatypes(Facts([it for it in fresh if it[0] in values and it[1] == self._program.type]))

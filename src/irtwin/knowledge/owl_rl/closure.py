@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, product
@@ -49,7 +49,11 @@ class Derivation:
 
 
 class Closure:
-    """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one."""
+    """Triples and all that OWL 2 RL infers from them. Contradiction names the first rule that finds one.
+
+    `terms` are the numbers of terms; `facts` is all that is known, but that x is itself; `known` says of all of it in
+    which round it was found.
+    """
 
     def __init__(self, triples: Iterable[Triple]):
         self._begin(program().terms.copy(), Facts())
@@ -59,10 +63,10 @@ class Closure:
     def _begin(self, terms: Terms, facts: Facts, before: Container[Fact] = frozenset()) -> None:
         """Know nothing yet, but what was known `before`."""
         self._program = program()
-        self._terms, self._facts, self._before = terms, facts, before
+        self.terms, self.facts, self._before = terms, facts, before
         self._drawn = 0
         self._rounds = 0
-        self._round: dict[Fact, int] = {}  # in which a fact was found: a conclusion is found after its premises
+        self.known: dict[Fact, int] = {}  # and its round: a conclusion is found after its premises
         self._groups: dict[Number, set[Number]] = {}  # of numbers that are the same
         self._named_values: set[Number] = set()
         self._triples: set[Triple] = set()
@@ -80,7 +84,7 @@ class Closure:
         """Return what of the triples was not given before."""
         more = set(triples) - self._triples
         self._triples |= more
-        facts = self._terms.facts(more)
+        facts = self.terms.facts(more)
         self._given.update(facts)
         self._refuse_ill_typed()
         return facts
@@ -88,8 +92,8 @@ class Closure:
     def copy(self) -> Self:
         """Return the same, to be added to apart."""
         other = copy.copy(self)
-        other._terms, other._facts = self._terms.copy(), self._facts.copy((None,))
-        other._round, other._groups = dict(self._round), copy.deepcopy(self._groups)
+        other.terms, other.facts = self.terms.copy(), self.facts.copy((None,))
+        other.known, other._groups = dict(self.known), copy.deepcopy(self._groups)
         other._named_values, other._triples, other._given = (
             set(self._named_values),
             set(self._triples),
@@ -99,12 +103,12 @@ class Closure:
 
     def inferred(self) -> Iterator[Triple]:
         """Return every triple that follows and was not given. What RDF cannot write, of literals, is left out."""
-        helpers, forms = self.helpers(), self._terms.forms
-        for fact in self._round:
+        helpers, forms = self.helpers(), self.terms.forms
+        for fact in self.known:
             if fact not in self._given and fact[1] not in helpers:
-                yield from self._terms.triples(fact)
+                yield from self.terms.triples(fact)
             elif len(forms[fact[2]]) > 1:  # a given value in the other ways that literals write it
-                yield from (triple for triple in self._terms.triples(fact) if triple not in self._triples)
+                yield from (triple for triple in self.terms.triples(fact) if triple not in self._triples)
 
     def worth_keeping(self, after: int = -1) -> set[Triple]:
         """Return what follows and is worth keeping in a graph; of that what was found after a round.
@@ -112,10 +116,10 @@ class Closure:
         Left out is what holds of everything (x sameAs x, C subClassOf C or owl:Thing), what is inferred of anonymous
         class expressions and of datatypes, and one more way to write a literal that stands there already.
         """
-        terms, hidden, helpers = self._terms, self._terms.hidden, self.helpers()
+        terms, hidden, helpers = self.terms, self.terms.hidden, self.helpers()
         reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
-        for fact in {fact for fact, found in self._round.items() if found > after} - self._given - _truisms():
+        for fact in {fact for fact, found in self.known.items() if found > after} - self._given - _truisms():
             subject, predicate, object = fact
             if subject == object and predicate in reflexive:
                 continue
@@ -123,32 +127,17 @@ class Closure:
                 kept.update(list(terms.triples(fact))[:1])
         return kept
 
-    @property
-    def facts(self) -> Facts:
-        """All that is known, but that x is itself, by numbers."""
-        return self._facts
-
-    @property
-    def terms(self) -> Terms:
-        """The numbers of terms."""
-        return self._terms
-
-    @property
-    def known(self) -> Mapping[Fact, int]:
-        """All that is known, and the round that it was found in."""
-        return self._round
-
     def why(self, statement: Statement | Triple) -> Derivation | None:
         """Return how a statement was first inferred; None where it was given, does not follow, or needs no premise."""
-        subject, predicate, object = map(self._terms.number, statement)
+        subject, predicate, object = map(self.terms.number, statement)
         return self._why((subject, predicate, object))
 
     def is_helper(self, statement: Statement) -> bool:
         """Whether a statement is one that the rules make for themselves, to walk along lists."""
-        return self._terms.number(statement[1]) in self.helpers()
+        return self.terms.number(statement[1]) in self.helpers()
 
     def _why(self, conclusion: Fact) -> Derivation | None:
-        if conclusion in self._given or conclusion not in self._round:
+        if conclusion in self._given or conclusion not in self.known:
             return None
         for rule, premises in self._derivations(conclusion):
             return Derivation(rule.name, tuple(map(self._shown, premises)))
@@ -156,11 +145,11 @@ class Closure:
 
     def _derivations(self, conclusion: Fact) -> Iterator[tuple[DatalogRule, list[Fact]]]:
         """Yield the rules that draw a conclusion from what was known before it, each with its premises."""
-        derived = self._round[conclusion]
+        derived = self.known[conclusion]
         for rule, join, arguments in self._program.concluding(conclusion):
-            for values in join(self._facts, self._facts, *arguments):
+            for values in join(self.facts, self.facts, *arguments):
                 premises = self._program.premises(rule, values)
-                if all(self._round[premise] < derived for premise in premises):
+                if all(self.known[premise] < derived for premise in premises):
                     yield rule, premises
 
     def _grounds(self, facts: Iterable[Fact]) -> set[Triple]:
@@ -172,8 +161,8 @@ class Closure:
                 continue
             seen.add(fact)
             if fact in self._given:
-                grounds.update(self._triples.intersection(self._terms.triples(fact)))
-            elif fact in self._round:
+                grounds.update(self._triples.intersection(self.terms.triples(fact)))
+            elif fact in self.known:
                 todo += (premise for _, premises in self._derivations(fact) for premise in premises)
         return grounds
 
@@ -183,9 +172,9 @@ class Closure:
             fresh += self._equal(fresh)
             self._rounds += 1
             for fact in fresh:
-                self._facts.add(fact)
+                self.facts.add(fact)
             new = Facts(fresh)
-            by_rules = (fact for join in self._program.forward for fact in join(self._facts, new))
+            by_rules = (fact for join in self._program.forward for fact in join(self.facts, new))
             fresh = self._unknown(chain(self._of_values(fresh), by_rules))
 
     def _equal(self, fresh: list[Fact]) -> list[Fact]:
@@ -207,7 +196,7 @@ class Closure:
 
     def _unknown(self, facts: Iterable[Fact]) -> list[Fact]:
         """Return those facts that are not known yet, and note the round that they are found in."""
-        known, before, unknown, drawn, number_of_round = self._round, self._before, [], self._drawn, self._rounds
+        known, before, unknown, drawn, number_of_round = self.known, self._before, [], self._drawn, self._rounds
         most = len(self._given) + MOST_FACTS
         for drawn, fact in enumerate(facts, self._drawn):
             if fact not in known and fact not in before:
@@ -226,21 +215,21 @@ class Closure:
         nodes = {number for subject, _, object in self._given for number in (subject, object)}
         mentioned = {iri: number for number in nodes if datatypes.is_datatype(iri := self.iri(number))}
         if mentioned:
-            for number, value in self._terms.values.items():
+            for number, value in self.terms.values.items():
                 for iri in datatypes.datatypes_of(value) & mentioned.keys():
                     yield (number, self._program.type, mentioned[iri])
 
     def _of_values(self, fresh: list[Fact]) -> Iterator[Fact]:
         """Say what is known of values that have just been given another name (dt-type2, dt-diff)."""
-        values = self._terms.values
+        values = self.terms.values
         same = [fact for fact in fresh if fact[1] == self._program.same and fact[0] != fact[2]]
         two_values = [fact for fact in same if fact[0] in values and fact[2] in values]
         if two_values:
             raise self._two_values(two_values)
         for subject, _, object in same:
-            for number in {subject, object} & self._terms.values.keys() - self._named_values:
-                for iri in datatypes.datatypes_of(self._terms.values[number]):
-                    yield (number, self._program.type, self._terms.number(NamedNode(iri)))
+            for number in {subject, object} & self.terms.values.keys() - self._named_values:
+                for iri in datatypes.datatypes_of(self.terms.values[number]):
+                    yield (number, self._program.type, self.terms.number(NamedNode(iri)))
                 for other in self._named_values:
                     yield (number, self._program.different, other)
                     yield (other, self._program.different, number)
@@ -253,28 +242,28 @@ class Closure:
         """
         same = self._program.same
         helpers = self.helpers()
-        facts = [fact for fact in self._round if fact[1] not in helpers]
+        facts = [fact for fact in self.known if fact[1] not in helpers]
         reflexive = [(number, same, number) for number in {same, *(number for fact in facts for number in fact)}]
         if any(same in (fact[0], fact[2]) for fact in facts):
             self._saturate(reflexive)
         else:
             for fact in self._unknown(reflexive):
-                self._facts.add(fact)
+                self.facts.add(fact)
 
     def _refuse_ill_typed(self) -> None:
-        ill_typed = set(map(self._terms.number, self._terms.ill_typed))
-        for literal in self._terms.ill_typed:
-            use, given = self._use(self._terms.number(literal)), (it for it in self._given if it[2] in ill_typed)
+        ill_typed = set(map(self.terms.number, self.terms.ill_typed))
+        for literal in self.terms.ill_typed:
+            use, given = self._use(self.terms.number(literal)), (it for it in self._given if it[2] in ill_typed)
             raise not_of(use, literal.datatype.value, self._grounds(given))
 
     def _refuse_contradictions(self) -> None:
         for rule, join in self._program.contradictions:
-            self._refuse(rule, list(dict.fromkeys(join(self._facts, self._facts))))
-        self._refuse_other_datatypes(self._facts)
+            self._refuse(rule, list(dict.fromkeys(join(self.facts, self.facts))))
+        self._refuse_other_datatypes(self.facts)
 
     def _refuse(self, rule: DatalogRule, bindings: list[tuple[Number, ...]]) -> None:
         if bindings:
-            clashes = chain(*(self._program.clashes(rule, culprits, self._facts) for culprits in bindings))
+            clashes = chain(*(self._program.clashes(rule, culprits, self.facts) for culprits in bindings))
             given = self._grounds(chain(*clashes))
             raise contradiction(rule.name, ", ".join(map(self._name, bindings[0])), given)
 
@@ -282,14 +271,14 @@ class Closure:
         """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""
         for kind, members in facts.subjects.get(self._program.type, {}).items():
             if datatypes.is_datatype(self.iri(kind)):
-                for number in members & self._terms.values.keys():
-                    if self.iri(kind) not in datatypes.datatypes_of(self._terms.values[number]):
+                for number in members & self.terms.values.keys():
+                    if self.iri(kind) not in datatypes.datatypes_of(self.terms.values[number]):
                         of_kind = (number, self._program.type, kind)
                         raise not_of(self._use(number), self.iri(kind), self._grounds([of_kind]))
 
     def helpers(self) -> set[Number]:
         """Return the predicates that only rules speak: their own, and lists that stand for a chain or a key."""
-        lists = (self._facts.objects.get(number, {}) for number in self._program.helpers)
+        lists = (self.facts.objects.get(number, {}) for number in self._program.helpers)
         return self._program.helpers.union(*lists)
 
     def in_words(self, fact: Fact) -> str:
@@ -297,7 +286,7 @@ class Closure:
         return " ".join(map(self._name, fact))
 
     def _shown(self, fact: Fact) -> Statement:
-        subject, predicate, object = (self._terms.forms[number][0] for number in fact)
+        subject, predicate, object = (self.terms.forms[number][0] for number in fact)
         return (subject, predicate, object)
 
     def _two_values(self, same: list[Fact]) -> Contradiction:
@@ -305,8 +294,7 @@ class Closure:
         derivation, given = self._why(same[0]), self._grounds(same)
         if derivation is None:
             return contradiction("dt-diff", " is the same as ".join(map(self._name, same[0][::2])), given)
-        premises = (" ".join(map(show, premise)) for premise in derivation.premises)
-        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(premises), given)
+        return contradiction(f"{derivation.rule}, dt-diff", "; ".join(map(say, derivation.premises)), given)
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
@@ -314,17 +302,17 @@ class Closure:
 
     def iri(self, number: Number) -> str:
         """Return the IRI that has a number, or nothing where it is of a literal or blank node."""
-        forms = self._terms.forms[number]
+        forms = self.terms.forms[number]
         return forms[0].value if forms and isinstance(forms[0], NamedNode) else ""
 
     def _name(self, number: Number) -> str:
-        return show(self._terms.forms[number][0])
+        return show(self.terms.forms[number][0])
 
 
 @cache
 def _truisms() -> frozenset[Fact]:
     """Return what follows from nothing."""
-    return frozenset(Closure([])._round)
+    return frozenset(Closure([]).known)
 
 
 def says_something(triple: Triple) -> bool:
@@ -341,6 +329,11 @@ def show(term: Node, base: str = ID) -> str:
     if isinstance(term, Literal) and term.datatype.value != XSD + "string" and term.language is None:
         return f'"{term.value}"^^{shorten(term.datatype.value)}'
     return str(term)
+
+
+def say(statement: Iterable[Node], base: str = ID) -> str:
+    """Return a triple, or some of its terms, as people write it."""
+    return " ".join(show(term, base) for term in statement)
 
 
 def contradiction(rule: str, what: str, given: Iterable[Triple] = ()) -> Contradiction:

@@ -78,25 +78,17 @@ class Facts:
         for fact in facts:
             self.add(fact)
 
-    def __contains__(self, fact: Fact) -> bool:
-        subject, predicate, object = fact
-        return object in self.objects.get(predicate, {}).get(subject, ())
-
     def __iter__(self) -> Iterator[Fact]:
         for predicate, objects in self.objects.items():
             for subject, values in objects.items():
                 for object in values:
                     yield (subject, predicate, object)
 
-    def add(self, fact: Fact) -> bool:
-        """Add a triple; tell whether it is new."""
+    def add(self, fact: Fact) -> None:
+        """Add a triple."""
         subject, predicate, object = fact
-        values = self.objects.setdefault(predicate, {}).setdefault(subject, set())
-        if object in values:
-            return False
-        values.add(object)
+        self.objects.setdefault(predicate, {}).setdefault(subject, set()).add(object)
         self.subjects.setdefault(predicate, {}).setdefault(object, set()).add(subject)
-        return True
 
     def copy(self, changing: Container[Number | None]) -> Facts:
         """Return the same triples, to be added to apart with some predicates alone; with any where None is one."""

@@ -15,12 +15,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from pyoxigraph import QuerySolutions, Store
+
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import AnswerTable
-from irtwin.knowledge.vocabulary import IRT
+from irtwin.knowledge.vocabulary import ID, IRT, PREFIXES
 from irtwin.resources import MOST_BYTES, Files, Resources, shipped
 
 _HEADER = re.compile(r"^# (title|question|theme|of|concluded): (.+)$", re.MULTILINE)
@@ -137,6 +139,12 @@ def read_question(file: Path) -> NamedQuery:
     concluded = tuple(header.get("concluded", "").split(", ")) if "concluded" in header else ()
     of_robot = header.get("of") == "robot"
     return NamedQuery(file.stem, header["title"], header["question"], header["theme"], of_robot, concluded, text)
+
+
+def columns_of(text: str) -> tuple[str, ...]:
+    """Return what a query selects; no data are needed for that."""
+    answer = Store().query(text, base_iri=ID, prefixes=PREFIXES)
+    return tuple(it.value for it in answer.variables) if isinstance(answer, QuerySolutions) else ()
 
 
 def _text(question: str, resources: Resources) -> str:

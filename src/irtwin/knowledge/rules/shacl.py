@@ -7,16 +7,9 @@ from decimal import Decimal, InvalidOperation
 from pyoxigraph import BlankNode, Literal, NamedNode
 
 from irtwin.knowledge.rules.rule import SHACL, Rule, start_of_body
-from irtwin.knowledge.shacl.shapes import Shapes
+from irtwin.knowledge.shacl.shapes import TARGETS, Shapes
 from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import RDFS, SH, shorten
-
-_TARGETS = {
-    "targetClass": "{{ $this rdf:type/rdfs:subClassOf* {} }}",
-    "targetNode": "{{ VALUES $this {{ {} }} }}",
-    "targetSubjectsOf": "{{ $this {} ?_any }}",
-    "targetObjectsOf": "{{ ?_any {} $this }}",
-}
 
 
 def rules_of(shapes: Shapes) -> tuple[Rule, ...]:
@@ -51,7 +44,7 @@ def _rule(shapes: Shapes, shape: Node, rule: Node) -> Rule:
 
 
 def _targets(shapes: Shapes, shape: Node) -> list[str]:
-    targets = [_TARGETS[name].format(value) for name, value in shapes.targets(shape)]
+    targets = [f"{{ {TARGETS[name].format(value)} }}" for name, value in shapes.targets(shape)]
     if not targets or shapes.values(shape, "target"):
         raise shapes.fault(
             shape, "its rule needs sh:targetClass, sh:targetNode, sh:targetSubjectsOf or sh:targetObjectsOf"

@@ -10,7 +10,12 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
 
-_TARGETS = ("targetClass", "targetNode", "targetSubjectsOf", "targetObjectsOf")
+TARGETS = {  # what is true in SPARQL of what a shape targets, by property
+    "targetClass": "$this rdf:type/rdfs:subClassOf* {}",
+    "targetNode": "VALUES $this {{ {} }}",
+    "targetSubjectsOf": "$this {} ?_any",
+    "targetObjectsOf": "?_any {} $this",
+}
 _CLASSES = {NamedNode(RDFS + "Class"), NamedNode(OWL + "Class")}
 
 
@@ -23,7 +28,7 @@ class Shapes(BySubject):
 
     def targets(self, shape: Node) -> Iterator[tuple[str, Node]]:
         """Yield the targets of a shape, each after the name of its property; a shape that is a class has itself."""
-        for name in _TARGETS:
+        for name in TARGETS:
             yield from ((name, value) for value in self.values(shape, name))
         if _CLASSES.intersection(self.values(shape, RDF + "type")):
             yield "targetClass", shape

@@ -12,23 +12,17 @@ from typing import cast
 
 from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 
-from irtwin.knowledge.shacl.shapes import Shapes
+from irtwin.knowledge.shacl.shapes import TARGETS, Shapes
 from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import PREFIXES, RDF, RDFS, SH, XSD
 
 _KIND = "?_kind"
 _THIS = "?this"
-_TARGETS = {
-    "targetClass": "$this a ?_kind {}",
-    "targetNode": "VALUES $this {{ {} }}",
-    "targetSubjectsOf": "$this {} ?_any",
-    "targetObjectsOf": "?_any {} $this",
-}
 _COMPARED = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
 _BESIDE = {"lessThan": "<", "lessThanOrEquals": "<="}
 _SAYS_NOTHING = {SH + name for name in ("message", "severity", "name", "description", "order", "group", "rule")}
 _SAYS_NOTHING |= {RDF + "type", RDFS + "label", RDFS + "comment", SH + "path"}
-_SAYS_NOTHING |= {SH + name for name in _TARGETS}
+_SAYS_NOTHING |= {SH + name for name in TARGETS}
 _TEXTS = (XSD + "string",)
 
 
@@ -77,7 +71,8 @@ class _Writer:
 
     def _targets(self, shape: Node) -> Iterator[str]:
         for name, value in self._shapes.targets(shape):
-            yield _TARGETS[name].format(self._of_kind(_KIND, value) if name == "targetClass" else value)
+            of_kind = name == "targetClass"  # whose classes are known
+            yield f"$this a {_KIND} {self._of_kind(_KIND, value)}" if of_kind else TARGETS[name].format(value)
 
     def _of_kind(self, variable: str, kind: Node) -> str:
         """Return what is true of a variable that is a class, or below it."""

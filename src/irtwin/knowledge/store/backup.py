@@ -105,7 +105,7 @@ def restore(archive: Path, where: Location | Path) -> None:
             sums = dict(unpack(archive, held, _NAMES))
             with KnowledgeGraph(location.graph_url or place.graph_folder, held) as graph:
                 if graph.graphs():
-                    raise InputError(f"{graph.shown}: the server holds a graph already; give an empty one")
+                    raise InputError(f"{graph.store.shown}: the server holds a graph already; give an empty one")
                 with engine.writing(place.engine) as session:
                     for table in Base.metadata.sorted_tables:
                         _insert(session.connection(), table, archive, held / "rows" / f"{table.name}.jsonl")

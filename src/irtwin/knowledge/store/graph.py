@@ -16,7 +16,7 @@ from irtwin.knowledge.store.blank_nodes import has_blank_node, named_below, same
 from irtwin.knowledge.store.damage import telling
 from irtwin.knowledge.store.keywords import refuse_service
 from irtwin.knowledge.store.named_graphs import belonging, graph_name, names_in, triples_in
-from irtwin.knowledge.store.reading import KeptAnswers, answers_of
+from irtwin.knowledge.store.reading import answers_of
 from irtwin.knowledge.store.series_functions import Functions, series_functions
 from irtwin.knowledge.store.sparql_text import bound
 from irtwin.knowledge.store.syntax_error import in_words
@@ -42,7 +42,8 @@ class KnowledgeGraph:
 
     Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
     in `workspace`, which a folder's parent is if none is given. Its individuals lie below `base`, else below what the
-    graph says of itself. `asserted_since` counts the writes, by this object, of what nobody inferred.
+    graph says of itself. `asserted_since` counts the writes, by this object, of what nobody inferred. `answers` hold
+    until the graph is written to: who keeps one takes them before the question is asked.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class KnowledgeGraph:
         self._base = base
         self._says_first = False  # whether the next change has it say first that it is behind
         self.asserted_since = 0
-        self._answers = answers_of(self.store)
+        self.answers = answers_of(self.store)
 
     @classmethod
     def of_workspace(cls, place: Workspace) -> Self:
@@ -88,12 +89,7 @@ class KnowledgeGraph:
     def close(self) -> None:
         """Let go of the folder, so that it can be opened again: it is locked while a graph is open on it."""
         self.store.close()
-        self._answers = answers_of(self.store)
-
-    @property
-    def shown(self) -> str:
-        """Where it is, as messages may say it: never with a password."""
-        return self.store.shown
+        self.answers = answers_of(self.store)
 
     @property
     def resources(self) -> Resources:
@@ -173,12 +169,7 @@ class KnowledgeGraph:
         try:
             yield self.store
         finally:
-            self._answers = answers_of(self.store)
-
-    @property
-    def answers(self) -> KeptAnswers:
-        """Answers that hold until the graph is written to. Take it before the question is asked."""
-        return self._answers
+            self.answers = answers_of(self.store)
 
     @telling
     def replace(self, quads: Iterable[Quad], *below: str) -> list[str]:
@@ -261,10 +252,6 @@ class KnowledgeGraph:
     def triples(self, *below: str) -> set[Triple]:
         """Return the triples of the named graphs `below`, as in `graphs`, of all without it."""
         return self.store.triples(*below)
-
-    def quads_in(self, name: str) -> Iterator[Quad]:
-        """Yield the quads of one named graph, by its whole IRI, as the store gives them."""
-        return self.store.quads_in(name)
 
     @telling
     def query(self, text: str, bindings: Mapping[str, str | Literal] | None = None) -> AnswerTable:

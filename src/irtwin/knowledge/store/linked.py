@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from collections.abc import Iterator
@@ -46,21 +45,7 @@ def published(view: Path) -> Iterator[None]:
 
 def found(folder: Path) -> Path | None:
     """Return the folder of links that a process that lives has published beside a folder."""
-    return next((view for view in folder.parent.glob(f"{_PUBLISHED}*") if _is_locked(view)), None)
-
-
-def _is_locked(view: Path) -> bool:
-    try:
-        lock = os.open(view, os.O_RDONLY)
-    except FileNotFoundError:
-        return False
-    try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(lock)
-    return False
+    return next((view for view in folder.parent.glob(f"{_PUBLISHED}*") if files.is_locked(view)), None)
 
 
 def remove_left_behind(folder: Path) -> None:

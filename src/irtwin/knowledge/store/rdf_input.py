@@ -41,6 +41,28 @@ def read_turtle(file: Path) -> Iterator[Triple]:
         yield from named_by_content((quad.triple for quad in parse(content, format=RdfFormat.TURTLE)), content)
 
 
+def read_triples(file: Path) -> Iterator[Triple]:
+    """Read an RDF file, whose suffix tells the format; what is not absolute lies below its place.
+
+    Raises InputError where no format has the suffix, and as `read_turtle`.
+    """
+    form = format_of(file)
+    content = read_rdf(file, form)
+    with parsing(file):
+        yield from (quad.triple for quad in parse(content, format=form, base_iri=file.absolute().as_uri()))
+
+
+def format_of(file: Path) -> RdfFormat:
+    """Return the RDF format that a file's suffix tells. Raises InputError where none has it."""
+    suffix = file.suffix.lower()
+    form = RdfFormat.RDF_XML if suffix == ".owl" else RdfFormat.from_extension(suffix.removeprefix("."))
+    if form is None:
+        raise InputError(
+            f"{file}: no RDF format has this suffix; use .ttl, .nt, .nq, .trig, .rdf, .owl, .n3 or .jsonld"
+        )
+    return form
+
+
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
     """Turn what a parser says of a file into an InputError."""

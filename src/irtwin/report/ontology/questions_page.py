@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyoxigraph import QuerySolutions, Store
-
-from irtwin.knowledge.questions.queries import THEMES, NamedQuery, named_questions
+from irtwin.knowledge.questions.queries import THEMES, NamedQuery, columns_of, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import content_policy
 from irtwin.report.questions import Row
@@ -70,10 +68,4 @@ def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
 def competencies(known: Resources, graph: KnowledgeGraph | None = None) -> Iterator[Competency]:
     """Yield the questions, theme by theme, each with what a graph answers if one is given."""
     for question in named_questions(known).values():
-        yield Competency(question, _columns(question), () if graph is None else graph.query(question.text))
-
-
-def _columns(question: NamedQuery) -> list[str]:
-    """Return the variables that a question selects; no data are needed for that."""
-    solutions = Store().query(question.text)
-    return [one.value for one in solutions.variables] if isinstance(solutions, QuerySolutions) else []
+        yield Competency(question, columns_of(question.text), () if graph is None else graph.query(question.text))
