@@ -6,7 +6,7 @@ Graph, database and pages are imported where a workspace or a report is asked fo
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -73,6 +73,7 @@ def diagnose(
     announce = clocked(announce)
     location = None if workspace is None else Location.of(workspace)
     files = _Files.checked(json_file, report, twin_file, motion_file, sysid_file, simulator_file, draws=draws)
+    files.check_apart(Path(one) for one in (simulator, twin) if isinstance(one, Path | str))
     if location is not None or files.report is not None:
         from irtwin.report.extensions import check
 
@@ -80,6 +81,7 @@ def diagnose(
     given = load(Path(twin)) if isinstance(twin, Path | str) else twin
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
+    files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
     model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
     if model is not None and files.simulator is not None:
         model.file.check_written(files.simulator)
@@ -126,6 +128,14 @@ class _Files:
         for file in (*filter(None, places), *more):
             check_place(file)
         return cls(*places, draws=more)
+
+    def check_apart(self, read: Iterable[Path]) -> None:
+        """Raise InputError where a file to write is one that is read, under whatever name."""
+        own = {one.resolve(): one for one in read}
+        named = (self.json, self.report, self.twin, self.motion, self.sysid, self.simulator, *self.draws)
+        for file in filter(None, named):
+            if file.resolve() in own:
+                raise InputError(f"{file}: is what the diagnosis is made of, and stays as it is; name another file")
 
     def write(
         self,

@@ -248,8 +248,6 @@ def diagnose(
     ):
         if file and not simulator:
             raise click.UsageError(f"{option} the model of --simulator: give that too")
-    if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
-        raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     if asked["draws"] and not simulator_file:
         raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
     diagnosis = judge(
