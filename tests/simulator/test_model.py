@@ -46,7 +46,9 @@ def test_meshes_for_pictures_may_be_missing(tmp_path):
 
 def test_a_model_of_other_joints_is_refused(tmp_path):
     file = mujoco_models.write(tmp_path / "arm.xml", arm(3))
-    with pytest.raises(InputError, match=r"has no joint joint_4; its joints are joint_1, joint_2, joint_3: give"):
+    with pytest.raises(
+        InputError, match=r"no joint joint_4; its joints are joint_1, joint_2, joint_3: no joints of it lie"
+    ):
         read_model(file, ROBOT)
 
 
@@ -66,7 +68,7 @@ def test_joints_of_other_names_are_said_in_the_robots_order(tmp_path):
     for old, new in zip(ROBOT.joint_names, names, strict=True):
         text = text.replace(f'"{old}"', f'"{new}"')
     file.write_text(text)
-    with pytest.raises(InputError, match=r"its joints are pan, lift, elbow, wrist: give .* calls them \(--joints\)"):
+    with pytest.raises(InputError, match=r"are pan, lift, elbow, wrist: say .*: --joints pan,lift,elbow,wrist lie as"):
         read_model(file, ROBOT)
     model = read_model(file, ROBOT, names)
     assert model.numbers("joint_2") == {name: pytest.approx(values[1]) for name, values in NUMBERS.items()}

@@ -179,7 +179,7 @@ def test_what_needs_torque_is_refused(tmp_path):
 
 def test_a_model_of_other_joints_is_refused(tmp_path):
     said = refused(tmp_path, text=servo_arm.MODEL.replace('"elbow"', '"knee"'))
-    assert "has no joint elbow; its joints are lift, knee: give a model whose joints" in said
+    assert "has no joint elbow; its joints are lift, knee: say what it calls the robot's: --joints lift,knee" in said
 
 
 def test_without_a_model_a_log_of_commands_is_told_what_it_is_good_for(tmp_path):
