@@ -255,7 +255,7 @@ class Servos:
             changed["forcerange"] = f"{-told['torque_limit']!r} {told['torque_limit']!r}"
         if own["delay"]:
             samples = int(np.ceil(told["delay"] / self.model.compiled.opt.timestep)) + 1
-            changed |= {"delay": told["delay"], "nsample": str(samples)}
+            changed |= {"delay": told["delay"], "nsample": str(samples), "interp": "linear"}  # else of whole steps
         return changed
 
     def clipped(self, commands: np.ndarray) -> Mapping[str, float]:
