@@ -201,13 +201,10 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
 
 
 def test_commands_that_the_model_clips_are_said(tmp_path):
-    from irtwin.simulator.playing import _clipped
-
-    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1"))
-    data_set, _, own = servo_arm.read(data, model)
-    lines = _clipped(own, data_set.runs)
-    assert len(lines) == 2
-    assert "of its commands are beyond the model's ctrlrange, which clips them" in lines[0]
+    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1))
+    said = irtwin("diagnose", data, "--simulator", model, "-q")
+    clips = r"read: lift: \d\d % of its commands are beyond the model's ctrlrange, which clips them"
+    assert re.search(clips, " ".join(said.out.split())), said.out
 
 
 def with_torque(folder, **numbers):

@@ -69,8 +69,9 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = servos(model)
-    for line in _clipped(own, runs):
-        tell(line)
+    clipped = _clipped(own, runs)
+    for line in clipped:
+        tell(f"  {line}")
     tell("Fitting numbers of servos")
     stretches = _stretches(runs, _LASTS)
     if _falls(own, stretches):
@@ -90,7 +91,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
-            mended="\n".join(data_set.repairs) or None,
+            mended="\n".join([*clipped, *data_set.repairs]) or None,
         ),
         writing.curves(data_set.robot, names, before, after),
         chosen,
@@ -133,6 +134,6 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
 def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
     shares = own.clipped(np.concatenate([run.signals.command for run in runs if run.signals.command is not None]))
     return [
-        f"  {joint}: {100 * share:.2g} % of its commands are beyond the model's ctrlrange, which clips them"
+        f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
         for joint, share in shares.items()
     ]
