@@ -83,8 +83,8 @@ def diagnose(
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
     files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
     model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
-    if model is not None and files.simulator is not None:
-        model.file.check_written(files.simulator)
+    if model is not None:
+        _take_in(model, files.simulator, announce)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:
@@ -105,6 +105,14 @@ def diagnose(
         keep_diagnosis(location, data_set, diagnosis, announce)
     files.write(data_set, diagnosis, model, location, seed, announce)
     return diagnosis
+
+
+def _take_in(model: Model, out: Path | None, announce: Announce) -> None:
+    """Say what of a model is not the robot's. Raises InputError where it cannot be written to a file, if to one."""
+    if model.others:
+        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
+    if out is not None:
+        model.file.check_written(out)
 
 
 @dataclass(frozen=True)

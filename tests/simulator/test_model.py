@@ -24,10 +24,10 @@ def test_a_model_takes_the_torque_of_its_bodies_rotors_and_friction(tmp_path):
 
 def test_joints_that_the_robot_lacks_stay_where_they_begin(tmp_path):
     file = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
-    text = file.read_text().replace("</worldbody>", '<body><joint name="door"/><geom size=".1"/></body></worldbody>')
-    file.write_text(text)
+    door = '<body><joint name="door"/><geom size=".1"/></body><body name="ball"><freejoint/><geom size=".1"/></body>'
+    file.write_text(file.read_text().replace("</worldbody>", f"{door}</worldbody>"))
     model = read_model(file, ROBOT)
-    assert model.others == ("door",)
+    assert model.others == ("door", "ball")
     motion = swing(ROBOT, 1, seconds=0.5)
     found = model.torque(motion.q, motion.dq, motion.ddq)
     np.testing.assert_allclose(found, rigid_torque(ROBOT, motion), atol=1e-4)

@@ -200,9 +200,12 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
     assert said.err.count("tau_abs_JOINT is torque without its sign") + said.out.count("without its sign") == 1
 
 
-def test_commands_that_the_model_clips_are_said(tmp_path):
-    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1))
-    said = irtwin("diagnose", data, "--simulator", model, "-q")
+def test_commands_that_the_model_clips_and_joints_that_the_robot_lacks_are_said(tmp_path):
+    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1)
+    door = '<body><joint name="door"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
+    data, model = logs(tmp_path, text=text.replace("</worldbody>", door))
+    said = irtwin("diagnose", data, "--simulator", model)
+    assert f"{model}: joints that the robot lacks are told nothing: door\n" in said.err
     clips = r"read: lift: \d\d % of its commands are beyond the model's ctrlrange, which clips them"
     assert re.search(clips, " ".join(said.out.split())), said.out
 

@@ -213,18 +213,20 @@ def _offered(compiled: mujoco.MjModel, robot: Robot) -> str:
 def joints_of(
     compiled: mujoco.MjModel, names: Sequence[str], source: str, otherwise: str = ""
 ) -> tuple[list[int], tuple[str, ...]]:
-    """Return the places of joints by name, and the names of others.
+    """Return the places of joints by name, and the names of others, or of what these move.
 
     Raises InputError where one is lacking, with what else can be done.
     """
-    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= _SLIDES}
+    every = [compiled.joint(place) for place in range(compiled.njnt)]
+    own = {joint.name: joint.id for joint in every if joint.type[0] >= _SLIDES}
     lacking = [name for name in names if name not in own]
     if lacking:
         raise InputError(
             f"{source}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: "
             + (otherwise or "give a model whose joints have the names of the robot's")
         )
-    return [own[name] for name in names], tuple(name for name in own if name not in names)
+    rest = tuple(joint.name or compiled.body(joint.bodyid[0]).name for joint in every if joint.name not in names)
+    return [own[name] for name in names], rest
 
 
 def compiled_of(
