@@ -29,6 +29,7 @@ from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
 from irtwin.simulator.sysid import script
+from irtwin.simulator.trusted import Trusted, trusted
 from irtwin.storage.files import check_place, write
 from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load, to_json
@@ -42,6 +43,7 @@ def diagnose(
     simulator: Path | str | None = None,
     joints: Sequence[str] = (),
     withhold: Sequence[str] = (),
+    trust: Sequence[str] = (),
     cutoff: float | None = None,
     seed: int = 0,
     repair: bool = False,
@@ -61,7 +63,8 @@ def diagnose(
     in their shapes, and its numbers as the prior. `simulator` is the file of a model, MJCF, URDF, SDF or USD: what it
     says of the observed motions is held against the robot, as runs of a simulator are, its `joints` named in the
     robot's order where it calls them otherwise; commands of runs are played through its servos (channel "position"),
-    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue.
+    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue;
+    `trust`, families or ids of effects, are right: no cause is looked for among them.
     `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is kept there,
     in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at all:
     `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
@@ -78,7 +81,7 @@ def diagnose(
         from irtwin.report.extensions import check
 
         check(resources_of(None if location is None else location.folder))
-    given = load(Path(twin)) if isinstance(twin, Path | str) else twin
+    given, right = load(Path(twin)) if isinstance(twin, Path | str) else twin, trusted(trust)
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
     files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
@@ -95,10 +98,12 @@ def diagnose(
 
         data_set = as_asserted(location, data_set)
     with telling(announce):
-        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model)
+        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model, right)
         if diagnosis is None:
             data_set = data_set if model is None else with_simulated_runs(data_set, model)
-            diagnosis = gap.diagnose(data_set, twin=given, simulator=model, withhold=withhold, seed=seed)
+            diagnosis = gap.diagnose(
+                data_set, twin=given, simulator=model, withhold=withhold, unknown=right.effects, seed=seed
+            )
     if location is not None:  # first, as a damaged workspace is to leave no file beside its error
         from irtwin.workflow import keep_diagnosis
 
@@ -220,11 +225,11 @@ def _asked(data_set: DataSet, lacking: Mapping[str, object]) -> bool:
     return bool(asked)
 
 
-def _played(data_set: DataSet, model: Model) -> Playing | None:
+def _played(data_set: DataSet, model: Model, right: Trusted) -> Playing | None:
     """Return the diagnosis by playing; None where what the model lacks is to be looked for in the torque."""
     if not data_set.is_commanded and not _can_play(data_set, model):
         return None
-    played = diagnose_by_playing(data_set, model)
+    played = diagnose_by_playing(data_set, model, right)
     return None if played.is_open else played
 
 

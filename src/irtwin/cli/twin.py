@@ -206,6 +206,12 @@ def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, 
 )
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option(
+    "--trust",
+    metavar="FAMILY",
+    multiple=True,
+    help="Hold these to be right, as bodies or friction, or one effect: no cause is looked for there. Repeatable.",
+)
+@click.option(
     "--cutoff",
     type=Number(min=0.0, min_open=True),
     metavar="HZ",
