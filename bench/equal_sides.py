@@ -22,6 +22,7 @@ from commanded import cases as commanded
 from irtwin.document.document import Document
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
+from irtwin.report.gap.verdict import misses
 from irtwin.signals.log import read_data_set
 from irtwin.simulator import playing
 from irtwin.simulator.model import read_model
@@ -84,11 +85,14 @@ def pair(kind: str, number: int, folder: Path, models: Path, data_sets: list[Pat
 
 
 def told(document: Document) -> str:
-    """Say the largest difference, that which no verdict counts too."""
+    """Say the largest difference, that which no verdict counts too, and by how much the simulator misses the robot."""
     first = max(document.findings, key=lambda one: one.share, default=None)
+    shrink = document.shrink
+    tracking, torque = (None if one is None else one.before for one in (shrink.position_rmse, shrink.torque_rmse))
+    left = misses("simulated", tracking, torque) or "-"
     if first is None:
-        return "nothing"
-    return f"{first.family} {', '.join(first.joints)}: {100 * first.share:.2g} % of {first.share_of}"
+        return f"nothing | {left}"
+    return f"{first.family} {', '.join(first.joints)}: {100 * first.share:.2g} % of {first.share_of} | {left}"
 
 
 def main() -> None:
@@ -107,11 +111,14 @@ def main() -> None:
             found = pair(kind, number // len(kinds), arguments.folder, arguments.models, arguments.data_sets)
             rows.append((f"{kind} {number // len(kinds)}", found.verdict, told(found)))
         except InputError as error:
-            rows.append((f"{kind} {number // len(kinds)}", "refused", str(error)))
+            rows.append((f"{kind} {number // len(kinds)}", "refused", f"{error} | -"))
         print(json.dumps(rows[-1]), flush=True)
         right = sum(verdict == "no_gap" for _, verdict, _ in rows)
         lines = ["# Two sides that are equal", "", f"`no_gap` in {right} of {len(rows)}: `python equal_sides.py`.", ""]
-        lines += ["| pair | verdict | largest difference |", "| --- | --- | --- |"]
+        lines += [
+            "| pair | verdict | largest difference | the simulator misses the robot by |",
+            "| --- | --- | --- | --- |",
+        ]
         lines += [f"| {' | '.join(row)} |" for row in rows]
         OUT.write_text("\n".join([*lines, ""]), encoding="utf-8")
 

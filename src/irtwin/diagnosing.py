@@ -6,7 +6,7 @@ Graph, database and pages are imported where a workspace or a report is asked fo
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
 from irtwin.simulator.sysid import script
+from irtwin.simulator.trusted import Trusted, trusted
 from irtwin.storage.files import check_place, write
 from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load, to_json
@@ -42,6 +43,7 @@ def diagnose(
     simulator: Path | str | None = None,
     joints: Sequence[str] = (),
     withhold: Sequence[str] = (),
+    trust: Sequence[str] = (),
     cutoff: float | None = None,
     seed: int = 0,
     repair: bool = False,
@@ -61,7 +63,8 @@ def diagnose(
     in their shapes, and its numbers as the prior. `simulator` is the file of a model, MJCF, URDF, SDF or USD: what it
     says of the observed motions is held against the robot, as runs of a simulator are, its `joints` named in the
     robot's order where it calls them otherwise; commands of runs are played through its servos (channel "position"),
-    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue.
+    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue;
+    `trust`, families or ids of effects, are right: no cause is looked for among them.
     `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is kept there,
     in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at all:
     `json_file` the diagnosis, `report` an HTML page, `twin_file` the twin with the causes added, `motion_file` the
@@ -73,16 +76,18 @@ def diagnose(
     announce = clocked(announce)
     location = None if workspace is None else Location.of(workspace)
     files = _Files.checked(json_file, report, twin_file, motion_file, sysid_file, simulator_file, draws=draws)
+    files.check_apart(Path(one) for one in (simulator, twin) if isinstance(one, Path | str))
     if location is not None or files.report is not None:
         from irtwin.report.extensions import check
 
         check(resources_of(None if location is None else location.folder))
-    given = load(Path(twin)) if isinstance(twin, Path | str) else twin
+    given, right = load(Path(twin)) if isinstance(twin, Path | str) else twin, trusted(trust)
     announce("Reading the data set")
     data_set = read_sound(Path(dataset), repair, announce, commanded=simulator is not None)
+    files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
     model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
-    if model is not None and files.simulator is not None:
-        model.file.check_written(files.simulator)
+    if model is not None:
+        _take_in(model, files.simulator, announce)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:
@@ -93,16 +98,26 @@ def diagnose(
 
         data_set = as_asserted(location, data_set)
     with telling(announce):
-        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model)
+        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model, right)
         if diagnosis is None:
             data_set = data_set if model is None else with_simulated_runs(data_set, model)
-            diagnosis = gap.diagnose(data_set, twin=given, simulator=model, withhold=withhold, seed=seed)
+            diagnosis = gap.diagnose(
+                data_set, twin=given, simulator=model, withhold=withhold, unknown=right.effects, seed=seed
+            )
     if location is not None:  # first, as a damaged workspace is to leave no file beside its error
         from irtwin.workflow import keep_diagnosis
 
         keep_diagnosis(location, data_set, diagnosis, announce)
     files.write(data_set, diagnosis, model, location, seed, announce)
     return diagnosis
+
+
+def _take_in(model: Model, out: Path | None, announce: Announce) -> None:
+    """Say what of a model is not the robot's. Raises InputError where it cannot be written to a file, if to one."""
+    if model.others:
+        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
+    if out is not None:
+        model.file.check_written(out)
 
 
 @dataclass(frozen=True)
@@ -126,6 +141,14 @@ class _Files:
         for file in (*filter(None, places), *more):
             check_place(file)
         return cls(*places, draws=more)
+
+    def check_apart(self, read: Iterable[Path]) -> None:
+        """Raise InputError where a file to write is one that is read, under whatever name."""
+        own = {one.resolve(): one for one in read}
+        named = (self.json, self.report, self.twin, self.motion, self.sysid, self.simulator, *self.draws)
+        for file in filter(None, named):
+            if file.resolve() in own:
+                raise InputError(f"{file}: is what the diagnosis is made of, and stays as it is; name another file")
 
     def write(
         self,
@@ -202,11 +225,11 @@ def _asked(data_set: DataSet, lacking: Mapping[str, object]) -> bool:
     return bool(asked)
 
 
-def _played(data_set: DataSet, model: Model) -> Playing | None:
+def _played(data_set: DataSet, model: Model, right: Trusted) -> Playing | None:
     """Return the diagnosis by playing; None where what the model lacks is to be looked for in the torque."""
     if not data_set.is_commanded and not _can_play(data_set, model):
         return None
-    played = diagnose_by_playing(data_set, model)
+    played = diagnose_by_playing(data_set, model, right)
     return None if played.is_open else played
 
 

@@ -43,6 +43,14 @@ def test_the_line_says_what_the_page_says(verdict, against, said):
     assert line(gap_cases.document(verdict), against) == said
 
 
+def test_a_simulator_that_is_right_agrees_to_so_much_torque():
+    diagnosis = gap_cases.diagnosis("no_gap")
+    torque = {"before": 0.42, "after": 0.42, "noise_floor": 0.4, "interval95_after": None}
+    diagnosis["shrink"] |= {"torque_rmse": torque}
+    said = line(Document.from_json(diagnosis), "simulated")
+    assert said == "no_gap: There is no gap: the simulator agrees with the robot, to 0.42 N m RMS."
+
+
 def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
     diagnosis = gap_cases.diagnosis("attributed")
     diagnosis["causes"][0] |= {"scope": "missing", "joints": [], "effect": "base_tilt"}

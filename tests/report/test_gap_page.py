@@ -75,6 +75,12 @@ def test_the_verdict_is_one_sentence(pages: dict[str, Path], verdict: str, said:
     assert verdict_of(pages[verdict].read_text()) == said
 
 
+def test_where_there_is_no_gap_the_map_is_not_contradicted(pages: dict[str, Path]) -> None:
+    page = pages["no_gap"].read_text()
+    assert "There is no gap that matters, so no place of it is named." in page
+    assert "No joint or regime has a gap above the noise floor." not in page
+
+
 @pytest.mark.parametrize("verdict", gap_cases.VERDICTS)
 def test_sections_stand_in_order(pages: dict[str, Path], verdict: str) -> None:
     known = [one for one in ORDER if verdict == "attributed" or one != "friction"]

@@ -12,7 +12,8 @@ def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9, ve
     """A diagnosis with one finding, payload or contact, of the whole robot."""
     rows = {
         "diagnosis": [
-            {"verdict": verdict, "reason": "unsure", "floor_from": "repeats", "tracking_error": None}
+            {"verdict": verdict, "reason": "unsure", "floor_from": "repeats"}
+            | {"tracking_error": None, "torque_error": 0.42}
             | {"against_simulator": simulated, "referenced": referenced}
         ],
         "findings": [
@@ -66,6 +67,12 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
     )
     guessed = sentence(answers("changed", simulated=True, parameters=parameters, sure=0.3))
     assert "other numbers" not in guessed
+
+
+def test_a_simulator_that_is_right_agrees_to_so_much_torque():
+    agrees = "There is no gap: the simulator agrees with the robot, to 0.42 N m RMS."
+    assert sentence(answers("changed", simulated=True, referenced=False, verdict="no_gap")).startswith(agrees)
+    assert "simulator" not in sentence(answers("changed", simulated=False, verdict="no_gap"))
 
 
 def test_stretches_that_stand_out_are_said_where_a_gap_is_unexplained():

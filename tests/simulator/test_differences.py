@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from tests import data_sets, mujoco_models, synthetic
@@ -65,9 +66,21 @@ def test_a_file_for_the_model_needs_a_model(tmp_path):
     assert (said.status, "--draws writes models beside that of --save-simulator" in said.err) == (2, True)
 
 
-def test_the_model_itself_is_not_written_over(tmp_path):
-    file = tmp_path / "arm.xml"
-    file.write_text("<mujoco/>")
-    said = irtwin("diagnose", tmp_path, "--simulator", file, "--save-simulator", file)
-    assert (said.status, file.read_text()) == (2, "<mujoco/>")
-    assert "--save-simulator names the model itself" in said.err
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [
+        ("--save-simulator", "arm.xml"),
+        ("--report", "data/dataset.toml"),
+        ("--json", "data/robot.urdf"),
+        ("--save-simulator", "data/runs/run_0.parquet"),
+    ],
+)
+def test_what_a_diagnosis_is_made_of_is_not_written_over(tmp_path, option, name):
+    run = synthetic.as_run(synthetic.measure(ROBOT, synthetic.swing(ROBOT, 0, seconds=1.0)))
+    data_sets.write(tmp_path / "data", ROBOT, [replace(run, name="run_0")])
+    model = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+    file = tmp_path / name
+    before, other_name = file.read_bytes(), tmp_path / "data" / ".." / name
+    said = irtwin("diagnose", tmp_path / "data", "--simulator", model, option, other_name)
+    assert (said.status, file.read_bytes()) == (2, before)
+    assert said.err.endswith(f"{other_name}: is what the diagnosis is made of, and stays as it is; name another file\n")

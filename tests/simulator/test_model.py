@@ -24,10 +24,10 @@ def test_a_model_takes_the_torque_of_its_bodies_rotors_and_friction(tmp_path):
 
 def test_joints_that_the_robot_lacks_stay_where_they_begin(tmp_path):
     file = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
-    text = file.read_text().replace("</worldbody>", '<body><joint name="door"/><geom size=".1"/></body></worldbody>')
-    file.write_text(text)
+    door = '<body><joint name="door"/><geom size=".1"/></body><body name="ball"><freejoint/><geom size=".1"/></body>'
+    file.write_text(file.read_text().replace("</worldbody>", f"{door}</worldbody>"))
     model = read_model(file, ROBOT)
-    assert model.others == ("door",)
+    assert model.others == ("door", "ball")
     motion = swing(ROBOT, 1, seconds=0.5)
     found = model.torque(motion.q, motion.dq, motion.ddq)
     np.testing.assert_allclose(found, rigid_torque(ROBOT, motion), atol=1e-4)
@@ -46,7 +46,9 @@ def test_meshes_for_pictures_may_be_missing(tmp_path):
 
 def test_a_model_of_other_joints_is_refused(tmp_path):
     file = mujoco_models.write(tmp_path / "arm.xml", arm(3))
-    with pytest.raises(InputError, match=r"has no joint joint_4; its joints are joint_1, joint_2, joint_3: give"):
+    with pytest.raises(
+        InputError, match=r"no joint joint_4; its joints are joint_1, joint_2, joint_3: no joints of it lie"
+    ):
         read_model(file, ROBOT)
 
 
@@ -66,7 +68,7 @@ def test_joints_of_other_names_are_said_in_the_robots_order(tmp_path):
     for old, new in zip(ROBOT.joint_names, names, strict=True):
         text = text.replace(f'"{old}"', f'"{new}"')
     file.write_text(text)
-    with pytest.raises(InputError, match=r"its joints are pan, lift, elbow, wrist: give .* calls them \(--joints\)"):
+    with pytest.raises(InputError, match=r"are pan, lift, elbow, wrist: say .*: --joints pan,lift,elbow,wrist lie as"):
         read_model(file, ROBOT)
     model = read_model(file, ROBOT, names)
     assert model.numbers("joint_2") == {name: pytest.approx(values[1]) for name, values in NUMBERS.items()}

@@ -179,7 +179,7 @@ def test_what_needs_torque_is_refused(tmp_path):
 
 def test_a_model_of_other_joints_is_refused(tmp_path):
     said = refused(tmp_path, text=servo_arm.MODEL.replace('"elbow"', '"knee"'))
-    assert "has no joint elbow; its joints are lift, knee: give a model whose joints" in said
+    assert "has no joint elbow; its joints are lift, knee: say what it calls the robot's: --joints lift,knee" in said
 
 
 def test_without_a_model_a_log_of_commands_is_told_what_it_is_good_for(tmp_path):
@@ -200,14 +200,14 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
     assert said.err.count("tau_abs_JOINT is torque without its sign") + said.out.count("without its sign") == 1
 
 
-def test_commands_that_the_model_clips_are_said(tmp_path):
-    from irtwin.simulator.playing import _clipped
-
-    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1"))
-    data_set, _, own = servo_arm.read(data, model)
-    lines = _clipped(own, data_set.runs)
-    assert len(lines) == 2
-    assert "of its commands are beyond the model's ctrlrange, which clips them" in lines[0]
+def test_commands_that_the_model_clips_and_joints_that_the_robot_lacks_are_said(tmp_path):
+    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1)
+    door = '<body><joint name="door"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
+    data, model = logs(tmp_path, text=text.replace("</worldbody>", door))
+    said = irtwin("diagnose", data, "--simulator", model)
+    assert f"{model}: joints that the robot lacks are told nothing: door\n" in said.err
+    clips = r"read: lift: \d\d % of its commands are beyond the model's ctrlrange, which clips them"
+    assert re.search(clips, " ".join(said.out.split())), said.out
 
 
 def with_torque(folder, **numbers):

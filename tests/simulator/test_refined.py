@@ -52,3 +52,12 @@ def test_all_is_given_back_where_nothing_differs(tmp_path):
     assert not better.differs.any()
     np.testing.assert_allclose(better.numbers, true)
     np.testing.assert_allclose(better.interval, np.stack([true, true]))
+
+
+def test_what_only_bends_a_fall_is_given_back_for_the_limit_alone(tmp_path):
+    begun = {"torque_limit": (0.5, 30 * np.pi), "damping": (0.3, 0.7), "delay": (0.05, 0.0), "spring": (0.4, 0.0)}
+    robot = {"torque_limit": (0.52, 30 * np.pi)}
+    rows = [LIMIT, *(NAMES.index(name) for name in ("damping", "delay", "spring"))]
+    _, better = found(tmp_path, robot, begun, [(row, 0) for row in rows])
+    assert np.argwhere(better.differs).tolist() == [[LIMIT, 0]]
+    assert better.numbers[LIMIT, 0] == pytest.approx(0.52, rel=3e-3)

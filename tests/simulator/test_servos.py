@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from tests import servo_arm
@@ -40,6 +41,21 @@ def test_what_differs_is_written_and_read_back(tmp_path):
     assert "<!-- servos as the maker says -->" in text
     assert '<position joint="lift" kp="12.5" kv="0.0" ctrlrange="-1.5 1.5" forcerange="-5 5" delay=' in text
     assert '<general joint="elbow" ctrlrange="-1.5 1.5" gaintype="fixed"' in text
+
+
+@pytest.mark.parametrize("late", [0.0100006, 0.02 - 4e-16, 0.0333])
+def test_mujoco_has_a_delay_that_is_written_as_it_is_played(tmp_path, late):
+    data, model = servo_arm.write(tmp_path, {"a": servo_arm.swings(2, 1)})
+    data_set, _, own = servo_arm.read(data, model)
+    numbers, stretch = servo_arm.changed(own, delay=(late, 0.0)), whole(data_set.runs[0])
+    file = tmp_path / "new.xml"
+    file.write_bytes(own.written(numbers, numbers != own.numbers))
+    compiled = mujoco.MjModel.from_xml_path(str(file))
+    moving, found = mujoco.MjData(compiled), np.empty_like(stretch.q)
+    for row, told in enumerate(data_set.runs[0].signals.command):
+        found[row], moving.ctrl[:] = moving.qpos, told
+        mujoco.mj_step(compiled, moving, round(0.02 / compiled.opt.timestep))
+    np.testing.assert_allclose(found, play(own, [numbers], [stretch])[0][0][:, 0], atol=1e-9)
 
 
 def test_a_tilt_is_written_as_gravity_where_the_file_has_options(tmp_path):

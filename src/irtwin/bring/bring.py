@@ -20,6 +20,7 @@ from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
+from irtwin.bring.role import roles
 from irtwin.bring.taken import TakenLogs, TakenRun, take
 from irtwin.bring.told import UserSaid, told
 from irtwin.check.check import check
@@ -37,7 +38,7 @@ _TOPIC = re.compile(r'say which in dataset\.toml: \[topics\] (\S+) = "(.*)"$')
 
 @dataclass(frozen=True)
 class Options:
-    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed` as they are typed, payload in kg and m.
+    """What the user says: `maps`, `gear_ratios`, `topics`, `fixed`, `roles` as they are typed, payload in kg and m.
 
     `names`: of the columns of logs that have no line of names.
     """
@@ -48,6 +49,7 @@ class Options:
     topics: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ()
     power_at: str | None = None
     payload_mass: float | None = None
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -87,7 +89,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         described = with_fixed(described, options.fixed)
         if (wrong := urdf_finding(described)) is not None:
             raise InputError(f"{robot}: {wrong.say}")
-    topics = dict(_topic(text) for text in options.topics)
+    role, topics = roles(files, options.roles), dict(_topic(text) for text in options.topics)
     logs = [_read(file, described, topics) for file in files]
     logs = [log.named(options.names) for log in logs] if options.names else logs
     logs = [with_power(log) for log in logs] if robot is None else logs
@@ -96,13 +98,14 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
     runs: dict[Path, tuple[RunText, TakenRun]] = {}
     for form in forms:
         for recording, run in zip(form.logs, form.taken.runs, strict=True):
-            runs[recording.path] = _run_text(recording, run, _name(recording.path, runs), form, options), run
+            text = _run_text(recording, run, _name(recording.path, runs), form, options)
+            runs[recording.path] = replace(text, role=role[recording.path]), run
     listed = [runs[file] for file in dict.fromkeys(files)]
-    text = data_set_text(
+    written = data_set_text(
         described, name, [run for run, _ in listed], origin=origin, power_at=power_at[0], power_at_why=power_at[1],
         gear_ratios=dict(said.gear_ratios),
     )  # fmt: skip
-    _write(out, described, text, {run_text.file: pa.table(dict(run.columns)) for run_text, run in listed})
+    _write(out, described, written, {text.file: pa.table(dict(run.columns)) for text, run in listed})
     return Brought(forms, tuple(line for form in forms for line in form.said))
 
 
@@ -258,7 +261,9 @@ def found_in(folder: Path) -> tuple[tuple[str, ...], str | None]:
     for finding in checked.findings:
         state = "cure first" if finding.stops else "mended when it is read" if finding.mended else "to be looked at"
         lines.append(f"{finding.fault} ({state}): {finding.say}")
-    command = f"irtwin diagnose {folder} --simulator MODEL.xml" if data_set.is_commanded else f"irtwin run {folder}"
+    beside = any(run.role == "simulated" for run in data_set.runs)
+    command = f"irtwin diagnose {folder}" if beside or data_set.is_commanded else f"irtwin run {folder}"
+    command += " --simulator MODEL.xml" if data_set.is_commanded else ""
     return tuple(dict.fromkeys(lines)), command if checked.sound else None
 
 

@@ -31,6 +31,7 @@ class RunText:
 
     file: str
     about: str
+    role: str = "observed"
     payload_mass: float = 0.0
     payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0)
     payload_why: str = "what the controller was told; none was said, 0 is taken"
@@ -115,7 +116,7 @@ def _sheet_lines(sheet: dict[str, float | None], explained: bool = True) -> list
 def _run_lines(run: RunText) -> Iterator[str]:
     yield "[[run]]"
     yield _line("file", run.file, run.about)
-    yield _line("role", "observed", "observed; reference: the healthy past; simulated; planned: a motion alone")
+    yield _line("role", run.role, "observed; reference: the healthy past; simulated; planned: a motion alone")
     yield _line("payload_mass", run.payload_mass, f"kg: {run.payload_why}")
     yield _line("payload_com", list(run.payload_com), "m, its centre of mass in the flange frame")
     if run.started is None:

@@ -48,6 +48,11 @@ _WIDE = 160  # characters of a table that goes into a file
     help="Joint that stood still and is not logged, as a gripper's. * stands for any letters.",
 )
 @click.option("--names", metavar="NAME,...", default="", help="Names of all columns, where the file has none.")
+@click.option(
+    "--role", "roles", metavar="[FILE=]ROLE", multiple=True,
+    help="Whose log FILE is: observed, reference (the healthy past) or simulated. * stands for any letters; without "
+    "FILE, of all. Default: observed.",
+)  # fmt: skip
 @click.option("--payload-mass", type=Number(0.0, 1e5), help="Payload of these runs, kg. Default: the log's, or 0.")
 @payload_com_option
 @click.option("--repair", is_flag=True, help="Drop samples whose time does not rise, and say how many.")
@@ -84,6 +89,7 @@ def import_(
 
     \b
     Example: irtwin import robot_data.csv --robot ur10 --out my_robot
+    Example: irtwin import robot.csv sim.csv --role sim.csv=simulated --robot my.urdf --out my_robot
     Example: irtwin import --robot my.urdf --out my_robot
     """
     if owl is not None:

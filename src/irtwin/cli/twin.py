@@ -206,6 +206,12 @@ def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, 
 )
 @click.option("--withhold", metavar="EFFECT", multiple=True, help="Remove this effect from the twin first. Repeatable.")
 @click.option(
+    "--trust",
+    metavar="FAMILY",
+    multiple=True,
+    help="Hold these to be right, as bodies or friction, or one effect: no cause is looked for there. Repeatable.",
+)
+@click.option(
     "--cutoff",
     type=Number(min=0.0, min_open=True),
     metavar="HZ",
@@ -248,8 +254,6 @@ def diagnose(
     ):
         if file and not simulator:
             raise click.UsageError(f"{option} the model of --simulator: give that too")
-    if simulator_file and simulator and simulator_file.absolute() == simulator.absolute():
-        raise click.UsageError("--save-simulator names the model itself, which stays as it is: give another file")
     if asked["draws"] and not simulator_file:
         raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
     diagnosis = judge(

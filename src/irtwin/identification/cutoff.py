@@ -31,11 +31,13 @@ _BETTER = 0.01  # of the squares that a lower cutoff has to save in each joint, 
 def cutoff_for(robot: Robot, runs: Sequence[Run], stated: float | None) -> Cutoff:
     """Return the cutoff for runs that are to be treated alike: the one that is stated, Hz, as it is.
 
+    It is of the robot's runs where there are any: a simulator has no sensors that noise could come of.
     Else it is ten times the band of the motion (`cutoff_of_motion`). Where noise of positions is louder than that of
     torque it is half of it, and that halved as long as the torque of what is held out is told better so.
     """
     if stated is not None:
         return Cutoff(hz=stated, stated=True, why="stated")
+    runs = [run for run in runs if run.role != "simulated"] or runs
     highest, why = cutoff_of_motion(runs)
     resolved = _resolved(robot, runs)
     if resolved < highest:

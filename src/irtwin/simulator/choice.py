@@ -22,7 +22,7 @@ from irtwin.simulator.servos import HOLDS, NAMES, PARTS, SOFT
 _HOLDING = NAMES.index("holding")
 _APART = np.isin(np.arange(len(NAMES)), (_HOLDING, *SOFT))[:, None]  # tried by themselves
 _ROBOTS = np.isin(np.arange(len(NAMES)), SHARED)[:, None]
-_PARTS = tuple(np.isin(NAMES, names)[:, None] for names in PARTS.values())
+_PARTS = {name: np.isin(NAMES, names)[:, None] for name, names in PARTS.items()}
 _SHOWS = 1.0  # natural logarithm of odds that one step of a payload or a tilt gains where there is one
 _MOST = 1 / Criterion().misfit ** 2  # independent samples that there can be beside what no number names
 _AGAIN, _PASSES = 2, 4  # passes after numbers were given back, and when one was added
@@ -90,7 +90,8 @@ def choose(fit: Fit) -> DifferingNumbers:
     own = fit.rolled(fit.servos.chart(fit.servos.numbers))
     fit, best = _all_free(fit, own)
     robots = np.zeros((len(NAMES), 1), dtype=bool)
-    for part in _PARTS:
+    parts = [part for name, part in _PARTS.items() if name not in fit.servos.trusted]
+    for part in parts:
         best, there = _with_part(fit, best, part, robots)
         robots = robots | (part & there)
     fit = _judged(fit, best, own) if robots.any() else fit
@@ -101,7 +102,7 @@ def choose(fit: Fit) -> DifferingNumbers:
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
         fit, best, differs = _given_back(fit, fit.solved(best, differs | robots, _AGAIN))
     odds = np.full(differs.shape, -np.inf)
-    for part in (one for one in _PARTS if (one & robots).any()):  # beside few numbers it shows whether it is needed
+    for part in (one for one in parts if (one & robots).any()):  # beside few numbers it shows whether it is needed
         back = _without(fit, best, part, differs | robots)
         odds = np.where(part, _odds(fit, (best, differs | robots), (back, differs | (robots & ~part))), odds)
         if odds[part[:, 0], 0][0] <= 0:

@@ -275,7 +275,7 @@ class Fit:
         found, most = best, np.minimum(numbers[row], np.max(asked, axis=0))
         for shares, about in ((_LIMITS, most), (_NEARER, None)):
             middle = self.servos.of_chart(found.at)[row] if about is None else about
-            tried = [np.where(np.arange(len(NAMES))[:, None] == row, middle * share, numbers) for share in shares]
+            tried = [np.where(self._free(row), middle * share, numbers) for share in shares]
             found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))
         return found
 
@@ -285,10 +285,14 @@ class Fit:
         Torque has a step at each command, so that a delay between samples is worse than any next to it.
         """
         numbers, row = self.servos.of_chart(best.at), NAMES.index("delay")
-        is_delay = np.arange(len(NAMES))[:, None] == row
+        is_delay = self._free(row)
         apart = interval(self.stretches[0].time)
         tried = [np.where(is_delay, self.servos.numbers + late * apart, numbers) for late in _LATE]
         return self.best((best, *self.all_played([self.servos.chart(one) for one in tried])))
+
+    def _free(self, row: int) -> np.ndarray:
+        """Return where a row of numbers (k, n) can differ."""
+        return np.asarray(self.servos.can_differ & (np.arange(len(NAMES)) == row)[:, None])
 
     def begun(self) -> Played:
         """Return numbers to begin with: of several stiffnesses, the others fitted beside each, each joint's best."""
@@ -298,7 +302,8 @@ class Fit:
         for times in _TIMES:
             stiffness = own[0] * times
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
-            grids.append([np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways])
+            every = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]
+            grids.append([np.where(self.servos.can_differ, one, own) for one in every])
         begun = [self.best(self.all_played([self.servos.chart(one) for one in grid])) for grid in grids]
         return self.best(self.all_solved([(one, free) for one in begun], 3))
 

@@ -19,6 +19,7 @@ from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.assembly import add_servo
+from irtwin.simulator.axes import alike, first_unlike
 from irtwin.simulator.formats import read_model_file
 from irtwin.simulator.model_file import ModelFile
 
@@ -165,7 +166,7 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
 
     `joints`: what the model calls the robot's joints, in their order; none where it calls them as the robot does.
     Raises InputError where the file is no model, a mesh that gives a body its inertia is missing, or the robot's joints
-    are not among the model's, move otherwise, or have numbers that no joint has.
+    are not among the model's, lie or move otherwise, or have numbers that no joint has.
     """
     if joints and not len(joints) == len(set(joints)) == len(robot.joints):
         raise InputError(
@@ -175,7 +176,7 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
     file = read_model_file(path)
     told = {called[one.name]: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
     compiled, delays, gains = compiled_of(file, told)
-    places, others = joints_of(compiled, tuple(called.values()), str(path), ", or say what it calls them (--joints)")
+    places, others = joints_of(compiled, tuple(called.values()), str(path), _offered(compiled, robot))
     model = Model(
         file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gains
     )
@@ -192,23 +193,40 @@ def _check_joints(model: Model, robot: Robot) -> None:
             value = float(getattr(model.compiled, f"dof_{number}")[dof])
             if not 0 <= value < np.inf:
                 raise InputError(f"{model.file.path}: {number} of joint {name} is {value}; give zero or more")
+    unlike = first_unlike(model.compiled, model.compiled.dof_jntid[model.speeds].tolist(), robot)
+    if unlike is not None:
+        raise InputError(
+            f"{model.file.path}: joint {model.joints[unlike]} lies otherwise to those before it than the robot's, or "
+            f"turns the other way, as in another robot or order: {_offered(model.compiled, robot)}"
+        )
+
+
+def _offered(compiled: mujoco.MjModel, robot: Robot) -> str:
+    """Say which of a model's joints could be the robot's, by where they lie."""
+    found = alike(compiled, robot)
+    if not found:
+        return "no joints of it lie as the robot's do; give a model of this robot"
+    more = f", and so do {len(found) - 1} others" if len(found) > 1 else ""
+    return f"say what it calls the robot's: --joints {','.join(found[0])} lie as these do{more}"
 
 
 def joints_of(
     compiled: mujoco.MjModel, names: Sequence[str], source: str, otherwise: str = ""
 ) -> tuple[list[int], tuple[str, ...]]:
-    """Return the places of joints by name, and the names of others.
+    """Return the places of joints by name, and the names of others, or of what these move.
 
     Raises InputError where one is lacking, with what else can be done.
     """
-    own = {compiled.joint(place).name: place for place in range(compiled.njnt) if compiled.jnt_type[place] >= _SLIDES}
+    every = [compiled.joint(place) for place in range(compiled.njnt)]
+    own = {joint.name: joint.id for joint in every if joint.type[0] >= _SLIDES}
     lacking = [name for name in names if name not in own]
     if lacking:
         raise InputError(
-            f"{source}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: give a model "
-            f"whose joints have the names of the robot's{otherwise}"
+            f"{source}: has no joint {', '.join(lacking)}; its joints are {', '.join(own) or 'none'}: "
+            + (otherwise or "give a model whose joints have the names of the robot's")
         )
-    return [own[name] for name in names], tuple(name for name in own if name not in names)
+    rest = tuple(joint.name or compiled.body(joint.bodyid[0]).name for joint in every if joint.name not in names)
+    return [own[name] for name in names], rest
 
 
 def compiled_of(

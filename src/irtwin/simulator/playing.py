@@ -22,6 +22,7 @@ from irtwin.simulator.push import FoundPush, find_pushes
 from irtwin.simulator.servos import NAMES, Servos, part_of, servos
 from irtwin.simulator.soft import softened
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
+from irtwin.simulator.trusted import NOTHING, Trusted
 
 _STRETCHES, _LASTS = 16, 15.0  # of all runs that numbers are fitted to; s, of each
 _FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls; s, of its stretches
@@ -60,23 +61,26 @@ class Playing:
         return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
 
 
-def diagnose(data_set: DataSet, model: Model) -> Playing:
+def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playing:
     """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
+
+    What it is to `trust` differs in no number.
 
     Raises InputError where `commanded_runs` does, or the model has no position servos.
     """
     runs = commanded_runs(data_set)
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
-    own = servos(model)
-    for line in _clipped(own, runs):
-        tell(line)
+    own = replace(servos(model), trusted=trust.numbers)
+    clipped = _clipped(own, runs)
+    for line in clipped:
+        tell(f"  {line}")
     tell("Fitting numbers of servos")
     stretches = _stretches(runs, _LASTS)
     if _falls(own, stretches):
         stretches = _stretches(runs, _BRIEF)
     step = max(_STEP, model.compiled.opt.timestep)
-    chosen, pushes = _chosen(own, stretches, step)
+    chosen, pushes = _chosen(own, stretches, step, trust.pushes)
     chosen = softened(chosen)
     tell("Playing all runs")
     numbers, names = held_out(chosen, runs), [run.name for run in runs]
@@ -90,7 +94,7 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
-            mended="\n".join(data_set.repairs) or None,
+            mended="\n".join([*clipped, *data_set.repairs]) or None,
         ),
         writing.curves(data_set.robot, names, before, after),
         chosen,
@@ -98,11 +102,14 @@ def diagnose(data_set: DataSet, model: Model) -> Playing:
 
 
 def _chosen(
-    own: Servos, stretches: Sequence[PlayedStretch], step: float
+    own: Servos, stretches: Sequence[PlayedStretch], step: float, untouched: bool
 ) -> tuple[DifferingNumbers, tuple[FoundPush, ...]]:
-    """Return the numbers that differ, and pushes: numbers are chosen anew beside these, and these beside numbers."""
+    """Return the numbers that differ, and pushes: numbers are chosen anew beside these, and these beside numbers.
+
+    A robot that is `untouched` has no pushes.
+    """
     chosen = choose(unjudged(alone(own, stretches, step)))
-    found = find_pushes(chosen)
+    found = () if untouched else find_pushes(chosen)
     if not found:
         return chosen, ()
     tell("Fitting numbers of servos beside what pushed the flange")
@@ -133,6 +140,6 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
 def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
     shares = own.clipped(np.concatenate([run.signals.command for run in runs if run.signals.command is not None]))
     return [
-        f"  {joint}: {100 * share:.2g} % of its commands are beyond the model's ctrlrange, which clips them"
+        f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
         for joint, share in shares.items()
     ]

@@ -15,6 +15,8 @@ from irtwin.simulator.servos import NAMES
 
 _PASSES, _WORTH = 8, 0.3
 _NEAR = 0.2  # of the step of a difference quotient: what falls bends
+_OF_LIMIT = ((0.8, 0.9, 0.95, 1.05, 1.1, 1.2), (0.97, 0.985, 1.015, 1.03), (0.993, 1.007))  # each about the last
+_LIMIT = NAMES.index("torque_limit")
 _SHARES, _DAMPINGS = (1.0, 0.3), (0.0, 1.0)  # of a step, tried
 
 Place = tuple[int, int]  # row of a number, and joint
@@ -23,11 +25,13 @@ Place = tuple[int, int]  # row of a number, and joint
 def refined(chosen: DifferingNumbers) -> DifferingNumbers:
     """Return numbers of joints, those that differ fitted together by what the whole model plays.
 
-    What the evidence is no worse without is given back. Intervals are as wide as these equations say, and no narrower
-    than joints by themselves did.
+    What the evidence is no worse without is given back, and all that a joint has beside its limit of torque where that
+    explains more alone. Intervals are as wide as these equations say, and no narrower than joints by themselves did.
     """
-    fit, best, own = chosen.fit, chosen.fit.rolled(chosen.played.at), chosen.fit.servos.chart(chosen.fit.servos.numbers)
-    places = _places(chosen)
+    fit, best, places = chosen.fit, chosen.fit.rolled(chosen.played.at), _places(chosen)
+    for joint in [joint for row, joint in places if row == _LIMIT]:
+        best, places = _limit_alone(fit, best, places, joint)
+    own = fit.servos.chart(fit.servos.numbers)
     while True:
         best, slopes = _solved(fit, best, places)
         doubt = _likely(fit, best, slopes).variance
@@ -38,6 +42,26 @@ def refined(chosen: DifferingNumbers) -> DifferingNumbers:
         place = places.pop(int(np.argmin(loss)))
         best = fit.all_rolled([_moved(best.at, [place], [(own - best.at)[place]])])[0]
     return _about(chosen, best, slopes)
+
+
+def _limit_alone(fit: Fit, best: Played, places: list[Place], joint: int) -> tuple[Played, list[Place]]:
+    """Return numbers, and which differ, where a joint has its limit of torque alone, if that is better.
+
+    An arm that gives way falls by the limit, and many numbers that bend its fall a little stand for one that is near.
+    """
+    others = [place for place in places if place[1] == joint and place[0] != _LIMIT]
+    own = fit.servos.chart(fit.servos.numbers)
+    found = fit.rolled(_moved(best.at, others, [(own - best.at)[place] for place in others]))
+    for shares in _OF_LIMIT:
+        tried = [fit.servos.of_chart(found.at) for _ in shares]
+        for numbers, share in zip(tried, shares, strict=True):
+            numbers[_LIMIT, joint] *= share
+        rolled = fit.all_rolled([fit.servos.chart(numbers) for numbers in tried])
+        found = min((found, *rolled), key=fit.total)
+    price = np.log(len(NAMES)) * len(others)
+    if not others or fit.total(found) >= fit.total(best) + price:
+        return best, places
+    return found, [place for place in places if place not in others]
 
 
 def evidence(chosen: DifferingNumbers) -> float:

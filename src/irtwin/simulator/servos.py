@@ -69,6 +69,7 @@ class Servos:
     actuators: np.ndarray  # (n,)
     numbers: np.ndarray  # (k, n), the model's own
     scale: np.ndarray  # (k, n), below which a number is as good as zero
+    trusted: frozenset[str] = frozenset()  # names, and parts, of numbers that are right
     variants: dict[tuple[bool, tuple[str, ...]], PlayedModel] = field(default_factory=dict)
 
     def chart(self, numbers: np.ndarray) -> np.ndarray:
@@ -103,11 +104,13 @@ class Servos:
     def can_differ(self) -> np.ndarray:
         """Whether numbers (k, n) of joints can be others.
 
-        A servo whose commands are filtered has no dead band, and a joint without a rotor is not soft behind it.
+        A servo whose commands are filtered has no dead band, a joint without a rotor is not soft behind it, and what
+        is trusted is right.
         """
-        found = np.repeat(np.isin(NAMES, OF_JOINTS)[:, None], self.numbers.shape[1], axis=1)
-        found[NAMES.index("dead_band")] = self.model.compiled.actuator_actnum[self.actuators] == 0
-        found[_SOFT] = self.numbers[NAMES.index("armature")] > 0
+        free = [name in OF_JOINTS and name not in self.trusted for name in NAMES]
+        found = np.repeat(np.array(free)[:, None], self.numbers.shape[1], axis=1)
+        found[NAMES.index("dead_band")] &= self.model.compiled.actuator_actnum[self.actuators] == 0
+        found[_SOFT] &= self.numbers[NAMES.index("armature")] > 0
         return found
 
     @cached_property
@@ -255,7 +258,7 @@ class Servos:
             changed["forcerange"] = f"{-told['torque_limit']!r} {told['torque_limit']!r}"
         if own["delay"]:
             samples = int(np.ceil(told["delay"] / self.model.compiled.opt.timestep)) + 1
-            changed |= {"delay": told["delay"], "nsample": str(samples)}
+            changed |= {"delay": told["delay"], "nsample": str(samples), "interp": "linear"}  # else of whole steps
         return changed
 
     def clipped(self, commands: np.ndarray) -> Mapping[str, float]:

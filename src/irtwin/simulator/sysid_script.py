@@ -193,6 +193,7 @@ def written(fitted: sysid.ParameterDict, model: Path) -> str:
             servo = servo_of(spec, of)
             servo.delay = one.value[0]
             servo.nsample = int(np.ceil(servo.delay / spec.option.timestep)) + 1
+            servo.interp = 1  # linear; else MuJoCo's delay is of whole steps
     spec.compile()
     return str(spec.to_xml())
 

@@ -112,15 +112,13 @@ def sentence(
     because: str | None = None,
     differ: str = "",
     has_floor: bool = True,
-    against: str | None = None,
     misses: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `against`: the role of the runs that it is held against, if any;
-    `misses`: the tracking error of a simulator that was told the robot's commands, if one was.
+    `has_floor`: whether a noise floor is known; `misses`: by how much a simulator does, where it is held against one.
     """
     if verdict == "no_gap":
         if misses is not None:
@@ -131,8 +129,7 @@ def sentence(
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."
             )
         if not findings:
-            agrees = "simulator agrees with the robot" if against == "simulated" else "twin explains the data"
-            return f"There is no gap: away from reversals the {agrees} down to the noise floor."
+            return "There is no gap: away from reversals the twin explains the data down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
     rest = [one for one in findings if one not in told]

@@ -27,7 +27,9 @@ def line(diagnosis: Document, against: str | None) -> str:
     """Return in one line what the page says first; `against`: role of the runs compared with, if any."""
     told = [_told(one, against, diagnosis.causes) for one in diagnosis.findings]
     place = next(iter(diagnosis.locations), None)
-    closed, tracking = diagnosis.shrink.closed_fraction, diagnosis.shrink.position_rmse
+    shrink = diagnosis.shrink
+    closed = shrink.closed_fraction
+    tracking, torque = (None if one is None else one.before for one in (shrink.position_rmse, shrink.torque_rmse))
     sentence = findings.sentence(
         diagnosis.verdict,
         told,
@@ -37,9 +39,8 @@ def line(diagnosis: Document, against: str | None) -> str:
         differing(
             [(one.kind, one.channel, one.joint) for one in diagnosis.not_repeating or () if not one.explained_by]
         ),
-        diagnosis.shrink.noise_floor_from is not None,
-        against,
-        None if tracking is None else misses(tracking.before),
+        shrink.noise_floor_from is not None,
+        misses(against, tracking, torque),
     )
     numbers = findings.other_numbers([
         (one.name, one.joint, one.simulator, one.robot, one.unit)

@@ -37,8 +37,7 @@ def sentence(answers: Answers) -> str:
             (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
         ]),
         judged["floor_from"] is not None,
-        _against(judged),
-        misses(judged["tracking_error"]) if played else None,
+        misses(_against(judged), judged["tracking_error"], judged["torque_error"]),
     )  # fmt: skip
     return numbers + said + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
@@ -108,6 +107,11 @@ def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
     return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
 
 
-def misses(error: float) -> str:
-    """Say a tracking error, rad."""
-    return f"{1e3 * error:.3g} mrad RMS"
+def misses(against: str | None, tracking: float | None, torque: float | None) -> str | None:
+    """Say by how much a simulator misses the robot, where that is what the robot is held against.
+
+    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else.
+    """
+    if tracking is not None:
+        return f"{1e3 * tracking:.3g} mrad RMS"
+    return None if torque is None or against != "simulated" else f"{torque:.3g} N m RMS"

@@ -1,0 +1,45 @@
+"""What a user knows to be right is no cause."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import servo_arm
+from tests.data_sets import irtwin
+
+from irtwin.errors import InputError
+from irtwin.simulator.playing import diagnose
+from irtwin.simulator.servos import NAMES
+from irtwin.simulator.trusted import NOTHING, trusted
+
+
+def test_a_family_and_an_effect_stand_for_numbers_of_servos_too():
+    assert trusted(()) == NOTHING
+    bodies = trusted(["bodies"])
+    assert bodies.effects == ("rigid_body", "rotor_inertia") and bodies.numbers == {"armature"}
+    some = trusted(["coulomb_friction", "command_delay", "external_contact"])
+    assert some.effects == ("coulomb_friction", "external_contact")
+    assert some.numbers == {"friction", "delay", "push"} and some.pushes
+
+
+def test_what_is_neither_is_refused_with_the_families():
+    with pytest.raises(InputError, match=r"trust masses: is neither a family of effects \(bodies, drive, .*\) nor an"):
+        trusted(["masses"])
+
+
+@pytest.mark.slow
+def test_numbers_that_are_trusted_stay_the_simulators(tmp_path):
+    told = {name: servo_arm.swings(4, seed) for seed, name in enumerate("ab")}
+    data_set, model, own = servo_arm.read(*servo_arm.write(tmp_path, told))
+    made = servo_arm.played(data_set, own, servo_arm.changed(own, stiffness=(20.0, 10.0), damping=(0.9, 1.0)))
+    found = diagnose(made, model, trusted(["friction", "load", "environment"]))
+    names = ("damping", "friction", "holding", "spring", "payload", "tilt_x")
+    rows = [NAMES.index(name) for name in names]
+    np.testing.assert_allclose(found.chosen.numbers[rows], own.numbers[rows], rtol=1e-12)
+    assert "servo_stiffness" in {one.effect for one in found.document.causes}
+
+
+@pytest.mark.slow
+def test_it_is_asked_for_on_the_command_line(tmp_path):
+    said = irtwin("diagnose", tmp_path, "--trust", "weights")
+    assert said.status == 2 and "trust weights: is neither a family" in said.err
