@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.effect import Term
+from irtwin.effects.friction import CoulombFriction
 from irtwin.errors import InputError
 from irtwin.gap.data.case import case_of
+from irtwin.gap.data.same_robot import _opposed
 from irtwin.gap.search import Search
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.robot.description import Robot
@@ -57,3 +61,11 @@ def test_references_that_move_one_joint_are_of_the_robot(joint: int) -> None:
 def test_references_of_other_bodies_are_refused() -> None:
     with pytest.raises(InputError, match="is nothing like that of the observed runs"):
         checked([run("reference", swing(DRAWN, seed), heavier(6.0)) for seed in (1, 2)])
+
+
+@pytest.mark.parametrize(("drives", "opposed"), [(-1e-5, False), (-0.5, True)])
+def test_a_simulator_without_friction_has_none_of_the_other_sign(drives: float, opposed: bool) -> None:
+    terms = [(CoulombFriction(), Term("Fc", "N m", joint)) for joint in DRAWN.joint_names]
+    system = SimpleNamespace(terms=terms, expected=np.zeros(6), scale=np.ones(6))
+    found, _ = _opposed(DRAWN, system, np.ones(6), np.full(6, drives))
+    assert found.tolist() == [opposed] * 6

@@ -18,7 +18,7 @@ from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import Run
 
 _OF_BODY = 10  # parameters: mass, first moments, inertia
-_AS_MUCH = 2.0  # times: friction that only has another sign
+_AS_MUCH, _COMPARABLE = 2.0, 10.0  # times: friction that only has another sign, and friction beside which it is none
 
 
 def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: Data) -> None:
@@ -103,7 +103,8 @@ def _opposed(robot: Robot, system: System, own: np.ndarray, other: np.ndarray) -
         ]
         seen = own[places] + system.expected[places] / system.scale[places]
         elsewhere = other[places] + system.expected[places] / system.scale[places]
-        opposed.append(bool(places) and bool(np.all(elsewhere * seen < 0)))
-        same = opposed[-1] and bool(np.all(np.abs(np.log(-seen / elsewhere)) < np.log(_AS_MUCH)))
-        alike.append(np.sign(seen.sum()) if same else 0.0)
+        reversed_here = bool(places) and bool(np.all(elsewhere * seen < 0))
+        times = np.exp(np.abs(np.log(-seen / elsewhere)).max()) if reversed_here else np.inf
+        opposed.append(bool(times < _COMPARABLE))
+        alike.append(np.sign(seen.sum()) if times < _AS_MUCH else 0.0)
     return np.array(opposed), np.array(alike)
