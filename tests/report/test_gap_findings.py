@@ -62,6 +62,11 @@ def test_a_finding_is_set_against_the_runs_that_lack_it(against: str, claim: str
     assert said("attributed", one) == f"Load {claim}: payload (94 % sure)."
 
 
+def test_bodies_are_many() -> None:
+    one = finding("bodies", joints=(), against="simulated", confidence=0.94, members=((("rigid body", 0.94),),))
+    assert said("attributed", one) == "Bodies differ from the simulator’s: rigid body (94 % sure)."
+
+
 def test_where_nothing_is_known_of_the_whole_the_first_finding_says_what_it_closes() -> None:
     told = said("attributed", finding(), finding("sensing", share=0.2), closes=None)
     assert told.endswith(

@@ -49,7 +49,8 @@ class ToldFinding:
         """What is said of the family; of a guess, no more than that it is one."""
         if not self.likely:
             return f"perhaps {self.place}"
-        return f"{self.place} {_CLAIMS[self.against]}"
+        said = _CLAIMS[self.against]
+        return f"{self.place} {said.replace('differs', 'differ') if self.family == 'bodies' else said}"
 
     @property
     def likely(self) -> bool:
