@@ -27,6 +27,7 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
 
+_TRIED = 3  # of those that explain most
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
 _SIZES = tuple(4.0**-k for k in range(6))  # in units of the catalogue's, which are alike for a base and a wrist
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
@@ -124,14 +125,14 @@ class Posterior:
         return self.evidence.variants[int(self.shape[place])]
 
     def promising(self, least: float) -> Iterator[int]:
-        """Yield the place of the hypothesis that explains most, and that of the likeliest, where there are any.
+        """Yield the places of the hypotheses that explain most, then that of the likeliest, where there are any.
 
         What has less than the `least` log odds, and less still by noise that holds its own effect, is left out.
         """
         shown = self.evidence.explained[self.shape]
         kept = np.flatnonzero((self.log_odds > least - _HIDDEN) & (shown > 0))
         if len(kept):
-            yield from dict.fromkeys(int(kept[np.argmax(of[kept])]) for of in (shown, self.log_odds))
+            yield from dict.fromkeys([*kept[np.argsort(-shown[kept])[:_TRIED]], kept[np.argmax(self.log_odds[kept])]])
 
     def explained(self, place: int) -> float:
         """Return the squares that a hypothesis explains in its best shape."""

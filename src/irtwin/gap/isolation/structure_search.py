@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import chain, combinations, repeat
 
 import numpy as np
 
@@ -176,7 +176,7 @@ class _Search:
         All are judged by what the first leaves: noise that holds its own effect would hide it. Where that is hopeless,
         what explains less may be likely. What the data speak against is not tried.
         """
-        for first, enough in zip(posterior.promising(least), (least, 0.0), strict=False):
+        for first, enough in zip(posterior.promising(least), chain([least], repeat(0.0)), strict=False):
             member = posterior.hypotheses[first], posterior.variant(first)
             judged = self.beside(structure, self.left([*structure, member], noise))
             place = judged.likeliest_at(member[0])
