@@ -144,6 +144,13 @@ def test_what_any_healthy_robot_may_have_of_an_effect_is_no_cause():
     assert [cause.effect for cause in causes(system, [law, candidates[1]])] == ["effect_0"]
 
 
+def test_what_any_healthy_robot_may_have_of_an_effect_is_no_change_either():
+    column = CandidateColumn(EFFECT, 0, Term("k", "1", unnamed=0.05))
+    for scope in (MISSING, CHANGED):
+        ((variant,),) = [one.variants for one in hypotheses([column], 0, scope)]
+        assert variant.terms == (column.term,)
+
+
 def test_groups_that_disagree_speak_against_an_effect():
     generator = np.random.default_rng(2)
 

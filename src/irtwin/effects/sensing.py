@@ -28,6 +28,7 @@ from irtwin.signals.motion import Motion
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
 _GAINS = (0.7, 1.4)  # of a meter, the range of the ontology, `effects.ttl`
 _FARTHEST = 0.35  # rad or m, of a zero
+_APART = 2.5e-4  # s, of channels: clocks, filters and samples put them so far apart, one standard deviation
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ class TimeDelay(JointEffect):
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return d."""
-        return (Term("d", "s", joint.name, spread=0.6, lowest=0.0),)
+        return (Term("d", "s", joint.name, spread=0.6, lowest=0.0, unnamed=_APART),)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return (tau(t - d) - tau(t))/d; before the run's start torque is what it was there."""

@@ -85,18 +85,13 @@ def hypotheses(
                 Variant(
                     columns[members[0]].effect,
                     tuple(first + k for k in members),
-                    tuple(_term(columns[k].term, scope) for k in members),
+                    tuple(columns[k].term for k in members),
                 )
                 for members in variants.values()
             ),
         )
         for (effect, joint), variants in places.items()
     ]
-
-
-def _term(term: Term, scope: str) -> Term:
-    """Return the term of a hypothesis: what nobody knows of a law is in the reference runs, too, and no change."""
-    return term if scope == MISSING else replace(term, unnamed=0.0)
 
 
 def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis]:
