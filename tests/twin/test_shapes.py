@@ -66,3 +66,9 @@ def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
     for effects in (named, [*BASELINE, *named[:-3:-1]]):
         found = shaped(ROBOT, [[curved(1), curved(2)]], effects)
         assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(found))
+
+
+def test_sides_whose_power_was_measured_share_a_shape_of_power():
+    sides = [[measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed)] for seed in (1, 2)]
+    found = shaped(ROBOT, sides, [*BASELINE, "meter_lag"])
+    assert [one.id for one in found if isinstance(one, Effect)] == ["meter_lag"]

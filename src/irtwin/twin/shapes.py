@@ -32,12 +32,20 @@ class _Side:
     motions: Sequence[Motion]
     reduced: ReducedTorque | None
 
+    @classmethod
+    def of(cls, robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> _Side:
+        turned, reduced = with_friction_near_zero(robot, motions, effects)
+        return cls(turned, motions, reduced)
+
+    @property
+    def powered(self) -> list[Motion]:
+        return [motion for motion in self.motions if motion.power is not None]
+
     def torque(self, trial: Stack) -> Estimate:
         return fit_torque(Stack(self.robot, trial.effects), self.motions, self.reduced)[1]
 
     def power(self, trial: Stack, torque_values: np.ndarray) -> Estimate:
-        with_power = [motion for motion in self.motions if motion.power is not None]
-        return _of_power(Stack(self.robot, trial.effects), with_power, torque_values)
+        return _of_power(Stack(self.robot, trial.effects), self.powered, torque_values)
 
 
 def shaped(
@@ -49,7 +57,7 @@ def shaped(
     robot in which something changed; they share the shapes. Motions without torque tell nothing.
     """
     with_torque = [own for side in sides if (own := [motion for motion in side if motion.torque is not None])]
-    powered = [own for own in with_torque if any(motion.power is not None for motion in own)]
+    powered = any(motion.power is not None for own in with_torque for motion in own)
     named, stack = {effect for effect in effects if isinstance(effect, str)}, Stack(robot, effects)
     of_torque, of_power = (
         {one.id for one in stack.effects if one.id in named and _has_open_shape(one, signal, robot)}
@@ -58,17 +66,17 @@ def shaped(
     tried = (of_torque if with_torque else set()) | (of_power if powered else set())
     if not tried:
         return tuple(effects)
-    parts = [
-        _Side(turned, own, of) for own in with_torque for turned, of in [with_friction_near_zero(robot, own, effects)]
-    ]
+    parts = [_Side.of(robot, own, effects) for own in with_torque]
     stack = Stack(parts[0].robot, effects)
     stack = _shaped(stack, tried, "torque", lambda trial: _together(parts, [part.torque(trial) for part in parts]))
     if tried & of_power:
-        values = [(part, part.torque(stack).values) for part in parts if part.motions in powered]
-        parts = [part for part, _ in values]
-        stack = _shaped(
-            stack, tried, "power", lambda trial: _together(parts, [part.power(trial, own) for part, own in values])
-        )
+        metered = [part for part in parts if part.powered]
+        values = [part.torque(stack).values for part in metered]
+
+        def left(trial: Stack) -> np.ndarray:
+            return _together(metered, [part.power(trial, own) for part, own in zip(metered, values, strict=True)])
+
+        stack = _shaped(stack, tried, "power", left)
     return (*(one for one in effects if one not in tried), *(one for one in stack.effects if one.id in tried))
 
 
