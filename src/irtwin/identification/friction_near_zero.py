@@ -68,8 +68,8 @@ def with_friction_near_zero(
         tried = [_around([turn for turn, _ in both if turn]) for both in found]
         found, blocks = _found(stack, open_shapes, laws, measured, tried, every)
     if every > 1:  # a part of the log chose, all of it says whether that is so
-        tried = [[turn for turn, _ in both if turn] for both in found]
-        found, blocks = _found(stack, open_shapes, laws, measured, tried)
+        tried = [[turn] if turn else [] for (turn, _), *_ in found]
+        found, blocks = _found(stack, open_shapes, (), measured, tried)
     turned = replace(
         plain, joints=tuple(_with(joint, likelier) for joint, (likelier, *_) in zip(plain.joints, found, strict=True))
     )
