@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from irtwin.live.broadcast import RECENT_SOCKET, SOCKET
+from irtwin.live.broadcast import SOCKET
 from irtwin.serve import samples as room
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.samples import Page, Samples
@@ -36,12 +36,12 @@ async def taken(page: Page, count: int) -> list[dict]:
     return found
 
 
-def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
+def test_a_page_gets_the_lines_of_its_robot(tmp_path: Path) -> None:
     async def play() -> None:
-        async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async def send(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            robot = (await reader.readline()).decode().rstrip("\n")
             for number in range(3):
-                for robot in ("a", "b"):
-                    writer.write(json.dumps({"robot": robot, "time": number}).encode() + b"\n")
+                writer.write(json.dumps({"robot": robot, "time": number}).encode() + b"\n")
             await writer.drain()
 
         (tmp_path / "live").mkdir()
@@ -56,54 +56,9 @@ def test_lines_go_to_the_pages_of_their_robot(tmp_path: Path) -> None:
     asyncio.run(play())
 
 
-def test_a_page_begins_with_the_last_minutes_of_its_robot(tmp_path: Path) -> None:
-    async def play() -> None:
-        asked: list[bytes] = []
-
-        async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            asked.append(await reader.readline())
-            writer.write(b'{"recent": "' + asked[-1][:-1] + b'"}\n')
-            writer.close()
-
-        (tmp_path / "live").mkdir()
-        async with serving(tell, tmp_path / "live" / RECENT_SOCKET):
-            samples = Samples(tmp_path)
-            page = samples.page("b", "10.0.0.1")
-            page.put(b'{"robot": "b", "time": 1}\n')
-            assert await asyncio.wait_for(taken(page, 2), 30) == [{"recent": "b"}, {"robot": "b", "time": 1}]
-            samples.close()
-        assert asked == [b"b\n"]
-
-    asyncio.run(play())
-
-
-@pytest.mark.parametrize("line", [b"", b"{" * 100_000 + b"\n"])
-def test_last_minutes_that_do_not_come_hold_nothing_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: bytes
-) -> None:
-    monkeypatch.setattr(room, "_RECALL", 0.05)
-    monkeypatch.setattr(room, "_LONGEST_LINE", 1000)
-
-    async def play() -> None:
-        over = asyncio.Event()
-
-        async def say_nothing(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            writer.write(line)
-            await over.wait()
-            writer.close()
-
-        (tmp_path / "live").mkdir()
-        async with serving(say_nothing, tmp_path / "live" / RECENT_SOCKET):
-            page = Page("b", "10.0.0.1", tmp_path / "live" / RECENT_SOCKET)
-            page.put(b'{"time": 1}\n')
-            assert await asyncio.wait_for(taken(page, 1), 30) == [{"time": 1}]
-            over.set()
-
-    asyncio.run(play())
-
-
 def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "_AGAIN", 0.01)
+    monkeypatch.setattr(room, "_LONGEST_LINE", 1000)
 
     async def play() -> None:
         samples = Samples(tmp_path)
@@ -113,7 +68,7 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
         (tmp_path / "live").mkdir()
 
         async def send(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            writer.write(b"not a line\n")
+            writer.write(b"{" * 100_000 + b"\n")
             writer.close()
 
         async def send_well(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -131,8 +86,8 @@ def test_watching_that_begins_later_is_found(tmp_path: Path, monkeypatch: pytest
     asyncio.run(play())
 
 
-def test_a_page_that_takes_nothing_is_let_go(tmp_path: Path) -> None:
-    page = Page("a", "10.0.0.1", tmp_path / RECENT_SOCKET)
+def test_a_page_that_takes_nothing_is_let_go() -> None:
+    page = Page("a", "10.0.0.1")
     for _ in range(401):
         page.put(b"{}\n")
     assert page.lost
@@ -181,11 +136,11 @@ def test_another_client_takes_the_newest_page_of_the_one_that_has_most(
     asyncio.run(play())
 
 
-def test_a_page_without_samples_gets_a_word_now_and_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_without_samples_gets_a_word_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(room, "_QUIET", 0.01)
 
     async def play() -> list[bytes]:
-        page, found = Page("a", "10.0.0.1", tmp_path / RECENT_SOCKET), []
+        page, found = Page("a", "10.0.0.1"), []
         async for piece in page.events():
             found.append(piece)
             if len(found) == 3:

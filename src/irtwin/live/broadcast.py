@@ -1,7 +1,7 @@
 """Samples for who looks on: each state as it is taken, and what the twin says of it, as JSON lines on a Unix socket.
 
-The socket lies in the workspace, so that who may read that may look on. Who reads too slowly is let go: watching waits
-for nobody. Who writes a robot's identifier to a second socket gets one line of its last minutes.
+The socket lies in the workspace, so that who may read that may look on. Who writes a robot's identifier to it gets one
+line of the robot's last minutes, then what comes. Who reads too slowly is let go: watching waits for nobody.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +24,21 @@ from irtwin.live.recent import Recent
 from irtwin.twin.so_far import WatchedStretch
 
 SOCKET = "samples.sock"
-RECENT_SOCKET = "recent.sock"
 _HELD = 1000  # lines that wait to be sent
-_MOST = 8  # who may look on: `irtwin serve` is one
+_MOST = 20  # who may look on: each page of `irtwin serve` is one
 _BUFFER = 1 << 18  # bytes that the system holds for each
-_ASKING = 1.0  # s that who asks for the last minutes may take
-_LONGEST_QUESTION = 1000  # bytes
+_ASKING = 1.0  # s that may pass until a robot is named, and its last minutes are taken
+_LONGEST_NAME = 1000  # bytes
+
+
+@dataclass(eq=False)
+class _Client:
+    """Who looks on at a robot; `held` is what came until its last minutes were sent: it is `begun` then."""
+
+    robot_id: str
+    socket: socket.socket
+    held: bytes = b""
+    begun: bool = False
 
 
 class Broadcast:
@@ -36,19 +46,18 @@ class Broadcast:
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._path, self._recent_path = folder / SOCKET, folder / RECENT_SOCKET
+        self._path = folder / SOCKET
         self._recent = Recent()
         self._newest: dict[str, State] = {}
-        self._lines: deque[bytes | State] = deque(maxlen=_HELD)
-        self._clients: list[socket.socket] = []
+        self._lines: deque[tuple[str, bytes | State]] = deque(maxlen=_HELD)
+        self._clients: list[_Client] = []
         self._news = threading.Event()
         self._over = False
 
     def __enter__(self) -> Broadcast:
         """Begin to listen."""
-        self._listening, self._asked = _listening(self._path), _listening(self._recent_path)
-        work = (self._admit, self._send, self._recall)
-        self._threads = [threading.Thread(target=each, daemon=True) for each in work]
+        self._listening = _listening(self._path)
+        self._threads = [threading.Thread(target=each, daemon=True) for each in (self._admit, self._send)]
         for thread in self._threads:
             thread.start()
         return self
@@ -57,16 +66,14 @@ class Broadcast:
         """Let everybody go."""
         self._over = True
         self._news.set()
-        for listening in (self._listening, self._asked):
-            with suppress(OSError):
-                listening.shutdown(socket.SHUT_RDWR)
-            listening.close()
+        with suppress(OSError):
+            self._listening.shutdown(socket.SHUT_RDWR)
+        self._listening.close()
         for thread in self._threads:
             thread.join(2.0)
         for client in self._clients:
-            client.close()
+            client.socket.close()
         self._path.unlink(missing_ok=True)
-        self._recent_path.unlink(missing_ok=True)
 
     def state(self, state: State) -> None:
         """Tell of a state that was taken."""
@@ -74,9 +81,7 @@ class Broadcast:
         power = state.of("power")[0]
         if not math.isnan(power):
             self._recent.add(state.robot_id, "measured", (state.time,), (power,))
-        if self._clients:
-            self._lines.append(state)
-            self._news.set()
+        self._tell(state.robot_id, state)
 
     def stretches(self, robot_id: str, stretches: Sequence[WatchedStretch]) -> None:
         """Tell what the twin says of a while ago: times, s since 1970, and power, W."""
@@ -84,32 +89,37 @@ class Broadcast:
             new = slice(0 if one.begins else 1, None)
             times, power = _rounded(one.motion.time[new]), _rounded(one.power[new])
             self._recent.add(robot_id, "modelled", times, power)
-            if self._clients:
-                self._lines.append(_encoded({"robot": robot_id, "modelled": {"time": times, "power": power}}))
-                self._news.set()
+            self._tell(robot_id, _encoded({"robot": robot_id, "modelled": {"time": times, "power": power}}))
+
+    def _tell(self, robot_id: str, line: bytes | State) -> None:
+        if any(client.robot_id == robot_id for client in self._clients):
+            self._lines.append((robot_id, line))
+            self._news.set()
 
     def _admit(self) -> None:
         while not self._over:
             try:
-                client, _ = self._listening.accept()
+                accepted, _ = self._listening.accept()
             except OSError:
                 return
-            if len(self._clients) >= _MOST:
-                client.close()
-                continue
-            client.setblocking(False)
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
-            self._clients = [*self._clients, client]
+            if len(self._clients) >= _MOST or not self._begin(accepted):
+                accepted.close()
 
-    def _recall(self) -> None:
-        while not self._over:
-            try:
-                client, _ = self._asked.accept()
-            except OSError:
-                return
-            client.settimeout(_ASKING)
-            with client, suppress(OSError, ValueError), client.makefile("rb") as question:
-                client.sendall(self._last_minutes(question.readline(_LONGEST_QUESTION).decode().rstrip("\n")))
+    def _begin(self, accepted: socket.socket) -> bool:
+        """Send a robot's last minutes, with what comes meanwhile held for afterwards; return whether that was read."""
+        accepted.settimeout(_ASKING)
+        accepted.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+        try:
+            with accepted.makefile("rb") as asked:
+                client = _Client(asked.readline(_LONGEST_NAME).decode().rstrip("\n"), accepted)
+            self._clients.append(client)
+            accepted.sendall(self._last_minutes(client.robot_id))
+        except (OSError, ValueError):
+            self._clients[:] = [other for other in self._clients if other.socket is not accepted]
+            return False
+        accepted.setblocking(False)
+        client.begun = True
+        return True
 
     def _last_minutes(self, robot_id: str) -> bytes:
         curves = {}
@@ -124,18 +134,22 @@ class Broadcast:
             self._news.wait()
             self._news.clear()
             while self._lines:
-                line = self._lines.popleft()
-                self._give(_encoded(_told(line)) if isinstance(line, State) else line)
+                robot_id, line = self._lines.popleft()
+                self._give(robot_id, _encoded(_told(line)) if isinstance(line, State) else line)
 
-    def _give(self, line: bytes) -> None:
-        for client in self._clients:
+    def _give(self, robot_id: str, line: bytes) -> None:
+        for client in [one for one in self._clients if one.robot_id == robot_id]:
+            client.held += line
+            if not client.begun:
+                continue
             try:
-                sent = client.send(line)
+                sent = client.socket.send(client.held)
             except OSError:
                 sent = 0
-            if sent < len(line):  # it is gone, or reads too slowly
-                self._clients = [other for other in self._clients if other is not client]
-                client.close()
+            if sent < len(client.held):  # it is gone, or reads too slowly
+                self._clients.remove(client)
+                client.socket.close()
+            client.held = b""
 
 
 def _listening(path: Path) -> socket.socket:

@@ -1,15 +1,14 @@
-"""Samples on their way from `irtwin live` to pages: one connection to it, and a bounded queue for each page."""
+"""Samples on their way from `irtwin live` to pages: a connection to it, and a bounded queue, for each page."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 from collections import Counter, deque
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 
-from irtwin.live.broadcast import RECENT_SOCKET, SOCKET, reachable
+from irtwin.live.broadcast import SOCKET, reachable
 from irtwin.serve.protocol import Refusal
 from irtwin.serve.shares import Displaced, gives_way
 from irtwin.storage.schema import LIVE
@@ -19,17 +18,13 @@ _HELD = 400  # samples that wait for a page: some five seconds
 _AGAIN = 1.0  # s until the next try where nobody watches
 _QUIET = 10.0  # s after which a page without samples gets a word, so that one that is gone is found out
 _LONGEST_LINE = 1 << 20  # bytes
-_RECALL = 2.0  # s that the last minutes may take to come
 
 
 class Page:
-    """Who looks on at one robot: the newest lines that were not sent yet; `lost` once there were too many.
+    """Who looks on at one robot: the newest lines that were not sent yet; `lost` once there were too many."""
 
-    `recent` is the socket that tells of the robot's last minutes, with which a page begins.
-    """
-
-    def __init__(self, robot_id: str, client: str, recent: Path) -> None:
-        self.robot_id, self.client, self._recent = robot_id, client, recent
+    def __init__(self, robot_id: str, client: str) -> None:
+        self.robot_id, self.client = robot_id, client
         self.lost = False
         self._lines: deque[bytes] = deque()
         self._news = asyncio.Event()
@@ -46,10 +41,8 @@ class Page:
         self._news.set()
 
     async def events(self) -> AsyncIterator[bytes]:
-        """Give server-sent events until it is lost: the last minutes, then what came meanwhile as one piece each."""
+        """Give server-sent events until it is lost: what came meanwhile as one piece each."""
         yield b"retry: 1000\n\n"
-        if line := await self._last_minutes():
-            yield b"data: " + line + b"\n"
         while not self.lost:
             with suppress(TimeoutError):
                 async with asyncio.timeout(_QUIET):
@@ -58,45 +51,26 @@ class Page:
             lines, self._lines = self._lines, deque()
             yield b"".join(b"data: " + line + b"\n" for line in lines) if lines else b": nothing new\n\n"
 
-    async def _last_minutes(self) -> bytes:
-        """Return the line that tells of them; none where nobody watches, or the answer does not come in time."""
-        with suppress(OSError, ValueError):  # TimeoutError is an OSError
-            async with asyncio.timeout(_RECALL):
-                with reachable(self._recent) as address:
-                    lines, writing = await asyncio.open_unix_connection(address, limit=_LONGEST_LINE)
-                try:
-                    writing.write(self.robot_id.encode() + b"\n")
-                    return await lines.readline()
-                finally:
-                    writing.close()
-        return b""
-
 
 class Samples:
     """Hands what `irtwin live` tells of a workspace to the pages, and waits for it to come where it is not there."""
 
     def __init__(self, workspace: Path) -> None:
-        self._socket, self._recent = workspace / LIVE / SOCKET, workspace / LIVE / RECENT_SOCKET
-        self._pages: list[Page] = []  # the newest last
-        self._reading: asyncio.Task[None] | None = None
+        self._socket = workspace / LIVE / SOCKET
+        self._pages: dict[Page, asyncio.Task[None]] = {}  # what reads for each, the newest last
 
     def page(self, robot_id: str, client: str) -> Page:
         """Let one more page of a client look on, in the place of another's that has more. Raises Refusal."""
         if len(self._pages) >= MOST:
             self._make_room(client)
-        page = Page(robot_id, client, self._recent)
-        self._pages.append(page)
-        if self._reading is None:
-            self._reading = asyncio.create_task(self._read())
+        page = Page(robot_id, client)
+        self._pages[page] = asyncio.create_task(self._read(page))
         return page
 
     def leave(self, page: Page) -> None:
-        """Note that a page is gone; after the last one, nothing is read."""
+        """Note that a page is gone, for which nothing more is read."""
         if page in self._pages:
-            self._pages.remove(page)
-        if not self._pages and self._reading is not None:
-            self._reading.cancel()
-            self._reading = None
+            self._pages.pop(page).cancel()
 
     def _make_room(self, client: str) -> None:
         try:
@@ -113,20 +87,15 @@ class Samples:
             page.let_go()
             self.leave(page)
 
-    async def _read(self) -> None:
+    async def _read(self, page: Page) -> None:
         while True:
-            with suppress(OSError, ValueError):  # nobody watches, or watching ended, or it sent what is no line
+            with suppress(OSError, ValueError):  # nobody watches, or watching ended, or a line is too long
                 with reachable(self._socket) as address:
                     lines, writing = await asyncio.open_unix_connection(address, limit=_LONGEST_LINE)
                 try:
+                    writing.write(page.robot_id.encode() + b"\n")
                     while line := await lines.readline():
-                        self._hand_out(line)
+                        page.put(line)
                 finally:
                     writing.close()
             await asyncio.sleep(_AGAIN)
-
-    def _hand_out(self, line: bytes) -> None:
-        robot_id = json.loads(line)["robot"]
-        for page in self._pages:
-            if page.robot_id == robot_id:
-                page.put(line)
