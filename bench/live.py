@@ -37,8 +37,7 @@ from irtwin.live.joint_stream import StateReader, feed, listening
 from irtwin.live.live_twin import LiveTwin
 from irtwin.live.watch import SWITCH
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE_RUN, Activity, Joint, Robot, Run
-from irtwin.storage.schema import Twin as TwinRow
+from irtwin.storage.schema import LIVE_RUN, Activity, JointRow, RobotRow, RunRow, TwinRow
 from irtwin.twin.files import to_json
 from irtwin.twin.twin import Twin
 from irtwin.workflow import unpack_demo
@@ -68,8 +67,8 @@ def send(port: int, robots: int, seconds: float, rate: float = RATE) -> None:
 
 
 def add_robot(place: Workspace, robot_id: str, twin: Twin | None) -> None:
-    joints = [Joint(robot_id=robot_id, name=name, position=n, kind="revolute") for n, name in enumerate(JOINTS, 1)]
-    robot = Robot(
+    joints = [JointRow(robot_id=robot_id, name=name, position=n, kind="revolute") for n, name in enumerate(JOINTS, 1)]
+    robot = RobotRow(
         robot_id=robot_id,
         name=robot_id,
         controlled_axes=6,
@@ -177,7 +176,7 @@ def main(robots: int, seconds: float, on_server: bool, with_twin: bool) -> None:
         twin.stop()
         stopped = time.perf_counter() - began
         with place.reading() as session:
-            runs = session.scalars(select(Run).where(Run.kind == LIVE_RUN)).all()
+            runs = session.scalars(select(RunRow).where(RunRow.kind == LIVE_RUN)).all()
         found = []
         for run in runs:
             stamps = place.read_series(run.run_id)["time"].to_numpy() + run.start_time.timestamp()

@@ -37,7 +37,7 @@ from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LIVE_RUN, Run
+from irtwin.storage.schema import LIVE_RUN, RunRow
 from live import add_robot, kr6, oxigraph_server
 from soak import serving
 
@@ -128,7 +128,7 @@ def soak_on(folder: Path, seconds: float, robots: int, rate: float, graph_url: s
         for thread in threads:
             thread.join()
     with Workspace(folder) as place, place.reading() as session:
-        stored = session.scalar(select(func.sum(Run.sample_count)).where(Run.kind == LIVE_RUN))
+        stored = session.scalar(select(func.sum(RunRow.sample_count)).where(RunRow.kind == LIVE_RUN))
         outcome.stored = int(stored or 0)
     return outcome
 

@@ -18,14 +18,15 @@ from irtwin.providers.names import robot_iri
 from irtwin.report.gap.page import render_gap
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Joint
+from irtwin.storage.schema import JointRow
 from tests import gap_cases, rows
 
 
 def six_axis(workspace: Workspace) -> None:
     """Put the robot of `gap_cases`, and its runs, into a workspace."""
     joints = [
-        Joint(robot_id=rows.ROBOT, name=name, position=k, kind="revolute") for k, name in enumerate(gap_cases.JOINTS, 1)
+        JointRow(robot_id=rows.ROBOT, name=name, position=k, kind="revolute")
+        for k, name in enumerate(gap_cases.JOINTS, 1)
     ]
     runs = [rows.run(name, role="reference" if name.startswith("ref") else "observed") for name in gap_cases.RUNS]
     workspace.ingest(rows.robot(controlled_axes=6), joints, runs, {run.run_id: rows.samples(1) for run in runs})

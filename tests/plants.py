@@ -37,7 +37,7 @@ def robots(place: Path) -> list[Quad]:
             session.execute(
                 update(schema.RunEnergy).where(of_arm_c).values(energy_from="mechanical", measured_energy_j=None)
             )
-            session.execute(update(schema.Robot).where(schema.Robot.robot_id == "Arm_D").values(name=HOSTILE))
+            session.execute(update(schema.RobotRow).where(schema.RobotRow.robot_id == "Arm_D").values(name=HOSTILE))
         quads = list(map_database(workspace.engine, sorted(folder("mappings").glob("*.r2rml.ttl"))))
     label = Quad(NamedNode(PLACE), NamedNode(f"{RDFS}label"), Literal(HOSTILE), NamedNode(f"{GRAPH_SOURCE}place"))
     return [*quads, label]

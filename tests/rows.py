@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from irtwin.storage.schema import Activity, Base, Joint, Robot, Run, RunEnergy, RunState, Twin, TwinRun
+from irtwin.storage.schema import Activity, Base, JointRow, RobotRow, RunEnergy, RunRow, RunState, TwinRow, TwinRun
 
 if TYPE_CHECKING:
     from irtwin.providers.provider import Made
@@ -19,7 +19,7 @@ ROBOT = "KUKA_KR6_R700"
 NOON = datetime(2026, 3, 1, 12, tzinfo=UTC)
 
 
-def robot(**changes: Any) -> Robot:
+def robot(**changes: Any) -> RobotRow:
     values: dict[str, Any] = {
         "robot_id": ROBOT,
         "name": "KUKA KR6 R700",
@@ -37,12 +37,12 @@ def robot(**changes: Any) -> Robot:
         "twin_effects": None,
         "notes": "{}",
     }
-    return Robot(**values | changes)
+    return RobotRow(**values | changes)
 
 
-def joints() -> list[Joint]:
+def joints() -> list[JointRow]:
     return [
-        Joint(
+        JointRow(
             robot_id=ROBOT,
             name=f"joint_a{position}",
             position=position,
@@ -57,7 +57,7 @@ def joints() -> list[Joint]:
     ]
 
 
-def run(name: str, **changes: Any) -> Run:
+def run(name: str, **changes: Any) -> RunRow:
     values: dict[str, Any] = {
         "run_id": f"{ROBOT}.{name}",
         "robot_id": ROBOT,
@@ -79,7 +79,7 @@ def run(name: str, **changes: Any) -> Run:
         "file": f"runs/{name}.csv",
         "sha256": "1" * 64,
     }
-    return Run(**values | changes)
+    return RunRow(**values | changes)
 
 
 def samples(seed: int) -> pa.Table:
@@ -87,7 +87,7 @@ def samples(seed: int) -> pa.Table:
     return pa.table({"time": time, "q_joint_a1": np.sin(seed + time), "power": 100.0 + time})
 
 
-def data_set() -> tuple[Robot, list[Joint], list[Run], dict[str, pa.Table]]:
+def data_set() -> tuple[RobotRow, list[JointRow], list[RunRow], dict[str, pa.Table]]:
     # The first run repeats a later one: the order of rows is the user's.
     runs = [run("again", repeat_of=f"{ROBOT}.work"), run("work")]
     return robot(), joints(), runs, {item.run_id: samples(seed) for seed, item in enumerate(runs)}
@@ -121,7 +121,7 @@ def keep(workspace: Workspace, robot_id: str, provider: str, subject: str, made:
 
 def twin(twin_id: str) -> list[Base]:
     return [
-        Twin(
+        TwinRow(
             twin_id=twin_id,
             robot_id=ROBOT,
             created=NOON,

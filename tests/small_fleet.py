@@ -133,14 +133,14 @@ def _facts(base: str) -> Iterator[Base]:
 def _robots() -> Iterator[Base]:
     makers = {"Arm_A": ("Acme", 30.0), "Arm_B": ("Bolt", 20.0), "Arm_C": ("Acme", 25.0), "Arm_D": ("Bolt", None)}
     for robot, (maker, weight) in makers.items():
-        yield schema.Robot(
+        yield schema.RobotRow(
             robot_id=robot, name=robot, manufacturer=maker, type="articulated", weight_kg=weight, notes="{}",
             controlled_axes=len(JOINTS[robot]), rated_payload_kg=5.0 if robot == "Arm_A" else None, simulated=True,
             ambient_temperature_degc=21.0 if robot == "Arm_B" else None, urdf="<robot/>", urdf_sha256="0" * 64,
             power_measured_at="dc_bus" if robot == "Arm_B" else "mains",
         )  # fmt: skip
         for position, joint in enumerate(JOINTS[robot], 1):
-            yield schema.Joint(
+            yield schema.JointRow(
                 robot_id=robot, name=joint, position=position, lower_limit_rad=-3.0, upper_limit_rad=3.0,
                 kind="prismatic" if robot == "Arm_D" else "revolute", speed_limit_rad_s=4.0,
                 torque_limit_nm=None if robot == "Arm_B" else 100.0, gear_ratio=50.0 if robot == "Arm_A" else None,
@@ -155,7 +155,7 @@ def _structures() -> Iterator[Base]:
     for robot, joints in JOINTS.items():
         links = ["base", *(f"link_{joint}" for joint in joints), "flange"]
         for number, link in enumerate(links):
-            yield structure.Link(
+            yield structure.LinkRow(
                 robot_id=robot, name=link, number=number, mass_kg=None if number == 0 else 2.0 * number
             )
         for joint, parent, child in zip([*joints, "mount"], links, links[1:], strict=False):
@@ -201,7 +201,7 @@ def _plans() -> Iterator[Base]:
     for robot, name, _, seconds, payload, *_ in PLANS:
         run_id = f"{robot}.{name}"
         scaled, times, *_ = SLOWER.get(run_id, (None, None))
-        yield schema.Run(
+        yield schema.RunRow(
             run_id=run_id, robot_id=robot, name=name, kind="Planned_Run", payload_kg=payload,
             time_scaling_of=scaled, time_scale=times, payload_com_x_m=0.0,
             payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
@@ -239,7 +239,7 @@ def _runs() -> Iterator[Base]:
     for robot, name, start, seconds, payload, idle, *_ in RUNS:
         run_id = f"{robot}.{name}"
         product, pieces, cycles = MADE.get(run_id, (None, None, None))
-        yield schema.Run(
+        yield schema.RunRow(
             product=product, pieces=pieces, cycles=cycles,
             run_id=run_id, robot_id=robot, name=name, kind="Measured_Run", role="observed", payload_kg=payload,
             payload_com_x_m=0.0, payload_com_y_m=0.0, payload_com_z_m=0.0, repeat_of=REPEATS.get(run_id),
@@ -273,7 +273,7 @@ def _twins() -> Iterator[Base]:
     for robot, effects in EFFECTS.items():
         made, twin = f"identification.{robot}", f"{robot}.t1"
         yield _activity(made, robot, "identification", "2026-03-05 12:01")
-        yield schema.Twin(
+        yield schema.TwinRow(
             twin_id=twin, robot_id=robot, created=_moment("2026-03-05 12:01"), file=f"twins/{twin}.json",
             sha256=digest(f"twin of {robot}"), cutoff_hz=10.0, cutoff_why=CUTOFF_WHY.get(robot),
             condition_number=conditions[robot],
@@ -299,13 +299,13 @@ def _twins() -> Iterator[Base]:
         activity_id="identification.Arm_A",
     )  # fmt: skip
     for robot, effect, joint, name, value, unit, lower, upper in PARAMETERS:
-        yield schema.Parameter(
+        yield schema.ParameterRow(
             parameter_id=f"{robot}.t1.{effect}.{joint or 'robot'}.{name}", twin_id=f"{robot}.t1", robot_id=robot,
             effect=effect, joint=joint, name=name, value=value, unit=unit, lower=lower, upper=upper,
             scaled_lower=0.9 * lower if unit == "N m" else None, scaled_upper=1.1 * upper if unit == "N m" else None,
             activity_id=f"identification.{robot}",
         )  # fmt: skip
-    yield schema.BaseParameter(
+    yield schema.BaseParameterRow(
         twin_id="Arm_A.t1", number=1, combination="Ia j1 + Izz l1", value=1.5, unit="kg m^2", lower=1.0, upper=2.0,
         activity_id="identification.Arm_A",
     )  # fmt: skip
@@ -356,7 +356,7 @@ def _energies() -> Iterator[Base]:
                 run_id=run_id, number=1, robot_id=robot, energy_j=80.0, lower_j=77.0, upper_j=83.0, activity_id=made
             )
         for number, (state, lasts, logged, told) in enumerate(SUPPLY.get(run_id, ()), start=1):
-            yield energy_schema.SupplyState(
+            yield energy_schema.SupplyStateRow(
                 run_id=run_id, number=number, robot_id=robot, state=state, seconds=lasts, power_w=logged,
                 modelled_power_w=told, modelled_power_lower_w=told - 3, modelled_power_upper_w=told + 3,
                 differs=abs(logged - told) > 3, activity_id=made,
@@ -371,7 +371,7 @@ def _energies() -> Iterator[Base]:
 def _live_runs() -> Iterator[Base]:
     for robot, name, start, seconds, payload, stream, stale_since, why in LIVE:
         run_id, made = f"{robot}.{name}", f"live.{robot}.{name}"
-        yield schema.Run(
+        yield schema.RunRow(
             run_id=run_id, robot_id=robot, name=name, kind="Live_Run", payload_kg=payload, payload_com_x_m=0.0,
             payload_com_y_m=0.0, payload_com_z_m=0.0, start_time=_moment(start), start_time_from="log",
             started=_moment(start), ended=_moment(start) + timedelta(seconds=seconds) if stream == "ended" else None,

@@ -23,7 +23,7 @@ from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAP
 from irtwin.rewriting import conclude, fill, map_rows, rewriting
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run
+from irtwin.storage.schema import RunRow
 from tests import small_fleet
 from tests.data_sets import irtwin
 
@@ -75,7 +75,7 @@ def test_a_payload_that_is_updated_is_a_row_and_a_fact_of_its_author(workspace: 
     update(workspace, text)
     assert rows(workspace, PAYLOAD) == [(5.5,)]
     with Workspace.existing(workspace) as place, place.reading() as session:
-        assert session.get_one(Run, "Arm_A.check_1").payload_kg == 5.5
+        assert session.get_one(RunRow, "Arm_A.check_1").payload_kg == 5.5
         fact = session.scalars(select(AssertedFact).where(AssertedFact.about_robot == "Arm_A")).one()
         assert (fact.author, fact.value, fact.replaced, fact.place) == ("anna", "5.5", "3.0", "run.payload_kg")
     (said,) = explain(f"<{RUN}> irt:Payload ?", workspace)

@@ -242,12 +242,12 @@ def test_a_live_run_outlasts_the_plan_of_an_earlier_data_set(watched: Path, tmp_
     shutil.copytree(watched, tmp_path / "w")
     with Workspace(tmp_path / "w") as place:
         with place.engine.begin() as connection:
-            later = sqlalchemy.update(schema.Run).where(schema.Run.kind.in_(schema.WATCHED_RUNS))
+            later = sqlalchemy.update(schema.RunRow).where(schema.RunRow.kind.in_(schema.WATCHED_RUNS))
             connection.execute(later.values(performs="arm_2.later"))
         with staged(place, "arm_2") as apart:
             ingest(apart, read_data_set(write(tmp_path / "logs", recorded())))
         with place.reading() as session:
-            runs = {run.name: run for run in session.scalars(select(schema.Run))}
+            runs = {run.name: run for run in session.scalars(select(schema.RunRow))}
     assert "later" not in runs
     assert [run.performs for name, run in runs.items() if name.startswith("live_")] == [None]
 
@@ -272,7 +272,7 @@ def test_one_run_is_dropped_and_the_others_stay(watched: Path) -> None:
     assert {one for one in before if "laden" not in one and live not in one} == after
     assert len(list((watched / "series").iterdir())) == files - 3  # the motion of "laden" is that of "reach"
     with Workspace(watched) as place, place.reading() as session:
-        assert {run.name for run in session.scalars(select(schema.Run))} >= {"reach", "later", "done", "swing_1"}
+        assert {run.name for run in session.scalars(select(schema.RunRow))} >= {"reach", "later", "done", "swing_1"}
         for table in schema.Base.metadata.sorted_tables:
             assert not [row for row in session.execute(select(table)) if "laden" in str(row) or live in str(row)]
     assert "laden" not in (watched / "reports" / "arm_2.html").read_text(encoding="utf-8")
@@ -344,7 +344,7 @@ def test_a_planned_motion_that_the_robot_cannot_make_stores_nothing(tmp_path: Pa
     with pytest.raises(InputError, match=r"outside its limits.*nothing of this data set was stored"):
         workflow.run(write(tmp_path / "logs", [far, *others]), tmp_path / "workspace")
     with Workspace(tmp_path / "workspace") as place, place.reading() as session:
-        assert session.scalars(select(schema.Run)).all() == []
+        assert session.scalars(select(schema.RunRow)).all() == []
 
 
 @pytest.mark.nightly

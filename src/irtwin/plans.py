@@ -27,8 +27,8 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import PLANNED, Run, check_plan, run_of
-from irtwin.storage import energy_schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.energy_schema import SupplyStateRow
 from irtwin.storage.files import check_place
 from irtwin.storage.schema import MEASURED_RUN
 from irtwin.storage.staging import staged
@@ -201,7 +201,7 @@ def optimise(
 
 def _off_power(place: Workspace, robot_id: str) -> float | None:
     """Return the mean power, W, that logs of a robot show while it was off; None where none does."""
-    state = energy_schema.SupplyState
+    state = SupplyStateRow
     with place.reading() as session:
         asked = select(state.seconds, state.power_w).where(state.robot_id == robot_id, state.state == "off")
         seen = [(seconds, power) for seconds, power in session.execute(asked) if power is not None]

@@ -23,7 +23,7 @@ from irtwin.storage.engine import shown
 from irtwin.storage.journal import left_behind
 from irtwin.storage.migration import newest
 from irtwin.storage.package_tables import package_tables
-from irtwin.storage.schema import LIVE, SIMULATED, Base, Robot, Run, Twin
+from irtwin.storage.schema import LIVE, SIMULATED, Base, RobotRow, RunRow, TwinRow
 from irtwin.trust import how, trusted
 from irtwin.upkeep import asked, lost_files
 
@@ -92,10 +92,10 @@ def _tables() -> list[str]:
 
 def _robots(place: Workspace) -> list[str]:
     with place.reading() as session:
-        robots = session.scalars(select(Robot).order_by(Robot.name)).all()
-        told = session.execute(select(Run.robot_id, Run.kind, Run.role))
+        robots = session.scalars(select(RobotRow).order_by(RobotRow.name)).all()
+        told = session.execute(select(RunRow.robot_id, RunRow.kind, RunRow.role))
         runs = Counter((robot_id, SIMULATED if role == SIMULATED else _KINDS[kind]) for robot_id, kind, role in told)
-        twins = set(session.scalars(select(Twin.robot_id)))
+        twins = set(session.scalars(select(TwinRow.robot_id)))
     lines = []
     for robot in robots:
         words = [word for word in (*_KINDS.values(), SIMULATED) if runs[robot.robot_id, word]]

@@ -25,7 +25,7 @@ from irtwin.storage import files
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import left_behind, of_robot
 from irtwin.storage.rows import named_files
-from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, Run
+from irtwin.storage.schema import LIVE, MEASURED_RUN, WATCHED_RUNS, RunRow
 from irtwin.storage.series import is_whole
 from irtwin.workflow import write_report
 
@@ -95,7 +95,7 @@ def _drop_run(place: Workspace, robot_id: str, name: str) -> None:
         files.remove(journal)
 
 
-def _check_that_it_may_go(place: Workspace, run: Run) -> None:
+def _check_that_it_may_go(place: Workspace, run: RunRow) -> None:
     if run.role is not None:
         raise InputError(
             f'{place.folder}: "{run.name}" stands in the robot\'s data set; take it out there and run that again'
@@ -103,7 +103,7 @@ def _check_that_it_may_go(place: Workspace, run: Run) -> None:
     if run.kind == MEASURED_RUN:
         raise InputError(f'{place.folder}: the twin was bettered or judged by "{run.name}"; it goes with its robot')
     with place.reading() as session:
-        done = session.scalars(select(Run).where(Run.performs == run.run_id)).first()
+        done = session.scalars(select(RunRow).where(RunRow.performs == run.run_id)).first()
     if done is not None:
         of_data_set = "take its `performs` out of the data set first"
         first = "remove that one first" if done.kind in WATCHED_RUNS else of_data_set if done.role else "both stay"

@@ -18,7 +18,7 @@ from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
 from irtwin.resources import folder
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Joint
+from irtwin.storage.schema import JointRow
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +30,7 @@ def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
     graph.load_ontology()
     with Workspace(tmp_path_factory.mktemp("w")) as workspace:
         joints = [
-            Joint(robot_id=rows.ROBOT, name=name, position=k, kind="revolute")
+            JointRow(robot_id=rows.ROBOT, name=name, position=k, kind="revolute")
             for k, name in enumerate(gap_cases.JOINTS, 1)
         ]
         runs = [rows.run(name) for name in gap_cases.RUNS]

@@ -18,9 +18,9 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.energy_schema import EnergyShare, JointEnergy
 from irtwin.storage.schema import (
     Base,
-    BaseParameter,
+    BaseParameterRow,
     JointState,
-    Parameter,
+    ParameterRow,
     Series,
     TorqueFit,
     TwinEffect,
@@ -69,7 +69,7 @@ def twin_parts() -> list[Base]:
     friction = {"twin_id": TWIN, "effect": "coulomb_friction"}
     return [
         TwinEffect(**friction),
-        Parameter(
+        ParameterRow(
             parameter_id=f"{TWIN}.coulomb_friction.joint_a1.Fc",
             **friction,
             **JOINT,
@@ -79,7 +79,7 @@ def twin_parts() -> list[Base]:
             lower=7.0,
             upper=7.5,
         ),
-        BaseParameter(
+        BaseParameterRow(
             twin_id=TWIN,
             number=1,
             combination="Ia joint_a1 + Izz link_1",
@@ -88,7 +88,7 @@ def twin_parts() -> list[Base]:
             lower=1.0,
             upper=2.0,
         ),
-        Parameter(
+        ParameterRow(
             parameter_id=f"{TWIN}.standby_power.robot.P0",
             twin_id=TWIN,
             robot_id=rows.ROBOT,

@@ -19,7 +19,7 @@ from irtwin.resources import folder
 from irtwin.signals.channels import CHANNELS
 from irtwin.storage import structure_schema as structure
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Parameter
+from irtwin.storage.schema import ParameterRow
 
 TWIN = f"{rows.ROBOT}.abc"
 QUDT = "http://qudt.org/vocab/unit/"
@@ -61,9 +61,9 @@ def channel(number: int, unit: str) -> structure.DeviceChannel:
     )
 
 
-def parameter(number: int, unit: str) -> Parameter:
+def parameter(number: int, unit: str) -> ParameterRow:
     named = {"parameter_id": f"p{number}", "twin_id": TWIN, "robot_id": rows.ROBOT, "effect": "coulomb_friction"}
-    return Parameter(**named, name=unit, value=1.0, unit=unit)
+    return ParameterRow(**named, name=unit, value=1.0, unit=unit)
 
 
 def test_the_mapping_knows_the_units_of_the_ontology(tmp_path: Path, known: dict[str, str]) -> None:

@@ -31,7 +31,8 @@ def asked(folder: Path, robot: bytes) -> socket.socket:
     client.settimeout(30)
     with reachable(folder / SOCKET) as address:
         client.connect(address)
-    client.sendall(robot)
+    if robot:
+        client.sendall(robot)
     return client
 
 

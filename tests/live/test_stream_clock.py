@@ -21,7 +21,7 @@ from irtwin.live.live_twin import LiveTwin
 from irtwin.live.stream_clock import HOLE, StreamClock, Tick, jump
 from irtwin.live.stream_health import STALE
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import LiveState, Run
+from irtwin.storage.schema import LiveState, RunRow
 
 NOON = 1772366400.0
 JUMPS = st.one_of(
@@ -79,7 +79,7 @@ def test_a_jump_is_told_in_seconds() -> None:
 
 def runs_of(
     jumps: list[float], steps: list[int], pause: float
-) -> tuple[list[tuple[Run, str | None]], set[float], int, list[str]]:
+) -> tuple[list[tuple[RunRow, str | None]], set[float], int, list[str]]:
     """Stream states whose clock jumps after each of the steps; return the runs with why they ended, the times that
     were sent, how many samples are stored, and what was told.
     """
@@ -100,7 +100,9 @@ def runs_of(
                     except InputError as error:
                         lines.append(f"refused: {error}")
         with place.reading() as session:
-            found = session.execute(select(Run, LiveState.stale_reason).join(LiveState).order_by(Run.start_time)).all()
+            found = session.execute(
+                select(RunRow, LiveState.stale_reason).join(LiveState).order_by(RunRow.start_time)
+            ).all()
             return [(run, why) for run, why in found], sent, twin.stored, lines
 
 

@@ -49,4 +49,4 @@ def test_nothing_is_stored_of_a_run_whose_effects_are_not_described(
     with pytest.raises(InputError, match='lacks the effect "magic"'):
         workflow.run(data, tmp_path / "workspace")
     with Workspace(tmp_path / "workspace") as place, place.reading() as session:
-        assert session.scalars(select(schema.Run)).all() == []
+        assert session.scalars(select(schema.RunRow)).all() == []

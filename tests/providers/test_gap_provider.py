@@ -130,7 +130,7 @@ def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
         == b'{"experiment": null, "follows": [], "runs": []}'
     )
     assert count(workspace, gap_schema.GapNotTestable) == 2
-    assert count(workspace, schema.Twin) == count(workspace, schema.RunEnergy) == 1
+    assert count(workspace, schema.TwinRow) == count(workspace, schema.RunEnergy) == 1
 
 
 def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> None:
@@ -164,7 +164,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
     found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     twin_id = adopt(workspace, ROBOT)
     with workspace.reading() as session:
-        twin = session.scalars(select(schema.Twin)).one()
+        twin = session.scalars(select(schema.TwinRow)).one()
         assert twin.twin_id == twin_id
         assert "a diagnosis of all these runs" in twin.split
         assert set(session.scalars(select(schema.TwinEffect.effect))) == set(FULL)
@@ -183,7 +183,7 @@ def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Works
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
     with workspace.reading() as session:
-        row = session.scalars(select(schema.Twin)).one()
+        row = session.scalars(select(schema.TwinRow)).one()
         assert set(load(workspace.folder / row.file).fitted) == {"swing_1", "swing_2"}
         parts = {one.run_id: one.part for one in session.scalars(select(schema.TwinRun))}
         fits = session.scalars(select(schema.TorqueFit)).all()

@@ -29,7 +29,7 @@ from irtwin.live.live_run import columns, journal_rows
 from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
-from irtwin.storage.schema import LIVE, PLANNED_RUN, Run
+from irtwin.storage.schema import LIVE, PLANNED_RUN, RunRow
 
 pytestmark = pytest.mark.slow
 
@@ -83,9 +83,9 @@ def mapped(place: Workspace) -> set[Quad]:
         return quads(fresh)
 
 
-def live_run(place: Workspace) -> Run:
+def live_run(place: Workspace) -> RunRow:
     with place.reading() as session:
-        return session.scalars(select(Run).where(Run.kind == "Live_Run")).one()
+        return session.scalars(select(RunRow).where(RunRow.kind == "Live_Run")).one()
 
 
 def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, graph: KnowledgeGraph) -> None:
@@ -194,7 +194,7 @@ def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: Kno
     assert place.read_series(live_run(place).run_id).num_rows == 2
     place.drop_robot(rows.ROBOT)
     with place.reading() as session:
-        assert not session.scalars(select(Run)).all()
+        assert not session.scalars(select(RunRow)).all()
 
 
 def test_a_long_stream_becomes_several_runs(
@@ -208,7 +208,7 @@ def test_a_long_stream_becomes_several_runs(
             if number % 50 == 0:
                 time.sleep(0.05)
     with place.reading() as session:
-        runs = session.scalars(select(Run).where(Run.kind == "Live_Run").order_by(Run.start_time)).all()
+        runs = session.scalars(select(RunRow).where(RunRow.kind == "Live_Run").order_by(RunRow.start_time)).all()
     assert len(runs) > 1
     assert sum(run.sample_count for run in runs) == 450
     power = np.concatenate([place.read_series(run.run_id)["power"].to_numpy() for run in runs])
@@ -237,7 +237,7 @@ def moved(number: int, by: float) -> State:
 def counts(place: Workspace) -> list[tuple[float, int]]:
     """When each live run began, s from noon, and its samples."""
     with place.reading() as session:
-        found = session.scalars(select(Run).where(Run.kind == "Live_Run").order_by(Run.start_time))
+        found = session.scalars(select(RunRow).where(RunRow.kind == "Live_Run").order_by(RunRow.start_time))
         return [(round(run.start_time.timestamp() - NOON, 3), run.sample_count) for run in found]
 
 

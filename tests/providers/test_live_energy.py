@@ -75,9 +75,9 @@ def states(run: LoggedRun, torque: Callable[[float], float] = lambda at: 0.0, po
         yield State("Arm", NOON + float(at), tuple(values))
 
 
-def live_run(place: Workspace) -> schema.Run:
+def live_run(place: Workspace) -> schema.RunRow:
     with place.reading() as session:
-        return session.scalars(select(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
+        return session.scalars(select(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)).one()
 
 
 def test_energy_grows_while_the_run_lasts_and_the_end_breaks_no_shape(
@@ -197,11 +197,15 @@ def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path
         for state in states(log()):
             twin.receive(state)
     with place.reading() as session:
-        old = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
+        old = session.scalars(
+            select(schema.RunEnergy).join(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)
+        ).one()
     run_all(small_robots.data_set(tmp_path / "data", "Arm"), place.folder)  # the same once more
     run_all(small_robots.data_set(tmp_path / "other", "Arm", seed=4), place.folder)
     with place.reading() as session:
-        new = session.scalars(select(schema.RunEnergy).join(schema.Run).where(schema.Run.kind == schema.LIVE_RUN)).one()
+        new = session.scalars(
+            select(schema.RunEnergy).join(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)
+        ).one()
     assert new.twin_id != old.twin_id
     assert new.energy_consumption_j == pytest.approx(old.energy_consumption_j, rel=1e-3)  # as measured
     assert new.modelled_energy_j != old.modelled_energy_j

@@ -19,8 +19,8 @@ from irtwin.report.questions import ask
 from irtwin.rewriting import map_rows, rewriting
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.storage.energy_schema import MeteredLoad, SupplyState
-from irtwin.storage.schema import RunEnergy, Twin
+from irtwin.storage.energy_schema import MeteredLoad, SupplyStateRow
+from irtwin.storage.schema import RunEnergy, TwinRow
 from irtwin.workflow import take_in
 
 pytestmark = pytest.mark.slow
@@ -53,8 +53,8 @@ def test_a_meters_log(tmp_path: Path) -> None:
         with place.reading() as session:
             energy = session.scalars(select(RunEnergy)).one()
             load = session.scalars(select(MeteredLoad)).one()
-            states = {row.state: row.seconds for row in session.scalars(select(SupplyState))}
-            assert session.scalars(select(Twin)).all() == []
+            states = {row.state: row.seconds for row in session.scalars(select(SupplyStateRow))}
+            assert session.scalars(select(TwinRow)).all() == []
         whole = float(np.trapezoid(power, time))
         assert (energy.energy_from, energy.energy_consumption_j) == ("measured", pytest.approx(whole))
         assert (load.cycle_count, load.cycle_time_s) == (58, 120.0)

@@ -13,7 +13,7 @@ from irtwin.errors import InputError
 from irtwin.providers.names import check_name, find_robot, identifier
 from irtwin.providers.records import ingest
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run as Row
+from irtwin.storage.schema import RunRow as Row
 
 
 def test_plain_names_are_their_own_identifiers():

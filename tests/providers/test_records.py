@@ -14,7 +14,7 @@ from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import DataSet, Run
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run as Row
+from irtwin.storage.schema import RunRow as Row
 
 URDF = """<robot name="one"><link name="base"/><link name="l1"/>
   <joint name="a" type="continuous"><parent link="base"/><child link="l1"/><axis xyz="0 0 1"/></joint></robot>"""

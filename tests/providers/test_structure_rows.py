@@ -19,7 +19,7 @@ from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.storage.database import Workspace
-from irtwin.storage.structure_schema import DHTable, Link
+from irtwin.storage.structure_schema import DHTable, LinkRow
 
 Told = tuple[DataSet, KnowledgeGraph]
 
@@ -97,10 +97,10 @@ def test_another_urdf_takes_the_place_of_all_parts(tmp_path: Path) -> None:
         ingest(workspace, read_data_set(small_robots.data_set(tmp_path / "three", "Arm", joints=3)))
         assert ingest(workspace, read_data_set(small_robots.data_set(tmp_path / "two", "Arm"))) == "replaced"
         with workspace.reading() as session:
-            assert session.query(Link).count() == len(read_data_set(tmp_path / "two").robot.links)
+            assert session.query(LinkRow).count() == len(read_data_set(tmp_path / "two").robot.links)
         workspace.drop_robot("Arm")
         with workspace.reading() as session:
-            assert session.query(Link).count() == 0
+            assert session.query(LinkRow).count() == 0
 
 
 def test_a_robot_whose_flange_stands_still_has_no_table() -> None:
@@ -115,4 +115,4 @@ def test_a_robot_whose_flange_stands_still_has_no_table() -> None:
     )
     rows = list(structure_rows("r", robot))
     assert not any(isinstance(row, DHTable) for row in rows)
-    assert sum(isinstance(row, Link) for row in rows) == 5
+    assert sum(isinstance(row, LinkRow) for row in rows) == 5

@@ -52,14 +52,14 @@ def test_a_run_that_takes_no_energy_has_no_relative_error(tmp_path: Path) -> Non
     with Workspace(tmp_path) as workspace:
         ingest(workspace, DataSet(Path(), robot, tuple(map(as_run, dead)), None, None, "mains", True, {}))
         made = identification.provide(workspace, "arm_1")
-        assert all(np.isfinite(row.value) for row in made.rows if isinstance(row, schema.Parameter))
+        assert all(np.isfinite(row.value) for row in made.rows if isinstance(row, schema.ParameterRow))
     (twin,) = made.documents.values()
     (fit,) = validate(from_json(twin.decode(), Path("twin.json")), dead[:1])
     assert fit.measured_energy == 0
     assert fit.energy_error is None
 
 
-def weighed(folder: Path, **said: object) -> tuple[schema.Twin, list[schema.Parameter], dict[str, object]]:
+def weighed(folder: Path, **said: object) -> tuple[schema.TwinRow, list[schema.ParameterRow], dict[str, object]]:
     """The twin of a robot whose data set says some more: its row, its parameters and its file."""
     robot = with_constants(arm(1))
     runs = tuple(as_run(measure(robot, swing(robot, k, seconds=6.0), noise=0.05)) for k in range(2))
@@ -67,9 +67,9 @@ def weighed(folder: Path, **said: object) -> tuple[schema.Twin, list[schema.Para
     with Workspace(folder) as workspace:
         ingest(workspace, told)
         made = identification.provide(workspace, "arm_1")
-    (row,) = (row for row in made.rows if isinstance(row, schema.Twin))
+    (row,) = (row for row in made.rows if isinstance(row, schema.TwinRow))
     (document,) = made.documents.values()
-    return row, [row for row in made.rows if isinstance(row, schema.Parameter)], json.loads(document)
+    return row, [row for row in made.rows if isinstance(row, schema.ParameterRow)], json.loads(document)
 
 
 def test_a_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path: Path) -> None:

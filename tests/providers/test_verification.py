@@ -113,7 +113,7 @@ OURS = "INSERT DATA { <urn:ours> a irt:Saving_Action ; irt:saves_at id:robot\\/A
 def take(place: Workspace, name: str, day: str, energy_j: float) -> None:
     """Keep a run of Arm_B of an hour with its measured energy, as `irtwin live` does."""
     run_id, start = f"Arm_B.{name}", datetime.fromisoformat(day)
-    row = schema.Run(
+    row = schema.RunRow(
         run_id=run_id, robot_id="Arm_B", name=name, kind="Live_Run", payload_kg=0.0, payload_com_x_m=0.0,
         payload_com_y_m=0.0, payload_com_z_m=0.0, product="bolts", start_time=start, start_time_from="log",
         started=start, ended=start + timedelta(hours=1), run_time_s=3600.0, sample_count=2, sample_rate_hz=1.0,
@@ -182,7 +182,7 @@ def test_what_is_done_is_verified_and_anew_with_each_run(opened: tuple[Workspace
     assert (row["state"], row["saved_kWh"]) == ("verified", pytest.approx(30.0 / 3.6e6))
     assert not graph.query("SELECT ?one { ?one irt:ready_for provider:verification }")
     with Session(place.engine) as session, session.begin():
-        for kind in (schema.RunEnergy, schema.Run):
+        for kind in (schema.RunEnergy, schema.RunRow):
             session.execute(delete(kind).where(kind.run_id == "Arm_B.after_2"))
     map_rows(place, graph)
     renew(place, graph, lambda: map_rows(place, graph))

@@ -11,7 +11,7 @@ from tests import rows
 
 from irtwin.storage.asserted import AssertedFact, follow
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run
+from irtwin.storage.schema import RunRow
 
 WORK = f"{rows.ROBOT}.work"
 LATER = rows.NOON + timedelta(days=300)
@@ -55,7 +55,7 @@ def test_a_kept_fact_changes_its_row_and_makes_the_data_set_one_to_fit_anew(tmp_
         before = next(run for run in runs if run.run_id == WORK).payload_kg
         place.keep_facts([fact("5.5", str(before))], [])
         with place.reading() as session:
-            assert session.get_one(Run, WORK).payload_kg == 5.5
+            assert session.get_one(RunRow, WORK).payload_kg == 5.5
         for outcome in ("replaced", "unchanged"):
             robot, parts, runs, series = rows.data_set()
             facts = place.facts_about(rows.ROBOT)

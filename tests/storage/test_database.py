@@ -11,7 +11,7 @@ from tests import rows
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace, in_memory
-from irtwin.storage.schema import Activity, ActivityUse, Base, Joint, Run, RunEnergy, RunState, Series, Twin
+from irtwin.storage.schema import Activity, ActivityUse, Base, JointRow, RunEnergy, RunRow, RunState, Series, TwinRow
 
 WORK = f"{rows.ROBOT}.work"
 TWIN, OTHER = f"{rows.ROBOT}.t1", f"{rows.ROBOT}.t2"
@@ -61,7 +61,7 @@ def test_a_data_set_is_taken_in(workspace: Workspace) -> None:
     with workspace.reading() as session:
         stored = session.scalars(select(Series).where(Series.run_id == WORK)).one()
         assert workspace.read_file(stored.path, stored.series_id).equals(rows.samples(1))
-        assert session.get_one(Run, f"{rows.ROBOT}.again").repeat_of == WORK
+        assert session.get_one(RunRow, f"{rows.ROBOT}.again").repeat_of == WORK
 
 
 def test_the_same_data_set_changes_nothing(workspace: Workspace) -> None:
@@ -107,7 +107,7 @@ def test_another_robot_is_left_alone(workspace: Workspace) -> None:
     assert workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)}) == "new"
     workspace.drop_robot(rows.ROBOT)
     with workspace.reading() as session:
-        assert session.scalars(select(Run.run_id)).all() == ["Other.alone"]
+        assert session.scalars(select(RunRow.run_id)).all() == ["Other.alone"]
     assert workspace.read_series("Other.alone").num_rows == 5
     assert len(list((workspace.folder / "series").iterdir())) == 1
 
@@ -138,7 +138,7 @@ def test_a_run_is_dropped_alone(workspace: Workspace) -> None:
     workspace.replace_activity(rows.activity("state.5", "other", f"run/{again}"), ["series"], [])
     workspace.drop_run(again, f"run/{again}")
     with workspace.reading() as session:
-        assert session.scalars(select(Run.run_id)).all() == [WORK]
+        assert session.scalars(select(RunRow.run_id)).all() == [WORK]
         assert set(session.scalars(select(Series.run_id))) == {WORK}
         assert session.get(Activity, "state.5") is None
 
@@ -164,7 +164,7 @@ def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace
         documents={f"twins/{OTHER}.json": b"{2}"},
     )
     with workspace.reading() as session:
-        assert session.scalars(select(Twin.twin_id)).all() == [OTHER]
+        assert session.scalars(select(TwinRow.twin_id)).all() == [OTHER]
         assert session.scalars(select(RunEnergy)).all() == []
         assert set(session.scalars(select(Series.kind))) == {"measured"}
         assert set(session.scalars(select(Activity.activity_id))) == {"state.1", "twin.2"}
@@ -195,7 +195,7 @@ def test_times_come_back_in_utc(workspace: Workspace) -> None:
     run = rows.run("work", start_time=datetime(2026, 1, 2, 23, 30, tzinfo=eastern))
     assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "new"
     with workspace.reading() as session:
-        found = session.get_one(Run, WORK).start_time
+        found = session.get_one(RunRow, WORK).start_time
     assert found.isoformat() == "2026-01-03T04:30:00+00:00"
     assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "unchanged"
 
@@ -252,10 +252,10 @@ def test_a_database_in_memory_has_the_tables_of_a_workspace_and_the_rows_that_we
         kept = set(inspect(workspace.engine).get_table_names())
         assert set(inspect(engine).get_table_names()) == kept - {"alembic_version"}
         with engine.connect() as connection:
-            assert list(connection.scalars(select(Joint.name))) == ["joint_a1", "joint_a2"]
+            assert list(connection.scalars(select(JointRow.name))) == ["joint_a1", "joint_a2"]
 
 
 def test_each_in_memory_is_a_database_of_its_own() -> None:
     for _ in range(2):
         with in_memory([rows.robot()]) as engine, engine.connect() as connection:
-            assert not list(connection.scalars(select(Joint.name)))
+            assert not list(connection.scalars(select(JointRow.name)))

@@ -17,7 +17,7 @@ from irtwin.storage import engine
 from irtwin.storage.database import Workspace
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Base, Individuals, Joint, Robot, Run, Series
+from irtwin.storage.schema import Base, Individuals, JointRow, RobotRow, RunRow, Series
 
 SERIES = {
     "series_id": "a" * 64,
@@ -35,40 +35,40 @@ def row_of(table: type[Base]) -> dict[str, Any]:
         return dict(SERIES)
     if table is Individuals:
         return {"base_iri": "https://plant.example/energy/"}
-    return values({Robot: rows.robot, Joint: lambda: rows.joints()[0], Run: lambda: rows.run("work")}[table]())
+    return values({RobotRow: rows.robot, JointRow: lambda: rows.joints()[0], RunRow: lambda: rows.run("work")}[table]())
 
 
-@pytest.mark.parametrize("table", [Robot, Joint, Run, Series, Individuals])
+@pytest.mark.parametrize("table", [RobotRow, JointRow, RunRow, Series, Individuals])
 def test_what_irtwin_writes_is_taken(table: type[Base]) -> None:
     check_row(of(table), row_of(table))
 
 
 def test_names_of_any_script_are_taken() -> None:
-    check_row(of(Robot), row_of(Robot) | {"robot_id": "~0123456789abcdef", "name": "焊接机器人"})
+    check_row(of(RobotRow), row_of(RobotRow) | {"robot_id": "~0123456789abcdef", "name": "焊接机器人"})
 
 
 @pytest.mark.parametrize(
     ("table", "column", "value"),
     [
-        (Robot, "robot_id", "../../../x"),
-        (Robot, "robot_id", ""),
-        (Robot, "robot_id", None),
-        (Robot, "robot_id", "a/b"),
-        (Robot, "robot_id", "a" * 300),
-        (Robot, "robot_id", 5),
-        (Robot, "name", "a\0b"),
-        (Robot, "name", "\ud800"),
-        (Robot, "controlled_axes", 10**30),
-        (Robot, "controlled_axes", True),
-        (Robot, "weight_kg", "50"),
-        (Robot, "weight_kg", math.inf),
-        (Robot, "simulated", "yes"),
-        (Joint, "robot_id", ".."),
-        (Run, "run_id", f"{rows.ROBOT}/../x"),
-        (Run, "run_id", "other.work"),
-        (Run, "repeat_of", "../work"),
-        (Run, "kind", "Any_Run"),
-        (Run, "start_time", "yesterday"),
+        (RobotRow, "robot_id", "../../../x"),
+        (RobotRow, "robot_id", ""),
+        (RobotRow, "robot_id", None),
+        (RobotRow, "robot_id", "a/b"),
+        (RobotRow, "robot_id", "a" * 300),
+        (RobotRow, "robot_id", 5),
+        (RobotRow, "name", "a\0b"),
+        (RobotRow, "name", "\ud800"),
+        (RobotRow, "controlled_axes", 10**30),
+        (RobotRow, "controlled_axes", True),
+        (RobotRow, "weight_kg", "50"),
+        (RobotRow, "weight_kg", math.inf),
+        (RobotRow, "simulated", "yes"),
+        (JointRow, "robot_id", ".."),
+        (RunRow, "run_id", f"{rows.ROBOT}/../x"),
+        (RunRow, "run_id", "other.work"),
+        (RunRow, "repeat_of", "../work"),
+        (RunRow, "kind", "Any_Run"),
+        (RunRow, "start_time", "yesterday"),
         (Series, "series_id", "../x"),
         (Series, "path", "/etc/passwd"),
         (Series, "path", "series/../../x"),
@@ -89,17 +89,17 @@ def of(table: type[Base]) -> Table:
 @pytest.mark.parametrize(
     ("table", "column", "value"),
     [
-        (Robot, "weight_kg", "x"),
-        (Robot, "weight_kg", b"\xff"),
-        (Robot, "weight_kg", "9e999"),
-        (Run, "started", 1e-310),
+        (RobotRow, "weight_kg", "x"),
+        (RobotRow, "weight_kg", b"\xff"),
+        (RobotRow, "weight_kg", "9e999"),
+        (RunRow, "started", 1e-310),
     ],
 )
 def test_a_workspace_whose_rows_another_program_changed_is_not_opened(
     tmp_path: Path, table: type[Base], column: str, value: object
 ) -> None:
     with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
-        for one in dict.fromkeys([Robot, table]):
+        for one in dict.fromkeys([RobotRow, table]):
             session.execute(insert(of(one)), [row_of(one)])
     with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
         database.execute(f"UPDATE {of(table).name} SET {column} = ?", (value,))
@@ -110,8 +110,8 @@ def test_a_workspace_whose_rows_another_program_changed_is_not_opened(
 
 def test_a_row_that_refers_to_none_is_told(tmp_path: Path) -> None:
     with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
-        session.execute(insert(of(Robot)), [row_of(Robot)])
-        session.execute(insert(of(Joint)), [row_of(Joint)])
+        session.execute(insert(of(RobotRow)), [row_of(RobotRow)])
+        session.execute(insert(of(JointRow)), [row_of(JointRow)])
     with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
         database.execute("DELETE FROM robot")
         database.commit()

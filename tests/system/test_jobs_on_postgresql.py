@@ -20,7 +20,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.live.known_robots import StoredTimes
 from irtwin.location import Location
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import WATCHED_RUNS, ImprovementRound, Run
+from irtwin.storage.schema import WATCHED_RUNS, ImprovementRound, RunRow
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 
@@ -54,9 +54,9 @@ def plant(tmp_path_factory: pytest.TempPathFactory, new_postgresql_database: Cal
     return made
 
 
-def live_run(plant: Plant) -> Run:
+def live_run(plant: Plant) -> RunRow:
     with plant.open() as place, place.reading() as session:
-        return session.scalars(select(Run).where(Run.kind.in_(WATCHED_RUNS))).one()
+        return session.scalars(select(RunRow).where(RunRow.kind.in_(WATCHED_RUNS))).one()
 
 
 @pytest.mark.nightly

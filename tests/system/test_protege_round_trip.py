@@ -11,7 +11,7 @@ from tests.data_sets import irtwin
 from irtwin.asking import ask, export
 from irtwin.identification.validation import FIT
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import Run, Twin, TwinRun
+from irtwin.storage.schema import RunRow, TwinRow, TwinRun
 from irtwin.workflow import run, unpack_demo
 
 pytest.importorskip("jpype")
@@ -38,14 +38,14 @@ def test_a_payload_that_is_changed_in_protege_is_followed(tmp_path: Path) -> Non
     run(data_set, place)
     assert twin_of(place) != twin
     with Workspace.existing(place) as there, there.reading() as session:
-        assert session.get_one(Run, run_id).payload_kg == 5.5
+        assert session.get_one(RunRow, run_id).payload_kg == 5.5
     (row,) = ask(f"SELECT ?kg {{ <{iri}> irt:Payload ?kg }}", place).rows
     assert row["kg"] == 5.5
 
 
 def twin_of(place: Path) -> str:
     with Workspace.existing(place) as there, there.reading() as session:
-        return session.scalars(select(Twin.twin_id)).one()
+        return session.scalars(select(TwinRow.twin_id)).one()
 
 
 def of_first_run(place: Path) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove
 from irtwin.storage.journal import DamagedJournal, Header, left_behind, read_journal
 from irtwin.storage.rows import Tables, Values, tables_of
-from irtwin.storage.schema import Activity, Run, RunEnergy, relation_to
+from irtwin.storage.schema import Activity, RunEnergy, RunRow, relation_to
 
 
 def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, announce: Announce) -> Tables:
@@ -36,8 +36,8 @@ def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, 
     with place.reading() as session:
         known = session.get(RunEnergy, header.run_id) is not None
     if not kept:  # else a crash came right here
-        others = {name: rows for name, rows in tables.items() if name != Run.__tablename__}
-        place.keep_run(Run(**tables[Run.__tablename__][0]), series, others)
+        others = {name: rows for name, rows in tables.items() if name != RunRow.__tablename__}
+        place.keep_run(RunRow(**tables[RunRow.__tablename__][0]), series, others)
     if twin is not None and not known:
         tables = live_run.together(tables, _keep_energy(place, header, tables["activity"][0]))
     return tables
@@ -85,7 +85,7 @@ def _use(activity_id: str, read: str) -> Values:
 
 def _is_there(place: Workspace, run_id: str) -> bool:
     with place.reading() as session:
-        return session.get(Run, run_id) is not None
+        return session.get(RunRow, run_id) is not None
 
 
 def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | None:

@@ -15,7 +15,7 @@ from irtwin.live.joint_stream import State
 from irtwin.providers.live_energy import KnownTwin, known_twin
 from irtwin.providers.names import find_run
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import PLANNED_RUN, WATCHED_RUNS, Joint, Robot, Run
+from irtwin.storage.schema import PLANNED_RUN, WATCHED_RUNS, JointRow, RobotRow, RunRow
 
 _STEP = 2e-6  # s: the database keeps moments to the microsecond
 
@@ -27,7 +27,9 @@ class StoredTimes:
         """Read the runs of a workspace."""
         self._runs: defaultdict[str, list[tuple[float, float, str]]] = defaultdict(list)  # by start
         self._reach: dict[str, list[tuple[float, str]]] = {}  # of each and those before: the last end, and whose
-        runs = select(Run.robot_id, Run.run_id, Run.start_time, Run.run_time_s).where(Run.kind.in_(WATCHED_RUNS))
+        runs = select(RunRow.robot_id, RunRow.run_id, RunRow.start_time, RunRow.run_time_s).where(
+            RunRow.kind.in_(WATCHED_RUNS)
+        )
         with place.reading() as session:
             for robot_id, run_id, began, length in session.execute(runs):
                 assert began is not None  # of a run that was watched
@@ -64,9 +66,10 @@ class KnownRobots:
         self._place, self._announce = place, announce
         self.joints: dict[str, list[str]] = {}
         with place.reading() as session:
-            for robot_id, name in session.execute(select(Joint.robot_id, Joint.name).order_by(Joint.position)):
+            for robot_id, name in session.execute(select(JointRow.robot_id, JointRow.name).order_by(JointRow.position)):
                 self.joints.setdefault(robot_id, []).append(name)
-            self.names = {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}
+            robots = session.execute(select(RobotRow.robot_id, RobotRow.name))
+            self.names = {robot_id: name for robot_id, name in robots}
         self.times = StoredTimes(place)
         self._twins: dict[str, KnownTwin | None] = {}
         self._plans: dict[tuple[str, str], str] = {}

@@ -18,9 +18,9 @@ from irtwin.providers.records import inputs, load_run, load_twin
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill
-from irtwin.storage import energy_schema, schema
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS
+from irtwin.storage.energy_schema import EnergyShare, InseparableEnergy, JointEnergy, RunPrice, SupplyStateRow
+from irtwin.storage.schema import PLANNED_RUN, SIMULATED, WATCHED_RUNS, Base, RunEnergy, RunRow, TwinRun
 from irtwin.twin.account import Entry, Share, account
 from irtwin.twin.price import Figure, Price, cost, saving
 from irtwin.twin.supply_states import SupplyState, supply_states
@@ -31,7 +31,7 @@ from irtwin.twin.validate import validate
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well; of a plan its price."""
     with workspace.reading() as session:
-        run = session.get_one(schema.Run, run_id)
+        run = session.get_one(RunRow, run_id)
     if run.kind in WATCHED_RUNS:
         return live_energy.provide(workspace, run_id)
     robot_id = run.robot_id
@@ -39,7 +39,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     if run.kind == PLANNED_RUN:
         return _planned(workspace, robot_id, run_id, twin_id, twin)
     with workspace.reading() as session:
-        role = session.get_one(schema.TwinRun, (twin_id, run_id))
+        role = session.get_one(TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
     entries = account(twin, motion)
     shares = [share for entry in entries for share in entry.shares]
@@ -53,7 +53,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             *_account(robot_id, run_id, twin_id, entries),
             *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
-                energy_schema.JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
+                JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
                 for joint, energy in _per_joint(shares).items()
             ),
         ],
@@ -61,13 +61,13 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     )
 
 
-def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry]) -> Iterator[schema.Base]:
+def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry]) -> Iterator[Base]:
     """Yield a run's shares of energy, and what is told of those together that are not told apart."""
     number = 0
     for entry in entries:
         if len(entry.shares) > 1:
             number += 1
-            yield energy_schema.InseparableEnergy(
+            yield InseparableEnergy(
                 run_id=run_id,
                 number=number,
                 robot_id=robot_id,
@@ -76,7 +76,7 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
                 upper_j=entry.upper,
             )
         for share in entry.shares:
-            yield energy_schema.EnergyShare(
+            yield EnergyShare(
                 twin_id=twin_id,
                 run_id=run_id,
                 effect=share.effect,
@@ -90,9 +90,9 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
             )
 
 
-def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[energy_schema.SupplyState]:
+def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[SupplyStateRow]:
     for number, one in enumerate(states, start=1):
-        yield energy_schema.SupplyState(
+        yield SupplyStateRow(
             run_id=run_id,
             number=number,
             robot_id=robot_id,
@@ -108,9 +108,9 @@ def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twi
     motion = condition(load_run(workspace, twin.robot, run_id), twin.robot, twin.cutoff)
     taken = cost(twin, [motion])
     with workspace.reading() as session:
-        scaled = session.get_one(schema.Run, run_id).time_scaling_of
+        scaled = session.get_one(RunRow, run_id).time_scaling_of
     saved = None if scaled is None else _saving(workspace, scaled, twin, motion)
-    row = energy_schema.RunPrice(
+    row = RunPrice(
         run_id=run_id,
         twin_id=twin_id,
         energy_from="modelled" if twin.knows_power else "mechanical",
@@ -149,8 +149,8 @@ def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:
 def stored_price(workspace: Workspace, run_id: str) -> Price | None:
     """Return what a planned run takes, as it was stored; None where its robot's twin knows nothing of power."""
     with workspace.reading() as session:
-        seconds = session.get_one(schema.Run, run_id).run_time_s
-        row = session.get_one(energy_schema.RunPrice, run_id)
+        seconds = session.get_one(RunRow, run_id).run_time_s
+        row = session.get_one(RunPrice, run_id)
     if row.energy_from != "modelled":
         return None
 
@@ -165,7 +165,7 @@ def stored_price(workspace: Workspace, run_id: str) -> Price | None:
     )
 
 
-def held_out(role: schema.TwinRun, motion: Motion) -> np.ndarray:
+def held_out(role: TwinRun, motion: Motion) -> np.ndarray:
     """Return which samples took no part in the fit, (N,) bool."""
     if role.held_out_from_s is not None:
         return motion.time >= role.held_out_from_s
@@ -192,15 +192,15 @@ def modelled_series(twin: Twin, motion: Motion, judged: np.ndarray) -> pa.Table:
 
 
 def _run_energy(
-    run: schema.Run, twin_id: str, role: schema.TwinRun, twin: Twin, motion: Motion, shares: Sequence[Share]
-) -> schema.RunEnergy:
+    run: RunRow, twin_id: str, role: TwinRun, twin: Twin, motion: Motion, shares: Sequence[Share]
+) -> RunEnergy:
     (whole,) = validate(twin, [motion])
     start = int(np.argmax(held_out(role, motion)))
     judged = whole if start == 0 else validate(twin, [motion.part(start, len(motion.time))])[0]
     power = twin.power(motion) if motion.power is None else motion.power
     standby = sum(share.energy for share in shares if share.effect in twin.at_rest)
     energy = whole.modelled_energy if whole.measured_energy is None else whole.measured_energy
-    return schema.RunEnergy(
+    return RunEnergy(
         run_id=run.run_id,
         twin_id=twin_id,
         part=role.part,

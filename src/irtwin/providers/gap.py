@@ -23,11 +23,11 @@ from irtwin.providers.names import identifier, robot_iri
 from irtwin.providers.provider import Made, activity, keep
 from irtwin.providers.records import inputs, rows_of
 from irtwin.signals.log import DataSet
-from irtwin.storage import gap_schema, schema
 from irtwin.storage.database import DIAGNOSES, Workspace
 from irtwin.storage.files import inside
+from irtwin.storage.gap_schema import GapDiagnosis, OfDiagnosis
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Base
+from irtwin.storage.schema import Base, JointRow, RobotRow, RunRow
 from irtwin.twin.files import from_json
 from irtwin.twin.identify import identify
 
@@ -39,7 +39,7 @@ def record(
     curves: Curves,
     twin: str | None = None,
     motion: str | None = None,
-) -> gap_schema.GapDiagnosis:
+) -> GapDiagnosis:
     """Keep a robot's diagnosis, in place of an earlier one; return its row.
 
     curves: what a page draws of it; twin: text of the twin with the causes added, which `adopt` makes the robot's;
@@ -48,16 +48,16 @@ def record(
     """
     started = datetime.now(UTC)
     with workspace.reading() as session:
-        if session.get(schema.Robot, robot_id) is None:
+        if session.get(RobotRow, robot_id) is None:
             raise InputError(f"{workspace.folder}: no robot {robot_id} here; run `irtwin run` on its data set first")
-        runs = session.scalars(select(schema.Run).where(schema.Run.robot_id == robot_id)).all()
-        joints = session.scalars(select(schema.Joint).where(schema.Joint.robot_id == robot_id)).all()
+        runs = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id)).all()
+        joints = session.scalars(select(JointRow).where(JointRow.robot_id == robot_id)).all()
     row, parts, documents = _rows(robot_id, joints, runs, diagnosis, curves, twin, motion)
     used = inputs(workspace, robot_id, [run.run_id for run in runs])
     diagnosis_id = row.diagnosis_id
     keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)
     with workspace.reading() as session:
-        return session.get_one(gap_schema.GapDiagnosis, diagnosis_id)
+        return session.get_one(GapDiagnosis, diagnosis_id)
 
 
 def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[list[Base], dict[str, bytes]]:
@@ -67,7 +67,7 @@ def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[
     """
     started = datetime.now(UTC)
     robot, parts, runs = rows_of(data_set, {})
-    joints = [part for part in parts if isinstance(part, schema.Joint)]
+    joints = [part for part in parts if isinstance(part, JointRow)]
     row, own, documents = _rows(robot.robot_id, joints, runs, diagnosis, curves)
     judged = activity("diagnosis", robot.robot_id, robot_iri(robot.robot_id), started)
     for one in (row, *own):
@@ -85,7 +85,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     """
     started = datetime.now(UTC)
     with workspace.reading() as session:
-        of_robot = select(gap_schema.GapDiagnosis).where(gap_schema.GapDiagnosis.robot_id == robot_id)
+        of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
         diagnosis = session.scalars(of_robot).one_or_none()
     if diagnosis is None:
         raise InputError(f"{robot_id}: no diagnosis in {workspace.folder}; run `irtwin diagnose` with it first")
@@ -107,13 +107,13 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
 
 def _rows(
     robot_id: str,
-    joints: Iterable[schema.Joint],
-    runs: Iterable[schema.Run],
+    joints: Iterable[JointRow],
+    runs: Iterable[RunRow],
     diagnosis: Document,
     curves: Curves,
     twin: str | None = None,
     motion: str | None = None,
-) -> tuple[gap_schema.GapDiagnosis, list[gap_schema.OfDiagnosis], dict[str, bytes]]:
+) -> tuple[GapDiagnosis, list[OfDiagnosis], dict[str, bytes]]:
     """Return the row of a diagnosis, those of its parts, and the documents that it names, by their path."""
     texts = _texts(diagnosis, curves, twin, motion)
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
@@ -121,7 +121,7 @@ def _rows(
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}" for kind in texts}
     ids = {run.run_id.removeprefix(f"{robot_id}."): run.run_id for run in runs}
     of = Of(diagnosis_id, robot_id, partial(_run_id, ids), {joint.name: joint.kind for joint in joints})
-    row = gap_schema.GapDiagnosis(
+    row = GapDiagnosis(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
         created=datetime.now(UTC),

@@ -17,8 +17,8 @@ from irtwin.providers.motions import RobotMotions, robot_motions
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, load_run, stored_data_set
 from irtwin.signals.log import DataSet, Run
-from irtwin.storage import schema
 from irtwin.storage.database import TWINS, Workspace
+from irtwin.storage.schema import BaseParameterRow, ParameterRow, TorqueFit, TwinChoice, TwinEffect, TwinRow, TwinRun
 from irtwin.twin.files import to_json
 from irtwin.twin.torque_scale import torque_scale
 from irtwin.twin.twin import BaseParameter, Choice, Parameter, Twin
@@ -58,7 +58,7 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
     document = to_json(twin).encode()
     checksum = hashlib.sha256(document).hexdigest()
     twin_id = f"{robot_id}.{checksum[:12]}"
-    row = schema.Twin(
+    row = TwinRow(
         twin_id=twin_id,
         robot_id=robot_id,
         created=datetime.now(UTC),
@@ -77,7 +77,7 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
         used=inputs(workspace, robot_id, keys.values()),
         rows=[
             row,
-            *(schema.TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),
+            *(TwinEffect(twin_id=twin_id, effect=effect) for effect in twin.effect_ids),
             *(_choice(twin_id, choice) for choice in twin.choices),
             *_runs(twin_id, keys, parts),
             *_parameters(twin_id, robot_id, twin),
@@ -88,8 +88,8 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
     )
 
 
-def _choice(twin_id: str, one: Choice) -> schema.TwinChoice:
-    return schema.TwinChoice(
+def _choice(twin_id: str, one: Choice) -> TwinChoice:
+    return TwinChoice(
         choice_id=f"{twin_id}.{one.effect}.{'chosen' if one.chosen else 'open'}",
         twin_id=twin_id,
         effect=one.effect,
@@ -113,21 +113,21 @@ def body_combinations(twin: Twin) -> int | None:
     return len(base_parameters(Stack(twin.robot, bodies)).independent)
 
 
-def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[schema.TwinRun]:
+def _runs(twin_id: str, keys: dict[str, str], parts: Split) -> Iterator[TwinRun]:
     held_out_from = {motion.run: float(motion.time[0]) for motion in parts.held_out}
     for name, run_id in keys.items():
         part = parts.part(name)
         cut = held_out_from[name] if part == "both" else None
-        yield schema.TwinRun(twin_id=twin_id, run_id=run_id, part=part, held_out_from_s=cut)
+        yield TwinRun(twin_id=twin_id, run_id=run_id, part=part, held_out_from_s=cut)
 
 
-def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[schema.Parameter]:
+def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[ParameterRow]:
     seen: Counter[str] = Counter()  # an effect of two shapes in one joint has two parameters of a name
     for parameter in twin.stated:
         place = parameter.joint or parameter.link or "robot"
         key = f"{twin_id}.{parameter.effect}.{place}.{parameter.name}"
         seen[key] += 1
-        yield schema.Parameter(
+        yield ParameterRow(
             parameter_id=key if seen[key] == 1 else f"{key}.{seen[key]}",
             twin_id=twin_id,
             robot_id=robot_id,
@@ -149,9 +149,9 @@ def _scaled(twin: Twin, one: Parameter | BaseParameter) -> dict[str, float]:
     return {} if interval is None else {"scaled_lower": interval[0], "scaled_upper": interval[1]}
 
 
-def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]:
+def _base_parameters(twin_id: str, twin: Twin) -> Iterator[BaseParameterRow]:
     for number, parameter in enumerate(twin.base_parameters, start=1):
-        yield schema.BaseParameter(
+        yield BaseParameterRow(
             twin_id=twin_id,
             number=number,
             combination=parameter.name,
@@ -163,15 +163,13 @@ def _base_parameters(twin_id: str, twin: Twin) -> Iterator[schema.BaseParameter]
         )
 
 
-def _torque_fits(
-    twin_id: str, robot_id: str, keys: dict[str, str], twin: Twin, parts: Split
-) -> Iterator[schema.TorqueFit]:
+def _torque_fits(twin_id: str, robot_id: str, keys: dict[str, str], twin: Twin, parts: Split) -> Iterator[TorqueFit]:
     for part, motions in ((FIT, parts.fit), (HELD_OUT, parts.held_out)):
         for fit in validate(twin, motions):
             if fit.torque_rmse is None or fit.r_squared is None:
                 continue
             for joint, error, explained in zip(twin.robot.joint_names, fit.torque_rmse, fit.r_squared, strict=True):
-                yield schema.TorqueFit(
+                yield TorqueFit(
                     twin_id=twin_id,
                     run_id=keys[fit.run],
                     joint=joint,

@@ -24,8 +24,8 @@ from irtwin.providers.names import twin_iri
 from irtwin.providers.provider import Made, keep
 from irtwin.providers.records import inputs, load_twin
 from irtwin.signals.motion import Motion
-from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.schema import ImprovementRound, TwinRow, TwinRun
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
@@ -138,11 +138,11 @@ class _Loop:
         used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
         keep(self.workspace, "improvement", Made(self.robot_id, used, [row]), started, f"{_ROUNDS}{row.round_id}")
 
-    def _row(self, tried: Round, earlier: str, fitted: _Twin) -> schema.ImprovementRound:
-        of_robot = schema.ImprovementRound.robot_id == self.robot_id
+    def _row(self, tried: Round, earlier: str, fitted: _Twin) -> ImprovementRound:
+        of_robot = ImprovementRound.robot_id == self.robot_id
         with self.workspace.reading() as session:
-            last = session.scalar(select(func.max(schema.ImprovementRound.number)).where(of_robot)) or 0
-        return schema.ImprovementRound(
+            last = session.scalar(select(func.max(ImprovementRound.number)).where(of_robot)) or 0
+        return ImprovementRound(
             round_id=f"{self.robot_id}.{last + 1}",
             robot_id=self.robot_id,
             number=last + 1,
@@ -160,8 +160,8 @@ class _Loop:
 def _parts_before(workspace: Workspace, known: RobotMotions, twin_id: str, new: Sequence[str]) -> Split:
     """Return the parts that runs took in a twin; new logs are held out of it."""
     with workspace.reading() as session:
-        rows = session.scalars(select(schema.TwinRun).where(schema.TwinRun.twin_id == twin_id)).all()
-        rule = session.get_one(schema.Twin, twin_id).split
+        rows = session.scalars(select(TwinRun).where(TwinRun.twin_id == twin_id)).all()
+        rule = session.get_one(TwinRow, twin_id).split
     fit, held_out = [], []
     for row in rows:
         motion = known.motions[row.run_id]

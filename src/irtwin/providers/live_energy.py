@@ -21,20 +21,25 @@ from irtwin.providers.names import run_iri, twin_iri
 from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
 from irtwin.signals.channels import CHANNELS, Signals, columns_of
-from irtwin.storage import energy_schema, schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.energy_schema import EnergyShare, JointEnergy
 from irtwin.storage.rows import Tables, Values
+from irtwin.storage.schema import (
+    LIVE,
+    LIVE_RUN,
+    GapExcursion,
+    GapState,
+    JointRow,
+    RunEnergy,
+    RunRow,
+    TwinRun,
+    moment_of,
+)
 from irtwin.twin.gap_watch import ROBOT, GapWatch, Windows, band
 from irtwin.twin.so_far import EnergySoFar, WatchedStretch
 from irtwin.twin.twin import Twin
 
-_KINDS: Mapping[str, type[schema.Base]] = {
-    "run_energy": schema.RunEnergy,
-    "energy_share": energy_schema.EnergyShare,
-    "joint_energy": energy_schema.JointEnergy,
-    "gap_state": schema.GapState,
-    "gap_excursion": schema.GapExcursion,
-}
+_KINDS = {kind.__tablename__: kind for kind in (RunEnergy, EnergyShare, JointEnergy, GapState, GapExcursion)}
 _AT_ONCE = 4096  # samples of a stored run
 _MOST_RUNS = 40  # that a twin knows tell its band
 _QUDT = {"W": "W", "N m": "N-M", "N": "N"}  # what QUDT calls the units of residuals
@@ -66,11 +71,11 @@ class LiveEnergy:
         known: KnownTwin | None,
         payload: float = 0.0,
         payload_com: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        kind: str = schema.LIVE_RUN,
+        kind: str = LIVE_RUN,
     ) -> None:
         """Begin a run of a robot by its twin, with what its flange carries: kg, and m in the flange's frame."""
         self.known = known
-        self._is_consumption = kind == schema.LIVE_RUN  # a replay takes nothing
+        self._is_consumption = kind == LIVE_RUN  # a replay takes nothing
         self._run_id, self._robot_id = run_id, robot_id
         twin = None if known is None else known.twin
         self.so_far = EnergySoFar(joints, twin, name=run_id, payload=payload, payload_com=payload_com)
@@ -147,7 +152,7 @@ class LiveEnergy:
                 "band": now.band,
                 "ratio": now.ratio,
                 "state": now.state,
-                "since": schema.moment_of(now.since),
+                "since": moment_of(now.since),
             }
 
     def _excursions(self) -> Iterator[Values]:
@@ -155,8 +160,8 @@ class LiveEnergy:
             for number, one in enumerate(now.excursions, start=1):
                 yield self._place(place) | {
                     "number": number,
-                    "began": schema.moment_of(one.began),
-                    "ended": None if one.ended is None else schema.moment_of(one.ended),
+                    "began": moment_of(one.began),
+                    "ended": None if one.ended is None else moment_of(one.ended),
                     "lasted_s": one.until - one.began,
                     "peak_residual": one.peak_residual,
                     "peak_ratio": one.peak_ratio,
@@ -172,7 +177,7 @@ class LiveEnergy:
 
 def watching(run_id: str) -> str:
     """Return the id of the activity that watched a live run, and read its meter."""
-    return f"{schema.LIVE}.{run_id}"
+    return f"{LIVE}.{run_id}"
 
 
 def used(run_id: str, known: KnownTwin | None) -> list[str]:
@@ -183,10 +188,8 @@ def used(run_id: str, known: KnownTwin | None) -> list[str]:
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make the energy, the ledger, the gap and the modelled series of a live run that is stored."""
     with workspace.reading() as session:
-        run = session.get_one(schema.Run, run_id)
-        in_order = (
-            select(schema.Joint.name).where(schema.Joint.robot_id == run.robot_id).order_by(schema.Joint.position)
-        )
+        run = session.get_one(RunRow, run_id)
+        in_order = select(JointRow.name).where(JointRow.robot_id == run.robot_id).order_by(JointRow.position)
         joints = tuple(session.scalars(in_order))
     known = known_twin(workspace, run.robot_id)
     com = (run.payload_com_x_m, run.payload_com_y_m, run.payload_com_z_m)
@@ -236,10 +239,10 @@ def _modelled_series(joints: tuple[str, ...], stretches: list[WatchedStretch], b
 def _bands(workspace: Workspace, twin_id: str, joints: tuple[str, ...]) -> dict[str, float]:
     """Return the band of each place: the widest of the newest runs that the twin knows, fitted or held out."""
     newest = (
-        select(schema.TwinRun.run_id)
-        .join(schema.Run, schema.Run.run_id == schema.TwinRun.run_id)
-        .where(schema.TwinRun.twin_id == twin_id, schema.TwinRun.part != APART)
-        .order_by(schema.Run.start_time.desc())
+        select(TwinRun.run_id)
+        .join(RunRow, RunRow.run_id == TwinRun.run_id)
+        .where(TwinRun.twin_id == twin_id, TwinRun.part != APART)
+        .order_by(RunRow.start_time.desc())
         .limit(_MOST_RUNS)
     )
     with workspace.reading() as session:

@@ -6,14 +6,14 @@ from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs
 from irtwin.signals.load_profile import Cycles, by_hour, load_profile
 from irtwin.storage.database import Workspace
-from irtwin.storage.energy_schema import MeteredLoad, SupplyState
-from irtwin.storage.schema import MEASURED, Run, RunEnergy, RunState
+from irtwin.storage.energy_schema import MeteredLoad, SupplyStateRow
+from irtwin.storage.schema import MEASURED, RunEnergy, RunRow, RunState
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's RunState, RunEnergy, MeteredLoad, and a SupplyState for each level of its power."""
     with workspace.reading() as session:
-        run = session.get_one(Run, run_id)
+        run = session.get_one(RunRow, run_id)
     robot_id, began = run.robot_id, run.start_time
     assert began is not None
     samples = workspace.read_series(run_id, MEASURED)
@@ -52,7 +52,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             energy_by_hour_j=",".join(f"{joules:.6g}" for joules in hours),
         ),
         *(
-            SupplyState(
+            SupplyStateRow(
                 run_id=run_id, number=number, robot_id=robot_id, state=state.name, seconds=state.seconds,
                 power_w=state.power, differs=False,
             )

@@ -15,10 +15,9 @@ from irtwin.robot.description import Robot
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import own_runs
 from irtwin.signals.motion import Motion
-from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import facts
-from irtwin.storage.schema import MEASURED, MEASURED_RUN
+from irtwin.storage.schema import MEASURED, MEASURED_RUN, JointRow, RobotRow, RunRow, Series
 
 
 @dataclass(frozen=True)
@@ -60,12 +59,10 @@ def robot_motions(workspace: Workspace, robot_id: str) -> RobotMotions:
 
 def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
     robot = load_robot(workspace, robot_id)
-    in_order = select(schema.Run.run_id).order_by(schema.Run.start_time, schema.Run.run_id)
+    in_order = select(RunRow.run_id).order_by(RunRow.start_time, RunRow.run_id)
     with workspace.reading() as session:
-        stated = session.get_one(schema.Robot, robot_id).cutoff_hz
-        run_ids = session.scalars(
-            in_order.where(schema.Run.robot_id == robot_id, schema.Run.kind == MEASURED_RUN)
-        ).all()
+        stated = session.get_one(RobotRow, robot_id).cutoff_hz
+        run_ids = session.scalars(in_order.where(RunRow.robot_id == robot_id, RunRow.kind == MEASURED_RUN)).all()
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     own = own_runs(list(runs.values()))
     cutoff = cutoff_for(robot, own, stated)
@@ -82,10 +79,10 @@ def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
 
 def _facts(workspace: Workspace, robot_id: str) -> Hashable:
     """Return all that the motions follow from: the robot, its joints, its runs and the checksums of their samples."""
-    runs = select(schema.Run).where(schema.Run.robot_id == robot_id, schema.Run.kind == MEASURED_RUN)
-    joints = select(schema.Joint).where(schema.Joint.robot_id == robot_id)
-    measured = select(schema.Series.run_id, schema.Series.series_id).join(schema.Run)
-    measured = measured.where(schema.Run.robot_id == robot_id, schema.Series.kind == MEASURED)
+    runs = select(RunRow).where(RunRow.robot_id == robot_id, RunRow.kind == MEASURED_RUN)
+    joints = select(JointRow).where(JointRow.robot_id == robot_id)
+    measured = select(Series.run_id, Series.series_id).join(RunRow)
+    measured = measured.where(RunRow.robot_id == robot_id, Series.kind == MEASURED)
     with workspace.reading() as session:
-        rows = [session.get_one(schema.Robot, robot_id), *session.scalars(joints), *session.scalars(runs)]
+        rows = [session.get_one(RobotRow, robot_id), *session.scalars(joints), *session.scalars(runs)]
         return frozenset({*map(facts, rows), *map(tuple, session.execute(measured))})

@@ -11,7 +11,7 @@ from sqlalchemy import select
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import MEASURED_RUN, PLANNED_RUN, Robot, Run
+from irtwin.storage.schema import MEASURED_RUN, PLANNED_RUN, RobotRow, RunRow
 
 _PLAIN = re.compile(r"[A-Za-z0-9_-]{1,200}")  # longer ones leave no room for the rest of a file's name
 _READABLE = 40  # characters of a name that is not plain
@@ -52,14 +52,14 @@ def find_robot(workspace: Workspace, name: str | None) -> str:
 _CALLED = {None: "run", PLANNED_RUN: "planned run", MEASURED_RUN: "measured run"}
 
 
-def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = None) -> Run:
+def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = None) -> RunRow:
     """Return a robot's run, of a kind if one is given, by its name; InputError, with the nearest, where there is none.
 
     kind: PLANNED_RUN or MEASURED_RUN.
     """
-    of_robot = select(Run).where(Run.robot_id == robot_id)
+    of_robot = select(RunRow).where(RunRow.robot_id == robot_id)
     with workspace.reading() as session:
-        rows = session.scalars(of_robot if kind is None else of_robot.where(Run.kind == kind))
+        rows = session.scalars(of_robot if kind is None else of_robot.where(RunRow.kind == kind))
         known = {row.name: row for row in rows}
         session.expunge_all()
     for row in known.values():
@@ -83,7 +83,7 @@ def check_name(workspace: Workspace, name: str) -> None:
 def check_run_name(workspace: Workspace, robot_id: str, name: str) -> None:
     """Raise InputError where a robot has a run of this name, in any form of Unicode, upper or lower case."""
     with workspace.reading() as session:
-        known = session.scalars(select(Run.name).where(Run.robot_id == robot_id)).all()
+        known = session.scalars(select(RunRow.name).where(RunRow.robot_id == robot_id)).all()
     for other in known:
         if _folded(other) == _folded(name):
             raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; choose another name')
@@ -106,7 +106,7 @@ def twin_iri(twin_id: str) -> str:
 
 def _names(workspace: Workspace) -> dict[str, str]:
     with workspace.reading() as session:
-        return {robot_id: name for robot_id, name in session.execute(select(Robot.robot_id, Robot.name))}
+        return {robot_id: name for robot_id, name in session.execute(select(RobotRow.robot_id, RobotRow.name))}
 
 
 def _folded(name: str) -> str:

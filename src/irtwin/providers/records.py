@@ -28,7 +28,6 @@ from irtwin.robot.urdf import parse_urdf
 from irtwin.signals import log
 from irtwin.signals.channels import columns_of, from_columns
 from irtwin.signals.conditioning import condition
-from irtwin.storage import schema
 from irtwin.storage.asserted import AssertedFact, follow
 from irtwin.storage.database import Outcome, Workspace
 from irtwin.storage.files import inside
@@ -40,11 +39,13 @@ from irtwin.storage.schema import (
     PLANNED_RUN,
     WATCHED_RUNS,
     Base,
-    Joint,
-    Robot,
+    JointRow,
     RobotNote,
-    Run,
+    RobotRow,
+    RunRow,
+    Series,
     SourceFile,
+    TwinRow,
     in_utc,
 )
 from irtwin.twin.files import from_json
@@ -97,14 +98,14 @@ def followed(data_set: log.DataSet, facts: Sequence[AssertedFact]) -> log.DataSe
     payloads = {row.name: row.payload_kg for row in runs}
     return replace(
         data_set,
-        robot=_with_sheets(data_set.robot, row, {part.name: part for part in parts if isinstance(part, Joint)}),
+        robot=_with_sheets(data_set.robot, row, {part.name: part for part in parts if isinstance(part, JointRow)}),
         runs=tuple(replace(run, payload_mass=payloads[run.name]) for run in data_set.runs),
         plans=tuple(replace(run, payload_mass=payloads[run.name]) for run in data_set.plans),
         ambient_temperature=row.ambient_temperature_degc,
     )
 
 
-def rows_of(data_set: log.DataSet, meshes: Mapping[str, MeshCopy]) -> tuple[Robot, list[Base], list[Run]]:
+def rows_of(data_set: log.DataSet, meshes: Mapping[str, MeshCopy]) -> tuple[RobotRow, list[Base], list[RunRow]]:
     """Return the rows of what a data set says: the robot, its parts, and each run; `meshes` by their names.
 
     Raises InputError where two runs are one by their names.
@@ -147,11 +148,13 @@ def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], ru
     return row.run_id
 
 
-def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[Run]) -> None:
+def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[RunRow]) -> None:
     """Raise InputError where a data set does not go with the runs of no data set that the workspace keeps."""
     with workspace.reading() as session:
-        kept = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_(None))).all()
-        joints = session.scalars(select(Joint.name).where(Joint.robot_id == robot_id).order_by(Joint.position)).all()
+        kept = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None))).all()
+        joints = session.scalars(
+            select(JointRow.name).where(JointRow.robot_id == robot_id).order_by(JointRow.position)
+        ).all()
     plans = {row.run_id: row.name for row in kept if row.kind == PLANNED_RUN}
     toml = data_set.folder / "dataset.toml"
     if any(row.kind not in WATCHED_RUNS for row in kept) and tuple(joints) != data_set.robot.joint_names:
@@ -174,8 +177,8 @@ def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet,
 def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[str]:
     """Return the IRIs, below the base, of what is read of some runs: they, their samples, files that say of what."""
     ids = list(run_ids)
-    told = select(schema.Series.series_id, schema.Series.run_id)
-    told = told.where(schema.Series.run_id.in_(ids), schema.Series.kind != MODELLED)
+    told = select(Series.series_id, Series.run_id)
+    told = told.where(Series.run_id.in_(ids), Series.kind != MODELLED)
     files = select(SourceFile.source_file_id).where(SourceFile.robot_id == robot_id)
     with workspace.reading() as session:
         series = [f"series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
@@ -185,7 +188,7 @@ def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[
 def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:
     """Return what the data set of a robot said, but for its runs."""
     with workspace.reading() as session:
-        row = session.get_one(Robot, robot_id)
+        row = session.get_one(RobotRow, robot_id)
     notes = parse_json(row.notes)
     return log.DataSet(
         folder=Path(robot_id),
@@ -204,14 +207,14 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
 def is_described(workspace: Workspace, robot_id: str) -> bool:
     """Whether a robot's joints are known; they are not where a meter alone was logged."""
     with workspace.reading() as session:
-        return bool(session.get_one(Robot, robot_id).urdf)
+        return bool(session.get_one(RobotRow, robot_id).urdf)
 
 
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
     """Give back a robot with its data sheet. Raises WorkspaceFault where a joint of its URDF has no row."""
     with workspace.reading() as session:
-        row = session.get_one(Robot, robot_id)
-        sheets = {joint.name: joint for joint in session.scalars(select(Joint).where(Joint.robot_id == robot_id))}
+        row = session.get_one(RobotRow, robot_id)
+        sheets = {joint.name: joint for joint in session.scalars(select(JointRow).where(JointRow.robot_id == robot_id))}
     if not row.urdf:
         raise InputError(
             f'{workspace.folder}: of "{row.name}" a meter alone was logged; this needs its joints: bring a log of '
@@ -226,10 +229,10 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
     return _with_sheets(replace(bare, name=row.name), row, sheets)
 
 
-def _with_sheets(robot: description.Robot, row: Robot, sheets: Mapping[str, Joint]) -> description.Robot:
+def _with_sheets(robot: description.Robot, row: RobotRow, sheets: Mapping[str, JointRow]) -> description.Robot:
     """Return a robot with the limits and data sheets that rows say."""
 
-    def said(sheet: Joint) -> dict[str, Any]:
+    def said(sheet: JointRow) -> dict[str, Any]:
         none = dict.fromkeys(_LIMITS, math.inf) | {"lower": -math.inf}
         values = {name: getattr(sheet, column) for name, column in (_LIMITS | _SHEET).items()}
         return {name: none.get(name) if value is None else value for name, value in values.items()}
@@ -241,7 +244,7 @@ def _with_sheets(robot: description.Robot, row: Robot, sheets: Mapping[str, Join
 def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:
     """Give back a run with its signals, measured or planned."""
     with workspace.reading() as session:
-        row = session.get_one(Run, run_id)
+        row = session.get_one(RunRow, run_id)
     planned = row.kind == PLANNED_RUN
     samples = workspace.read_series(run_id, PLANNED if planned else MEASURED)
     return log.Run(
@@ -280,7 +283,7 @@ def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
 def known_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin] | None:
     """Give back a robot's twin with its twin_id; None where it has none. Raises InputError where its file is gone."""
     with workspace.reading() as session:
-        row = session.scalars(select(schema.Twin).where(schema.Twin.robot_id == robot_id)).one_or_none()
+        row = session.scalars(select(TwinRow).where(TwinRow.robot_id == robot_id)).one_or_none()
     if row is None:
         return None
     document = workspace.read_document(row.file, row.sha256)
@@ -328,10 +331,10 @@ def _within(folder: Path, file: Path) -> str:
     return (file.relative_to(folder) if file.is_relative_to(folder) else file.resolve()).as_posix()
 
 
-def _robot_row(robot_id: str, data_set: log.DataSet) -> Robot:
+def _robot_row(robot_id: str, data_set: log.DataSet) -> RobotRow:
     robot, notes = data_set.robot, data_set.notes
     rated, arm = notes.get("rated_payload"), notes.get("arm_movement_type")
-    return Robot(
+    return RobotRow(
         robot_id=robot_id,
         name=robot.name,
         type=robot.type,
@@ -356,20 +359,20 @@ def _movement(robot: description.Robot) -> str:
     return "".join("P" if joint.kind == "prismatic" else "R" for joint in robot.joints)
 
 
-def _joint_row(robot_id: str, place: int, joint: description.Joint) -> Joint:
+def _joint_row(robot_id: str, place: int, joint: description.Joint) -> JointRow:
     limits = {column: getattr(joint, name) for name, column in _LIMITS.items()}
     finite = {column: limit for column, limit in limits.items() if math.isfinite(limit)}
     sheet = {column: getattr(joint, name) for name, column in _SHEET.items()}
-    return Joint(robot_id=robot_id, name=joint.name, position=place, kind=joint.kind, **finite, **sheet)
+    return JointRow(robot_id=robot_id, name=joint.name, position=place, kind=joint.kind, **finite, **sheet)
 
 
-def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = None) -> Run:
+def _run_row(robot_id: str, run: log.Run, now: datetime, folder: Path | None = None) -> RunRow:
     time = run.signals.time
     duration = float(time[-1] - time[0])
     x, y, z = run.payload_com
     planned = run.role == log.PLANNED
     began = None if planned or run.started is None else in_utc(run.started)
-    return Run(
+    return RunRow(
         run_id=f"{robot_id}.{identifier(run.name)}",
         robot_id=robot_id,
         name=run.name,

@@ -8,13 +8,13 @@ from irtwin.providers.provider import Made
 from irtwin.providers.records import inputs, is_described
 from irtwin.signals.motion import standstill
 from irtwin.storage.database import Workspace
-from irtwin.storage.schema import JointState, Run, RunState
+from irtwin.storage.schema import JointState, RunRow, RunState
 
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's RunState and the JointState of each joint at its last sample; of a meter's log what power says."""
     with workspace.reading() as session:
-        robot_id = session.get_one(Run, run_id).robot_id
+        robot_id = session.get_one(RunRow, run_id).robot_id
     if not is_described(workspace, robot_id):
         return meter_log.provide(workspace, run_id)
     known = robot_motions(workspace, robot_id)

@@ -17,7 +17,7 @@ from irtwin.robot.structure import Body, Connection, Origin, Solid, structure_of
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import DataSet
 from irtwin.storage.schema import Base
-from irtwin.storage.structure_schema import Device, DeviceChannel, DHRow, DHTable, Link, LinkJoint, LinkShape
+from irtwin.storage.structure_schema import Device, DeviceChannel, DHRow, DHTable, LinkJoint, LinkRow, LinkShape
 
 _MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -73,11 +73,11 @@ def device_rows(robot_id: str, data_set: DataSet) -> Iterator[Base]:
     yield from channels.values()
 
 
-def _link(robot_id: str, number: int, body: Body) -> Link:
+def _link(robot_id: str, number: int, body: Body) -> LinkRow:
     inertia = body.inertia if body.inertia is not None and all(map(math.isfinite, body.inertia)) else (None,) * 6
     x, y, z = body.com or (None, None, None)
     moments = {f"inertia_{name}_kg_m2": value for name, value in zip(_MOMENTS, inertia, strict=True)}
-    return Link(
+    return LinkRow(
         robot_id=robot_id,
         name=body.name,
         number=number,

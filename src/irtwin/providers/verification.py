@@ -22,7 +22,7 @@ from irtwin.providers.provider import Made
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
 from irtwin.storage.energy_schema import SavingVerification
-from irtwin.storage.schema import Activity, Run, RunEnergy, in_utc
+from irtwin.storage.schema import Activity, RunEnergy, RunRow, in_utc
 
 FEWEST = 3  # runs of a product and payload on each side: with two, nothing tells scatter from change
 _SURE = 0.975  # of a distribution below the upper end of a 95 % interval
@@ -78,12 +78,14 @@ def _earlier(session: Session, action: str) -> str:
 
 def _runs(session: Session, robot_id: str) -> dict[str, TakenEnergy | None]:
     """Return the runs of a robot that are over, by run_id; None of one whose energy or day nobody measured."""
-    of_robot = Run.robot_id == robot_id, Run.ended.is_not(None), RunEnergy.energy_consumption_j.is_not(None)
-    rows = session.execute(select(Run, RunEnergy).join(RunEnergy, RunEnergy.run_id == Run.run_id).where(*of_robot))
+    of_robot = RunRow.robot_id == robot_id, RunRow.ended.is_not(None), RunEnergy.energy_consumption_j.is_not(None)
+    rows = session.execute(
+        select(RunRow, RunEnergy).join(RunEnergy, RunEnergy.run_id == RunRow.run_id).where(*of_robot)
+    )
     return {run.run_id: _taken(run, energy) for run, energy in rows}
 
 
-def _taken(run: Run, energy: RunEnergy) -> TakenEnergy | None:
+def _taken(run: RunRow, energy: RunEnergy) -> TakenEnergy | None:
     if energy.energy_from != "measured" or run.start_time_from != "log" or not run.run_time_s:
         return None
     assert run.start_time is not None and energy.energy_consumption_j is not None

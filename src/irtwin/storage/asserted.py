@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import Column, ForeignKey, Table, delete, exists, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
-from irtwin.storage.schema import Base, Twin
+from irtwin.storage.schema import Base, TwinRow
 
 # table -> the columns that a user may fill: what a person said in a data set, and what no name or file hangs on
 FILLED = {
@@ -128,5 +128,5 @@ def is_newer_than_twin(session: Session, robot_id: str, facts: Sequence[Asserted
     """Whether one of the facts is younger than the twin that the robot has."""
     if not facts:
         return False
-    older = exists().where(Twin.robot_id == robot_id, Twin.created < max(fact.time for fact in facts))
+    older = exists().where(TwinRow.robot_id == robot_id, TwinRow.created < max(fact.time for fact in facts))
     return bool(session.scalar(select(older)))

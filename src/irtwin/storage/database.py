@@ -47,9 +47,9 @@ from irtwin.storage.schema import (
     Activity,
     ActivityUse,
     Base,
-    Robot,
-    Run,
+    RobotRow,
     RunEnergy,
+    RunRow,
     Series,
     SourceFile,
     relation_to,
@@ -152,7 +152,7 @@ class Workspace:
     def knows_robots(self) -> bool:
         """Whether the database knows of any robot."""
         with self.reading() as session:
-            return bool(session.scalar(select(func.count()).select_from(Robot)))
+            return bool(session.scalar(select(func.count()).select_from(RobotRow)))
 
     @property
     def mapped_rows(self) -> Path:
@@ -177,9 +177,9 @@ class Workspace:
 
     def ingest(
         self,
-        robot: Robot,
+        robot: RobotRow,
         parts: Sequence[Base],
-        runs: Sequence[Run],
+        runs: Sequence[RunRow],
         series: Mapping[str, pa.Table],
         documents: Mapping[str, bytes] | None = None,
         facts: Sequence[AssertedFact] = (),
@@ -197,7 +197,7 @@ class Workspace:
             raise ValueError(f"runs and series differ: {sorted(missing)}")
         rows = [robot, *parts, *runs]
         with self._writing() as session:
-            known = bool(session.scalar(select(exists().where(Robot.robot_id == robot.robot_id))))
+            known = bool(session.scalar(select(exists().where(RobotRow.robot_id == robot.robot_id))))
             is_followed = not asserted.is_newer_than_twin(session, robot.robot_id, facts)
             if known and is_followed and self._holds(session, robot.robot_id, rows):
                 for row in parts:
@@ -206,7 +206,7 @@ class Workspace:
                 return "unchanged"
             if known:
                 drop_data_set(session, robot.robot_id)
-                session.execute(update(Robot).where(Robot.robot_id == robot.robot_id).values(values(robot)))
+                session.execute(update(RobotRow).where(RobotRow.robot_id == robot.robot_id).values(values(robot)))
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
             stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
@@ -254,7 +254,7 @@ class Workspace:
             insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
-    def keep_run(self, run: Run, series: pa.Table, rows: Tables | None = None) -> None:
+    def keep_run(self, run: RunRow, series: pa.Table, rows: Tables | None = None) -> None:
         """Keep a run of no data set with its samples, and further rows about it, by table."""
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)
@@ -346,15 +346,15 @@ class Workspace:
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series and meshes undamaged."""
-        runs = session.scalars(select(Run).where(Run.robot_id == robot_id, Run.role.is_not(None)))
-        stored = {facts(session.get_one(Robot, robot_id)), *map(facts, runs)}
+        runs = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_not(None)))
+        stored = {facts(session.get_one(RobotRow, robot_id)), *map(facts, runs)}
         for table in part_tables():
             rows_kept = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
             stored |= {
                 (table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in rows_kept
             }
-        measured = select(Series.path, Series.series_id).join(Run)
-        measured = measured.where(Run.robot_id == robot_id, Series.kind != MODELLED)
+        measured = select(Series.path, Series.series_id).join(RunRow)
+        measured = measured.where(RunRow.robot_id == robot_id, Series.kind != MODELLED)
         named = [(row.path, row.series_id) for row in session.execute(measured)]
         shapes = select(LinkShape.mesh_file, LinkShape.mesh_sha256).where(LinkShape.robot_id == robot_id)
         named += [(row.mesh_file, row.mesh_sha256) for row in session.execute(shapes) if row.mesh_file is not None]
@@ -429,7 +429,7 @@ def in_memory(rows: Iterable[Base]) -> Iterator[Engine]:
         opened.dispose()
 
 
-def _told(run: Run) -> str:
+def _told(run: RunRow) -> str:
     """Return the kind of the samples that a run comes with."""
     return PLANNED if run.kind == PLANNED_RUN else MEASURED
 

@@ -86,7 +86,7 @@ class MeteredLoad(MadeRow):
     energy_by_hour_j: Mapped[str]  # from then on, comma separated
 
 
-class SupplyState(MadeRow):
+class SupplyStateRow(MadeRow):
     """A state of the supply in a run: how long, and its mean power by the log and by the twin, with a 95 % interval."""
 
     run_id: Mapped[str] = mapped_column(ForeignKey("run.run_id"), primary_key=True)

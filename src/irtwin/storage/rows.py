@@ -31,9 +31,9 @@ from irtwin.storage.schema import (
     Activity,
     Base,
     Individuals,
-    Robot,
-    Run,
+    RobotRow,
     RunEnergy,
+    RunRow,
     Series,
     SourceFile,
     in_utc,
@@ -73,7 +73,7 @@ def values(row: Base) -> Values:
 def facts(row: Base) -> tuple[object, ...]:
     """Return a row's values, to compare; when and from which folder it was taken in is no fact of a data set."""
     columns = values(row) | ({"folder": ""} if isinstance(row, SourceFile) else {})
-    if isinstance(row, Run):
+    if isinstance(row, RunRow):
         columns["start_time"] = in_utc(row.start_time) if row.start_time and row.start_time_from == "log" else None
     return (row.__tablename__, *columns.values())
 
@@ -83,7 +83,7 @@ def part_tables() -> list[Table]:
     return [
         table
         for table in Base.metadata.sorted_tables
-        if table.name not in (Robot.__tablename__, Run.__tablename__)
+        if table.name not in (RobotRow.__tablename__, RunRow.__tablename__)
         and "robot_id" in table.columns
         and "activity_id" not in table.columns
     ]
@@ -164,21 +164,21 @@ def drop_data_set(session: Session, robot_id: str) -> None:
 
     The robot stays, and so do runs of no data set and the prices of plans among them.
     """
-    kept = select(RunPrice.activity_id).join(Run).where(Run.robot_id == robot_id, Run.role.is_(None))
-    _drop(session, robot_id, Run.role.is_not(None), set(session.scalars(kept)))
+    kept = select(RunPrice.activity_id).join(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None))
+    _drop(session, robot_id, RunRow.role.is_not(None), set(session.scalars(kept)))
 
 
 def drop_recorded(session: Session, robot_id: str) -> None:
     """Drop all that `recorded_rows` returns but the robot itself."""
-    _drop(session, robot_id, Run.kind.not_in(WATCHED_RUNS))
+    _drop(session, robot_id, RunRow.kind.not_in(WATCHED_RUNS))
 
 
 def _drop(session: Session, robot_id: str, which: ColumnElement[bool], kept: AbstractSet[str] = frozenset()) -> None:
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
     drop_activities(session, set(session.scalars(made)) - kept)
-    runs = select(Run.run_id).where(Run.robot_id == robot_id, which)
+    runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, which)
     session.execute(delete(Series).where(Series.run_id.in_(runs)))
-    session.execute(delete(Run).where(Run.robot_id == robot_id, which))
+    session.execute(delete(RunRow).where(RunRow.robot_id == robot_id, which))
     _drop_parts(session, robot_id)
 
 
@@ -186,9 +186,9 @@ def drop_robot(session: Session, robot_id: str) -> None:
     """Drop a robot and all that is known of it."""
     made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
     drop_activities(session, set(session.scalars(made)))
-    session.execute(delete(Series).where(Series.run_id.in_(select(Run.run_id).where(Run.robot_id == robot_id))))
+    session.execute(delete(Series).where(Series.run_id.in_(select(RunRow.run_id).where(RunRow.robot_id == robot_id))))
     _drop_parts(session, robot_id)
-    for kind in (Run, Robot):
+    for kind in (RunRow, RobotRow):
         session.execute(delete(kind).where(kind.robot_id == robot_id))
 
 
@@ -196,18 +196,18 @@ def drop_run(session: Session, run_id: str, subject: str) -> None:
     """Drop a run that no twin knows, with its series and all that providers made of it, their `subject` by IRI."""
     made = select(Activity.activity_id).where(Activity.subject == subject)
     drop_activities(session, with_dependents(session, set(session.scalars(made))))
-    for kind in (Series, Run):
+    for kind in (Series, RunRow):
         session.execute(delete(kind).where(kind.run_id == run_id))
 
 
 def release_plans(session: Session, robot_id: str) -> None:
     """Let runs of a robot that carried out a plan which is gone say no plan, and slower plans no run that is gone."""
-    there = aliased(Run)
-    for column, also in ((Run.performs, {}), (Run.time_scaling_of, {Run.time_scale: None})):
+    there = aliased(RunRow)
+    for column, also in ((RunRow.performs, {}), (RunRow.time_scaling_of, {RunRow.time_scale: None})):
         gone = ~exists().where(there.run_id == column)
         session.execute(
-            update(Run)
-            .where(Run.robot_id == robot_id, column.is_not(None), gone)
+            update(RunRow)
+            .where(RunRow.robot_id == robot_id, column.is_not(None), gone)
             .values({column: None, **also})
             .execution_options(synchronize_session=False)
         )
@@ -251,14 +251,14 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
 
 def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[Any] | None]]:
     """Yield each table with the query of a robot's rows in it, without its live runs'; None where there are none."""
-    runs = select(Run.run_id).where(Run.robot_id == robot_id, Run.kind.not_in(WATCHED_RUNS))
+    runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, RunRow.kind.not_in(WATCHED_RUNS))
     activities = select(Activity.activity_id).where(
         Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
     )
     made = set(session.scalars(activities))  # by name: a query within that of each table takes longer to compile
     for table in Base.metadata.sorted_tables:
         rows = select(table)
-        if table.name == Run.__tablename__ or table.name == Series.__tablename__:
+        if table.name == RunRow.__tablename__ or table.name == Series.__tablename__:
             yield table, rows.where(table.columns["run_id"].in_(runs))
         elif "activity_id" in table.columns:
             yield table, _made_by(table, made) if made else None
@@ -268,7 +268,9 @@ def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[A
 
 def _of_live(robot_id: str) -> Select[Any]:
     """Return the query of the activities in which a twin worked out the energy of a robot's live runs."""
-    energies = select(RunEnergy.activity_id).join(Run).where(Run.robot_id == robot_id, Run.kind.in_(WATCHED_RUNS))
+    energies = (
+        select(RunEnergy.activity_id).join(RunRow).where(RunRow.robot_id == robot_id, RunRow.kind.in_(WATCHED_RUNS))
+    )
     return energies.where(RunEnergy.twin_id.is_not(None))
 
 
@@ -295,7 +297,7 @@ def keep_base(connection: Connection, base: str) -> None:
     current = base_of(connection)
     if base == current:
         return
-    if connection.scalar(select(exists().where(Robot.robot_id.is_not(None)))):
+    if connection.scalar(select(exists().where(RobotRow.robot_id.is_not(None)))):
         raise InputError(
             f"the individuals of this workspace lie below {current}, and others may name them so; they cannot move to "
             f"{base}: take the data sets into a new workspace with that base"

@@ -59,8 +59,11 @@ class Base(DeclarativeBase):
 
     @declared_attr.directive
     def __tablename__(cls) -> str:
-        """Return what a class's table is called: run_energy of RunEnergy, dh_table of DHTable."""
-        return _WORD.sub("_", cls.__name__).lower()
+        """Return what a class's table is called: run_energy of RunEnergy, dh_table of DHTable, run of RunRow.
+
+        `Row` stands where what the rows are of has a class of its own elsewhere.
+        """
+        return _WORD.sub("_", cls.__name__.removesuffix("Row")).lower()
 
 
 class MadeRow(Base):
@@ -77,7 +80,7 @@ class Individuals(Base):
     base_iri: Mapped[str] = mapped_column(primary_key=True)
 
 
-class Robot(Base):
+class RobotRow(Base):
     """An industrial robot (Yan 2018, eqs. 10, 12); `robot_id` is the end of its IRI."""
 
     robot_id: Mapped[str] = mapped_column(primary_key=True)
@@ -118,7 +121,7 @@ class SourceFile(Base):
     sha256: Mapped[str]
 
 
-class Joint(Base):
+class JointRow(Base):
     """A moving joint of a robot, with its limits and data sheet."""
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
@@ -136,7 +139,7 @@ class Joint(Base):
     winding_resistance_ohm: Mapped[float | None]
 
 
-class Run(Base):
+class RunRow(Base):
     """One motion, recorded or planned (Yan 2018, eq. 11); `run_id` is `robot_id.name`."""
 
     run_id: Mapped[str] = mapped_column(primary_key=True)
@@ -283,7 +286,7 @@ class GapExcursion(MadeRow):
     peak_ratio: Mapped[float]
 
 
-class Twin(MadeRow):
+class TwinRow(MadeRow):
     """An identified twin of a robot; `twin_id` is `robot_id.` and a hash of what made it."""
 
     twin_id: Mapped[str] = mapped_column(primary_key=True)
@@ -355,7 +358,7 @@ class TwinRun(MadeRow):
     held_out_from_s: Mapped[float | None]  # of the log's time, where the run was cut in time
 
 
-class Parameter(MadeRow):
+class ParameterRow(MadeRow):
     """An identified parameter with its 95 % interval."""
 
     parameter_id: Mapped[str] = mapped_column(primary_key=True)  # twin_id.effect.joint or link.name
@@ -372,7 +375,7 @@ class Parameter(MadeRow):
     scaled_upper: Mapped[float | None]
 
 
-class BaseParameter(MadeRow):
+class BaseParameterRow(MadeRow):
     """A combination of torque coefficients that the measured torque shows, with its 95 % interval."""
 
     twin_id: Mapped[str] = mapped_column(ForeignKey("twin.twin_id"), primary_key=True)

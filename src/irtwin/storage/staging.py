@@ -20,7 +20,7 @@ from irtwin.storage.rows import (
     recorded_rows,
     release_plans,
 )
-from irtwin.storage.schema import Robot
+from irtwin.storage.schema import RobotRow
 from irtwin.storage.series import is_whole
 
 _PREFIX = ".staged-"
@@ -66,10 +66,10 @@ def _put(source: Workspace, rows: Tables, target: Workspace, robot_id: str) -> s
             _link(source, target, path)
         of_live = modelled_of_live_runs(session, robot_id)
         drop_recorded(session, robot_id)
-        if session.get(Robot, robot_id) is None:
+        if session.get(RobotRow, robot_id) is None:
             insert_values(session, rows)
         else:
-            session.execute(update(Robot).where(Robot.robot_id == robot_id).values(**rows["robot"][0]))
+            session.execute(update(RobotRow).where(RobotRow.robot_id == robot_id).values(**rows["robot"][0]))
             insert_values(session, {**rows, "robot": []})
         if {row["twin_id"] for row in of_live["run_energy"]} <= {row["twin_id"] for row in rows["twin"]}:
             insert_values(session, of_live)  # it is the same twin: what it says of live runs holds

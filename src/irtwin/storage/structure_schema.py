@@ -8,7 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from irtwin.storage.schema import Base
 
 
-class Link(Base):
+class LinkRow(Base):
     """A rigid body; mass, centre of mass and inertia (about it) in the link's own axes, none where nobody said."""
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
@@ -98,6 +98,8 @@ class DHTable(Base):
 
 class DHRow(Base):
     """A row of a Denavit-Hartenberg table, with its joint at zero."""
+
+    __tablename__ = "dh_row"
 
     robot_id: Mapped[str] = mapped_column(ForeignKey("robot.robot_id"), primary_key=True)
     convention: Mapped[str] = mapped_column(primary_key=True)

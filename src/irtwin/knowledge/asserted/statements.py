@@ -33,7 +33,7 @@ from irtwin.knowledge.vocabulary import (
 from irtwin.storage.asserted import FILLED, AssertedFact, key_text, row_of, value_of, written
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
-from irtwin.storage.schema import Base, Robot
+from irtwin.storage.schema import Base, RobotRow
 
 _TYPE = NamedNode(f"{RDF}type")
 _NUMBERS = frozenset(f"{XSD}{name}" for name in ("double", "float", "decimal", "integer", "int", "long"))
@@ -202,7 +202,7 @@ def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str |
     """Return the robot that an individual's IRI is about, if any."""
     parts = subject.value.removeprefix(graph.base).split("/")
     robot_id = parts[1].partition(".")[0] if len(parts) > 1 and subject.value.startswith(graph.base) else ""
-    return robot_id if robot_id and session.get(Robot, robot_id) is not None else None
+    return robot_id if robot_id and session.get(RobotRow, robot_id) is not None else None
 
 
 def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:

@@ -38,7 +38,7 @@ from irtwin.storage.files import inside
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import NamedFile, named_files
-from irtwin.storage.schema import LIVE, Base, Moment, Robot
+from irtwin.storage.schema import LIVE, Base, Moment, RobotRow
 from irtwin.storage.series import FOLDER
 from irtwin.storage.tariff import FILE as PLANT_FILE
 from irtwin.trust import withdraw
@@ -120,7 +120,7 @@ def restore(archive: Path, where: Location | Path) -> None:
                         raise InputError(_incomplete(archive, lost, "missing or altered", "use another backup"))
                     if _GRAPH not in sums:
                         raise InputError(f"{archive}: incomplete: it holds no graph; use another backup")
-                    robots = session.scalar(select(func.count()).select_from(Robot))
+                    robots = session.scalar(select(func.count()).select_from(RobotRow))
                     names = (str(quad.graph_name) for quad in _read_quads(archive, held / _GRAPH))
                     if robots and not any(name.startswith(f"<{GRAPH_SOURCE}") for name in names):
                         raise InputError(f"{archive}: incomplete: its graph knows no robot; use another backup")
