@@ -10,12 +10,13 @@ import re
 import struct
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import count
 from typing import Any
 
 from irtwin.alarms.mqtt import Broker, BrokerConnection
 from irtwin.announce import Announce
+from irtwin.report.questions import Row
 
 METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
@@ -24,7 +25,6 @@ _UINT64, _DOUBLE, _BOOLEAN, _STRING = 8, 10, 11, 12  # Sparkplug's types of metr
 _PATIENCE = 2.0  # s for the death to leave at the end
 
 Metric = tuple[str, int, Any]  # name, type, value; None: not known
-Row = Mapping[str, Any]
 
 
 class EdgeNode(BrokerConnection):

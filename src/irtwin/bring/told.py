@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, by_column
+from irtwin.signals.log import POWER_PLACES
 from irtwin.signals.unit import MOTOR, Unit, unit_of
 
 LEFT_OUT = "-"
-_POWER_AT = ("mains", "dc_bus")
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class UserSaid:
 
 def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot: Robot) -> UserSaid:
     """Read what the options say. Raises InputError, naming the option and what may stand there."""
-    if power_at is not None and power_at not in _POWER_AT:
-        raise InputError(f"--power-at {power_at}: use {' or '.join(_POWER_AT)}")
+    if power_at is not None and power_at not in POWER_PLACES:
+        raise InputError(f"--power-at {power_at}: use {' or '.join(POWER_PLACES)}")
     gears: dict[str, float] = {
         joint.name: joint.gear_ratio for joint in robot.joints if joint.gear_ratio is not None and joint.gear_ratio > 0
     }

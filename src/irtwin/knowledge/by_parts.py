@@ -19,10 +19,10 @@ from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
 from irtwin.knowledge.contained import CONTRADICTION, contain
 from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Contradiction, say
-from irtwin.knowledge.parts import EQUALITIES, TYPE, Joined, Name, Ontology, Region
+from irtwin.knowledge.parts import EQUALITIES, Joined, Name, Ontology, Region
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED
+from irtwin.knowledge.vocabulary import GRAPH_OWL_RL, GRAPH_REASONED, TYPE
 
 MOST_WAITING = 50_000  # quads that wait to be written
 

@@ -33,7 +33,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_REASONED,
     GRAPH_VALIDATION,
     OWL,
-    RDF,
+    TYPE,
     term,
 )
 from irtwin.resources import Resources
@@ -45,7 +45,6 @@ MOST_TOGETHER = 20_000  # triples of small parts that are looked at together
 MOST_KEPT = 100_000  # triples of parts that are kept for who asks next
 _AT_ONCE = 500_000  # nodes that are looked up among those that are known
 
-TYPE = NamedNode(RDF + "type")
 EQUALITIES = {NamedNode(OWL + name) for name in ("sameAs", "differentFrom")}
 _ROBOT = NamedNode(term("Industrial_Robot"))
 _ONTOLOGY = NamedNode(GRAPH_ONTOLOGY)

@@ -5,9 +5,11 @@ What the terms mean stands in `ontology/`; a test holds every term that the code
 
 from __future__ import annotations
 
+from pyoxigraph import NamedNode
+
+from irtwin.document.words import ONTOLOGY as ONTOLOGY
 from irtwin.storage.base_iri import DEFAULT
 
-ONTOLOGY = "https://w3id.org/irtwin"
 IRT = f"{ONTOLOGY}#"
 EFFECT = f"{ONTOLOGY}/effect/"
 PROVIDER = f"{ONTOLOGY}/provider/"
@@ -28,6 +30,7 @@ UNIT = "http://qudt.org/vocab/unit/"
 SH = "http://www.w3.org/ns/shacl#"
 DCTERMS = "http://purl.org/dc/terms/"
 VOID = "http://rdfs.org/ns/void#"
+TYPE = NamedNode(f"{RDF}type")
 
 PREFIXES = {
     "irt": IRT,

@@ -13,8 +13,7 @@ from irtwin.document.tables import DOCUMENT, OF_CURVES, Column, Table, reached
 from irtwin.document.words import UNITS
 from irtwin.errors import InputError
 from irtwin.storage.gap_schema import CLASSES, OfDiagnosis
-
-Row = dict[str, Any]
+from irtwin.storage.rows import Values
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Of:
         return UNITS[word].replace("N m", "N").replace("rad", "m") if slides else UNITS[word]
 
 
-def row(document: Document, of: Of) -> Row:
+def row(document: Document, of: Of) -> Values:
     """Return the columns of a diagnosis that its document tells."""
     return _row(DOCUMENT, None, document, of)
 
@@ -47,7 +46,7 @@ def rows(document: Document, drawn: Curves, of: Of) -> Iterator[OfDiagnosis]:
             yield from _rows(table, whole, {"diagnosis_id": of.diagnosis_id}, of)
 
 
-def _rows(table: Table, whole: Any, key: Row, of: Of) -> Iterator[OfDiagnosis]:
+def _rows(table: Table, whole: Any, key: Values, of: Of) -> Iterator[OfDiagnosis]:
     for place, one in _placed(table, reached(whole, table.steps)):
         made = key | _row(table, place, one, of)
         yield CLASSES[table.name](**made)
@@ -65,7 +64,7 @@ def _placed(table: Table, parts: Any) -> Iterator[tuple[str | int, Any]]:
         yield from enumerate(parts if isinstance(parts, tuple) else filter(None, (parts,)), start=1)
 
 
-def _row(table: Table, place: str | int | None, one: Any, of: Of) -> Row:
+def _row(table: Table, place: str | int | None, one: Any, of: Of) -> Values:
     made = {column.name: _value(column, place, one, of) for column in table.columns if not column.unit_of}
     joint = made.get("joint")
     if joint is not None and joint not in of.joints:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.table import Row
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure, Three
 from irtwin.robot.urdf_text import robot_of
-
-Row = Mapping[str, Any]
 
 _ROBOT = """SELECT ?name ?manufacturer ?type ?weight {
   ?arm irt:has_Information ?information . ?information irt:IR_Name ?name .

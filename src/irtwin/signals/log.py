@@ -23,7 +23,7 @@ from irtwin.toml_file import TomlTable, read_toml, shown, take
 PLANNED = "planned"  # role of a run that holds a motion, of which nothing was measured
 ROLES = ("observed", "reference", "simulated", PLANNED)
 SHEET_KEYS = ("gear_ratio", "rotor_inertia", "torque_constant", "winding_resistance", "acceleration", "kp", "kd")
-_POWER_AT = ("mains", "dc_bus")
+POWER_PLACES = ("mains", "dc_bus")
 # what the tables of dataset.toml may hold, besides notes
 DATA_SET_KEYS = ("robot", "run", "twin", "topics")
 ROBOT_KEYS = (
@@ -125,8 +125,8 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     if not runs:
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
     power_at = table.text("power_at")
-    if power_at is not None and power_at not in _POWER_AT:
-        raise table.fault("power_at", f'= "{power_at}"; use {" or ".join(_POWER_AT)}')
+    if power_at is not None and power_at not in POWER_PLACES:
+        raise table.fault("power_at", f'= "{power_at}"; use {" or ".join(POWER_PLACES)}')
     TomlTable(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
     twin = _optional(file, document, "twin", TWIN_KEYS)

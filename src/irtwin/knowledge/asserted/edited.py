@@ -15,9 +15,8 @@ from irtwin.knowledge.store.export import exported
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_triples
-from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, RDF
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ONTOLOGY, OWL, TYPE
 
-_TYPE = NamedNode(f"{RDF}type")
 _OF_BOTH_ENDS = {
     NamedNode(f"{OWL}{name}")
     for name in (
@@ -76,7 +75,7 @@ def _turned(triple: Triple) -> Triple:
 def _is_declaration(triple: Triple) -> bool:
     """Whether a triple says only what kind of term something is, which editors write of every term."""
     kind = triple.object
-    return triple.predicate == _TYPE and isinstance(kind, NamedNode) and kind.value.startswith(OWL)
+    return triple.predicate == TYPE and isinstance(kind, NamedNode) and kind.value.startswith(OWL)
 
 
 def _in_order(gone: set[Triple], came: set[Triple]) -> list[tuple[str, Triple]]:

@@ -27,7 +27,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
     GRAPH_SOURCE,
-    RDF,
+    TYPE,
     XSD,
 )
 from irtwin.storage.asserted import FILLED, AssertedFact, key_text, row_of, value_of, written
@@ -35,7 +35,6 @@ from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Base, RobotRow
 
-_TYPE = NamedNode(f"{RDF}type")
 _NUMBERS = frozenset(f"{XSD}{name}" for name in ("double", "float", "decimal", "integer", "int", "long"))
 _MADE_BY = {
     GRAPH_ACTIVITY: "a provider worked it out; change what it worked on",
@@ -222,7 +221,7 @@ def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
         raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
-    if quad.predicate != _TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
+    if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
             f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )

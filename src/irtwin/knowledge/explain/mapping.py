@@ -10,10 +10,8 @@ from pyoxigraph import NamedNode, Triple
 from irtwin.knowledge.mapping.document import LogicalTable, TermMap, TriplesMap
 from irtwin.knowledge.mapping.reader import read_document
 from irtwin.knowledge.mapping.terms import values_in
-from irtwin.knowledge.vocabulary import RDF
+from irtwin.knowledge.vocabulary import TYPE
 from irtwin.resources import Files
-
-_TYPE = NamedNode(RDF + "type")
 
 
 def says(triple: Triple, files: Files, base: str) -> str | None:
@@ -40,7 +38,7 @@ def maps_of(files: Files) -> tuple[tuple[str, TriplesMap], ...]:
 def _says(triples_map: TriplesMap, triple: Triple, base: str) -> bool:
     if not _fits(triples_map.subject, triple.subject, base):
         return False
-    if triple.predicate == _TYPE and triple.object in triples_map.classes:
+    if triple.predicate == TYPE and triple.object in triples_map.classes:
         return True
     return any(_fits(each, triple.predicate, base) for pair in triples_map.properties for each in pair.predicates)
 

@@ -21,11 +21,11 @@ from irtwin.knowledge.mapping.document import (
 from irtwin.knowledge.mapping.identifiers import Identifier, quoted
 from irtwin.knowledge.mapping.source import TableSource, describe
 from irtwin.knowledge.mapping.terms import Row, RowColumn, TermMaker, term_maker
+from irtwin.knowledge.vocabulary import TYPE
 
 GraphName = NamedNode | DefaultGraph
 GraphMaker = Callable[[Row], Sequence[GraphName]]
 
-_RDF_TYPE = NamedNode("http://www.w3.org/1999/02/22-rdf-syntax-ns#type")
 _DEFAULT_GRAPH = NamedNode(f"{RR}defaultGraph")
 
 
@@ -161,7 +161,7 @@ class _Select:
 
 def _plain(select: _Select, triples_map: TriplesMap, document: MappingDocument) -> Statement:
     """The statement of a logical table alone: classes, and all objects that need no join."""
-    rdf_type = select.maker(_constant(_RDF_TYPE))
+    rdf_type = select.maker(_constant(TYPE))
     properties = [PlannedProperty((rdf_type,), (select.maker(_constant(name)),), None) for name in triples_map.classes]
     for item in triples_map.properties:
         objects = [

@@ -26,8 +26,8 @@ from irtwin.knowledge.mapping.document import (
 from irtwin.knowledge.mapping.identifiers import parse_identifier, parse_table, parse_template
 from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.store.rdf_input import parsing, read_rdf
+from irtwin.knowledge.vocabulary import TYPE
 
-_RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
 # BCP 47, as far as it is in use: no language of five letters or more is registered.
 _LANGUAGE = re.compile(r"[a-z]{2,3}(?:-[a-z0-9]{1,8})*|[xi](?:-[a-z0-9]{1,8})+", re.IGNORECASE)
 _SQL_VERSIONS = {
@@ -72,7 +72,7 @@ class _Reader:
     def triples_maps(self) -> dict[Node, TriplesMap]:
         nodes: dict[Node, None] = {}  # in the document's order, so that each reading gives the same statements
         for node in self.graph.all():
-            typed = NamedNode(f"{RR}TriplesMap") in self.graph.values(node, _RDF_TYPE)
+            typed = NamedNode(f"{RR}TriplesMap") in self.graph.values(node, TYPE.value)
             if typed or self.graph.values(node, "logicalTable") or self.graph.values(node, "subjectMap"):
                 nodes[node] = None
             nodes |= dict.fromkeys(self.graph.values(node, "parentTriplesMap"))

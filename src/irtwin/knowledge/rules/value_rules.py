@@ -14,9 +14,9 @@ from pyoxigraph import BlankNode, NamedNode, Triple
 
 from irtwin.knowledge.rules.as_swrl import VARIABLE, class_atom, imp, link_atom, triples_of
 from irtwin.knowledge.store.by_subject import BySubject, Node
-from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, shorten
+from irtwin.knowledge.vocabulary import OWL, RDFS, TYPE, shorten
 
-_TYPE, _BELOW, _SAME = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf"), NamedNode(OWL + "equivalentClass")
+_BELOW, _SAME = NamedNode(RDFS + "subClassOf"), NamedNode(OWL + "equivalentClass")
 _THIS = f"<{VARIABLE}this>"
 
 Atom = tuple[NamedNode, NamedNode]  # a property and its value; rdf:type and a class
@@ -59,13 +59,13 @@ def _parts(said: BySubject, expression: Node) -> list[Node]:
 
 
 def _rules(said: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
-    is_class = (_TYPE, of_class)
+    is_class = (TYPE, of_class)
     label = f"definition of {said.text(of_class, RDFS + 'label') or shorten(of_class.value)}"
     made = set[Triple]()
     alternatives = _alternatives(said, axiom.object)
     if len(alternatives) == 1:
         for predicate, value in alternatives[0]:
-            if predicate != _TYPE:
+            if predicate != TYPE:
                 made.update(_imp(label, [is_class], (predicate, value)))
             elif value != of_class:
                 made.add(Triple(of_class, _BELOW, value))
@@ -78,7 +78,7 @@ def _rules(said: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
 def _alternatives(said: BySubject, expression: Node) -> list[list[Atom]]:
     """Return what a class expression asks of a member: the atoms of one of the lists."""
     if isinstance(expression, NamedNode):
-        return [[(_TYPE, expression)]]
+        return [[(TYPE, expression)]]
     of_property, value = said.value(expression, "onProperty"), said.value(expression, "hasValue")
     if isinstance(of_property, NamedNode) and isinstance(value, NamedNode):
         return [[(of_property, value)]]
@@ -104,4 +104,4 @@ def _imp(label: str, body: list[Atom], head: Atom) -> set[Triple]:
 
 
 def _atom(predicate: NamedNode, value: NamedNode) -> str:
-    return class_atom(_THIS, str(value)) if predicate == _TYPE else link_atom(_THIS, str(predicate), str(value))
+    return class_atom(_THIS, str(value)) if predicate == TYPE else link_atom(_THIS, str(predicate), str(value))

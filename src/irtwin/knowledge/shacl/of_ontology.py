@@ -16,10 +16,9 @@ from pyoxigraph import Literal, NamedNode, RdfFormat, Triple, parse
 
 from irtwin.knowledge.shacl.shapes import Shapes
 from irtwin.knowledge.store.by_subject import Node
-from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, shorten
+from irtwin.knowledge.vocabulary import OWL, RDF, RDFS, SH, TYPE, shorten
 
 _OWN = "https://w3id.org/irtwin/shapes/"
-_TYPE = RDF + "type"
 SUB_CLASS_OF = NamedNode(RDFS + "subClassOf")
 _PROLOGUE = f"PREFIX sh: <{SH}> PREFIX rdf: <{RDF}> PREFIX rdfs: <{RDFS}>\n"
 Classes = tuple[str, ...]  # IRIs; what is meant is of one of them
@@ -49,7 +48,7 @@ class _Ontology:
 
     def __init__(self, said: Shapes, by_hand: Shapes):
         self._said, self._by_hand = said, by_hand
-        self._classes = {one for one in said.having(_TYPE, OWL + "Class") if self._is_own(one)}
+        self._classes = {one for one in said.having(TYPE.value, OWL + "Class") if self._is_own(one)}
         self.catalogues = {
             one.value: individuals for one in self._classes if (individuals := self._individuals(one.value))
         }
@@ -91,7 +90,7 @@ class _Ontology:
         """Whether a term has a name, and is not of a vocabulary that the ontology has no module of."""
         home = self._said.value(term, RDFS + "isDefinedBy")
         named = isinstance(term, NamedNode)
-        return named and (home is None or NamedNode(OWL + "Ontology") in self._said.values(home, _TYPE))
+        return named and (home is None or NamedNode(OWL + "Ontology") in self._said.values(home, TYPE.value))
 
     def _classes_of(self, name: str, end: str) -> Classes:
         """Return the classes that a property's domain or range is, or is the union of."""
@@ -125,10 +124,10 @@ class _Ontology:
 
     def _individuals(self, name: str) -> list[str]:
         """Return the individuals that the ontology says of a class; of classes below as well where it says any."""
-        if not self._said.having(_TYPE, name):
+        if not self._said.having(TYPE.value, name):
             return []
         below = [one for one in self._classes if NamedNode(name) in self._above(one)]
-        return sorted({str(each.value) for one in below for each in self._said.having(_TYPE, one.value)})  # type: ignore[union-attr]
+        return sorted({str(each.value) for one in below for each in self._said.having(TYPE.value, one.value)})  # type: ignore[union-attr]
 
     def _named(self, classes: Classes) -> str:
         return " or ".join(f"{_article(self._label(one))} {self._label(one)} ({shorten(one)})" for one in classes)

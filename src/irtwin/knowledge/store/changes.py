@@ -23,7 +23,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SOURCE,
     GRAPH_VALIDATION,
     PROV,
-    RDF,
+    TYPE,
 )
 
 DERIVED_FROM = NamedNode(PROV + "wasDerivedFrom")
@@ -33,7 +33,6 @@ _CHANGED = NamedNode(GRAPH_CHANGED)
 _REASONED = NamedNode(GRAPH_REASONED)
 _INFLUENCED_BY = NamedNode(PROV + "wasInfluencedBy")
 _READERS = (GRAPH_INFERRED, GRAPH_VALIDATION)
-_TYPE = NamedNode(RDF + "type")
 
 BEHIND = Quad(NamedNode(GRAPH), _INFLUENCED_BY, NamedNode(GRAPH_SOURCE), _CHANGED)
 
@@ -43,7 +42,7 @@ def notes(store: Store, quads: Iterable[Quad]) -> set[Quad]:
     asserted = [quad for quad in quads if is_asserted(quad)]
     if not asserted or not made_of(store):
         return set()
-    ends = {quad.subject for quad in asserted} | {quad.object for quad in asserted if quad.predicate != _TYPE}
+    ends = {quad.subject for quad in asserted} | {quad.object for quad in asserted if quad.predicate != TYPE}
     return {_note(reader, node) for reader in _READERS for node in ends if not isinstance(node, Literal)}
 
 

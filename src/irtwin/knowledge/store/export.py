@@ -23,12 +23,11 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_SOURCE,
     ONTOLOGY,
     OWL,
-    RDF,
     RDFS,
+    TYPE,
 )
 
 _ONTOLOGY = NamedNode(ONTOLOGY)
-_TYPE = NamedNode(RDF + "type")
 _LABEL = NamedNode(RDFS + "label")
 _COMMENT = NamedNode(RDFS + "comment")
 _CLASS = NamedNode(OWL + "Class")
@@ -76,9 +75,9 @@ def _declarations(triples: Iterable[Triple]) -> set[Triple]:
     """Declare each individual of a class: owlready2 lists no others."""
     classes = _of_type(triples, _CLASS)
     return {
-        Triple(triple.subject, _TYPE, _INDIVIDUAL)
+        Triple(triple.subject, TYPE, _INDIVIDUAL)
         for triple in triples
-        if triple.predicate == _TYPE and triple.object in classes and isinstance(triple.subject, NamedNode)
+        if triple.predicate == TYPE and triple.object in classes and isinstance(triple.subject, NamedNode)
     }
 
 
@@ -95,4 +94,4 @@ def _label(iri: str, base: str) -> str:
 
 
 def _of_type(triples: Iterable[Triple], kind: NamedNode) -> set[Any]:
-    return {triple.subject for triple in triples if triple.predicate == _TYPE and triple.object == kind}
+    return {triple.subject for triple in triples if triple.predicate == TYPE and triple.object == kind}
