@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import chain, islice
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -52,8 +51,6 @@ _NOT_PARTS = (GRAPH_VALIDATION, GRAPH_CHANGED, GRAPH_MAPPED)
 _NOT_FOLLOWED = (GRAPH_REASONED, *_NOT_PARTS)
 _ASSERTED, _CONCLUDED, _NOTED, _APART = "asserted", "concluded", "noted", "apart"
 _NAMES = (NamedNode, BlankNode)
-_RECENT: WeakKeyDictionary[KnowledgeGraph, tuple[int, dict[Name, Region]]] = WeakKeyDictionary()
-_ONTOLOGIES: WeakKeyDictionary[KnowledgeGraph, tuple[int, Ontology]] = WeakKeyDictionary()
 
 
 class Joined(Exception):
@@ -72,10 +69,10 @@ class Ontology:
     @classmethod
     def of(cls, graph: KnowledgeGraph) -> Ontology:
         """Return a graph's ontology; of a graph in a folder the same one until something is asserted."""
-        count, kept = _ONTOLOGIES.get(graph, (-1, None))
-        if kept is None or count != graph.asserted_since or graph.folder is None:
-            _ONTOLOGIES[graph] = graph.asserted_since, (kept := cls(graph))
-        return kept
+        known: Ontology | None = graph.read.get("ontology")
+        if known is None or graph.folder is None:
+            known = graph.read["ontology"] = cls(graph)
+        return known
 
     @cached_property
     def _content(self) -> tuple[frozenset[Triple], Resources]:
@@ -158,10 +155,9 @@ def some(
     asserted: what was concluded of them is not needed, so those that were read last may be given again.
     """
     wanted, done = set(seeds), set[Name]()
-    recent = _recent(graph)
     for seed in sorted(wanted, key=str):
         if seed not in done:
-            region = recent.get(seed) if asserted else None
+            region = _recent(graph).get(seed) if asserted else None
             region = region or around(graph, ontology, [seed])
             if region is None:
                 yield None
@@ -169,16 +165,13 @@ def some(
             done |= region.nodes & wanted
             if region.nodes:  # none are around a term of the ontology
                 yield region
-                recent = _recent(graph)
-                if sum(len(one.asserted) for one in recent.values()) < MOST_KEPT:
-                    recent[seed] = region
+                if sum(len(one.asserted) for one in _recent(graph).values()) < MOST_KEPT:
+                    _recent(graph)[seed] = region
 
 
 def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
     """Return parts that were read lately, each by a node of it, if nothing was asserted meanwhile."""
-    count, recent = _RECENT.get(graph, (-1, {}))
-    if count != graph.asserted_since:
-        _RECENT[graph] = graph.asserted_since, (recent := {})
+    recent: dict[Name, Region] = graph.read.setdefault("parts", {})
     return recent
 
 

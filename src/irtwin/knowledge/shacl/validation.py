@@ -6,7 +6,7 @@ are read as SHACL reads them: by the types that are said, and `rdfs:subClassOf` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -87,7 +87,7 @@ def validate(graph: KnowledgeGraph) -> tuple[Violation, ...]:
         in_graph((quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)), GRAPH_VALIDATION), GRAPH_VALIDATION
     )
     graph.change(changed or (), in_graph([validated], GRAPH_REASONED) if in_parts else ())
-    robots = _Robots(graph, ontology)
+    robots = _robots(graph, ontology, report)
     return tuple(sorted((_violation(report, node, robots) for node in report.objects(None, SH.result)), key=str))
 
 
@@ -139,21 +139,15 @@ def _empty() -> rdflib.Graph:
     return report
 
 
-class _Robots:
-    """Tells which robot a node belongs to, by the part of the graph that it is in."""
-
-    def __init__(self, graph: KnowledgeGraph, ontology: Ontology):
-        self._graph, self._ontology = graph, ontology
-        self._known: dict[str, str | None] = {}
-
-    def of(self, node: str) -> str | None:
-        """Return a robot's IRI; None where the node is no robot's alone."""
-        if node not in self._known:
-            region = parts.around(self._graph, self._ontology, [NamedNode(node)])
-            robots = [] if region is None else parts.robots(self._ontology, region.asserted)
-            robot = robots[0].value if len(robots) == 1 else None
-            self._known |= dict.fromkeys([node, *(one.value for one in (region.nodes if region else ()))], robot)
-        return self._known[node]
+def _robots(graph: KnowledgeGraph, ontology: Ontology, report: rdflib.Graph) -> dict[str, str]:
+    """Return the robots of a report's nodes, by their IRIs, where these are one robot's alone: in the same part."""
+    focused = {NamedNode(str(it)) for it in report.objects(None, SH.focusNode) if isinstance(it, rdflib.URIRef)}
+    robots: dict[str, str] = {}
+    for region in parts.some(graph, ontology, focused - ontology.terms, asserted=True):
+        assert region is not None  # for no term of the ontology was asked
+        if len(own := parts.robots(ontology, region.asserted)) == 1:
+            robots |= dict.fromkeys((node.value for node in region.nodes & focused), own[0].value)
+    return robots
 
 
 @lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
@@ -201,7 +195,7 @@ def _as_rdflib(triples: Iterable[Triple]) -> rdflib.Graph:
     return rdflib.Graph().parse(data=serialize(triples, format=RdfFormat.N_TRIPLES), format="nt")
 
 
-def _violation(report: rdflib.Graph, result: rdflib.term.Node, robots: _Robots) -> Violation:
+def _violation(report: rdflib.Graph, result: rdflib.term.Node, robots: Mapping[str, str]) -> Violation:
     values = {name: report.value(result, SH[name]) for name in ("focusNode", "resultMessage", "resultPath", "value")}
     focus, path, value = values["focusNode"], values["resultPath"], values["value"]
     return Violation(
@@ -209,6 +203,6 @@ def _violation(report: rdflib.Graph, result: rdflib.term.Node, robots: _Robots) 
         message=str(values["resultMessage"]),
         property=str(path) if isinstance(path, rdflib.URIRef) else None,
         value=None if value is None else str(value),
-        robot=robots.of(str(focus)) if isinstance(focus, rdflib.URIRef) else None,
+        robot=robots.get(str(focus)),
         several=report.value(result, SH.sourceConstraintComponent) == SH.MaxCountConstraintComponent,
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from pyoxigraph import Literal, NamedNode, Quad, QueryBoolean, QuerySolutions, QueryTriples, Store, Triple
 
@@ -42,8 +42,8 @@ class KnowledgeGraph:
 
     Queries reach the samples of series by the functions of `series_functions`, where the series' files are known:
     in `workspace`, which a folder's parent is if none is given. Its individuals lie below `base`, else below what the
-    graph says of itself. `asserted_since` counts the writes, by this object, of what nobody inferred. `answers` hold
-    until the graph is written to: who keeps one takes them before the question is asked.
+    graph says of itself. `read` is what others made of asserted quads, by a word of theirs: gone once this object
+    writes to such. `answers` hold until the graph is written to: who keeps one takes them before the question is asked.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class KnowledgeGraph:
         self._resources = resources
         self._base = base
         self._says_first = False  # whether the next change has it say first that it is behind
-        self.asserted_since = 0
+        self.read: dict[str, Any] = {}
         self.answers = answers_of(self.store)
 
     @classmethod
@@ -211,7 +211,8 @@ class KnowledgeGraph:
         both = taken | given
         if has_blank_node(both):
             raise ValueError("quads with blank nodes cannot be changed one by one; replace their graph")
-        self.asserted_since += any(map(changes.is_asserted, both))
+        if any(map(changes.is_asserted, both)):
+            self.read = {}
         if (embedded := self.store.embedded) is not None:
             notes = changes.notes(embedded, both)
             taken -= notes
@@ -362,7 +363,7 @@ class KnowledgeGraph:
         """Before graphs are written whole: have everything inferred and validated anew, if they are asserted."""
         if all(name.startswith(changes.NOT_ASSERTED) for name in written):
             return
-        self.asserted_since += 1
+        self.read = {}
         self.change(self.made_of(), ())
 
     def _functions(self, faults: dict[str, None]) -> Functions:
