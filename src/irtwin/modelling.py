@@ -171,7 +171,7 @@ def expect(
     cost = price(known, motions)
     expected = Expectation(run, table, cost, collisions.checks_itself)
     if out is not None:
-        write_expectation(expected, Path(out))
+        write_table(expected.table, Path(out))
     return expected
 
 
@@ -184,11 +184,6 @@ def motions_of(robot: Robot, file: Path) -> list[Motion]:
 def _motions(twin: Twin, run: Run) -> list[Motion]:
     pieces, _ = as_sampled(run.signals, run.file)
     return [condition(replace(run, signals=piece), twin.robot, twin.cutoff) for piece in pieces]
-
-
-def write_expectation(expected: Expectation, out: Path) -> None:
-    """Write torque and power of a motion as Parquet."""
-    _write_parquet(expected.table, out)
 
 
 def write_model(twin: Twin, form: str, out: Path) -> list[str]:
@@ -256,10 +251,11 @@ def write_motion(motion: Motion, robot: Robot, out: Path) -> None:
     if ending == ".csv":
         write(out, csv_text(signals, joints).encode())
         return
-    _write_parquet(pa.table(columns_of(signals, joints)), out)
+    write_table(pa.table(columns_of(signals, joints)), out)
 
 
-def _write_parquet(table: pa.Table, out: Path) -> None:
+def write_table(table: pa.Table, out: Path) -> None:
+    """Write a table, such as that of an expectation, as Parquet."""
     buffer = io.BytesIO()
     pa.parquet.write_table(table, buffer)
     write(out, buffer.getvalue())

@@ -119,7 +119,7 @@ def predict(
         check_place(out)
     expected, kept = _keep(robot, name, make, location, announce)
     if out is not None:
-        modelling.write_expectation(expected, out)
+        modelling.write_table(expected.table, out)
     return expected, kept
 
 

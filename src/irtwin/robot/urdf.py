@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
@@ -183,16 +184,14 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
         what = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
         raise InputError(f"{source}: {what}; all links must be connected to one base")
     depths = {roots[0]: 0}
-    for link in links:
-        way: list[str] = []
-        at = link
-        while at not in depths and len(way) <= len(links):
-            way.append(at)
-            at = parents[at]
-        if len(way) > len(links):
-            raise InputError(f'{source}: the joints around link "{link}" form a loop; a URDF is a tree')
-        for below in reversed(way):
-            depths[below] = depths[parents[below]] + 1
+    try:
+        for link in TopologicalSorter({child: [parent] for child, parent in parents.items()}).static_order():
+            if link in parents:
+                depths[link] = depths[parents[link]] + 1
+    except CycleError as error:
+        raise InputError(
+            f'{source}: the joints around link "{error.args[1][0]}" form a loop; a URDF is a tree'
+        ) from None
     if max(depths.values()) > _DEEPEST:
         raise InputError(f"{source}: a chain of more than {_DEEPEST} links cannot be modelled")
 
