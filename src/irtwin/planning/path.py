@@ -15,10 +15,9 @@ from irtwin.planning.poses import follow
 from irtwin.robot.collision import STEP, CollisionModel
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
-from irtwin.signals.sampling import interpolated
 
 LONGEST_SEARCH = 10.0  # s
-_SHORTCUTS = 60
+_ROPE = 0.75  # rad (m) between points of a path at which a rope along it is held
 _LINE = 5e-3  # m between poses of a straight line
 _TURN = 0.02  # rad, likewise
 _JUMP = 0.3  # rad: a joint that must move farther from one pose of a line to the next has changed its branch
@@ -30,13 +29,12 @@ def joint_path(
 ) -> np.ndarray:
     """Return corners (k, n) of a path that is straight in joint space in between and touches nothing.
 
-    Straight to the goal where that is clear; else RRT-Connect (Kuffner and LaValle, 2000), shortened by random
-    shortcuts. Raises InputError where none is found in `seconds`.
+    Straight to the goal where that is clear; else RRT-Connect (Kuffner and LaValle, 2000), shortened as a rope that is
+    pulled. Raises InputError where none is found in `seconds`.
     """
     if clear_between(collisions, start, goal):
         return np.array([start, goal])
-    corners = _search(robot, collisions, start, goal, seconds)
-    return _shortened(collisions, corners)
+    return _search(robot, collisions, start, goal, seconds)
 
 
 def line_path(robot: Robot, collisions: CollisionModel, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
@@ -109,8 +107,9 @@ def _search(
         setup.solve(max(0.01, until - monotonic()))
         if not setup.haveExactSolutionPath():
             break
-        states = setup.getSolutionPath().getStates()
-        corners = np.array([[state[joint] for joint in range(n)] for state in states])
+        found = setup.getSolutionPath()
+        setup.getPathSimplifier().ropeShortcutPath(found, _ROPE)
+        corners = np.array([[state[joint] for joint in range(n)] for state in found.getStates()])
         if all(clear_between(collisions, a, b) for a, b in pairwise(corners)):
             return corners
         setup.clear()  # something thin was missed
@@ -118,23 +117,6 @@ def _search(
         f"found no path in {seconds:g} s that touches nothing; move the boxes, give another goal, or search longer "
         "with --search"
     )
-
-
-def _shortened(collisions: CollisionModel, corners: np.ndarray) -> np.ndarray:
-    """Return the path with random shortcuts between points of it (Geraerts and Overmars, 2007)."""
-    random = np.random.default_rng(_SEED)
-    for _ in range(_SHORTCUTS):
-        way = way_along(corners)
-        a, b = np.sort(random.uniform(0, way[-1], 2))
-        first, last = np.searchsorted(way, [a, b])
-        if first == last:
-            continue
-        ends = interpolated(way, corners, np.array([a, b]))
-        if clear_between(collisions, *ends):
-            corners = np.array([*corners[:first], *ends, *corners[last:]])
-            keep = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > 1e-9])
-            corners = corners[keep]
-    return corners
 
 
 def _ompl() -> tuple[Any, Any, Any]:
