@@ -29,21 +29,37 @@ def blocks(runs: int, lasting: float, noise: float, seed: int = 0) -> list[Block
 
 
 def test_what_lasts_a_run_is_told_from_noise():
-    found = remainder(blocks(60, 2.0, 1.0), TERMS, None, 0)
+    found = left(blocks(60, 2.0, 1.0))
     assert found.sample == pytest.approx(5**0.5, rel=0.25)
     assert found.seconds == pytest.approx(50.0)  # five runs a group
     assert found.mean == pytest.approx(1.12 * 2.0 / 5**0.5, rel=0.5)  # by Student's t of twelve groups
 
 
 def test_what_coefficients_are_unsure_by_is_no_remainder():
-    noisy, lasting = (remainder(blocks(8, off, 1.0), TERMS, None, 0).mean for off in (0.0, 2.0))
+    noisy, lasting = (left(blocks(8, off, 1.0)).mean for off in (0.0, 2.0))
     assert noisy < 0.1 * lasting
 
 
 def test_of_one_run_stretches_of_time_tell():
     long = [block for k, block in enumerate(blocks(10, 2.0, 0.1)) for block in [replaced(block, k)]]
-    assert remainder(long, TERMS, None, 0).mean > 0.5
-    assert remainder(long[:3], TERMS, None, 0) is None
+    assert left(long).mean > 0.5
+    assert left(long[:3]) is None
+
+
+def test_what_predicted_torque_leaves_is_of_the_remainder():
+    logged = blocks(60, 0.0, 1.0)
+    offs = 2.0 * np.random.default_rng(1).standard_normal(60)
+    predicted = [shifted(block, offs[int(block.run)]) for block in logged]
+    assert remainder(logged, predicted, TERMS, None, 0).mean > 5 * left(logged).mean
+
+
+def left(some: list[Block]) -> Remainder | None:
+    return remainder(some, some, TERMS, None, 0)
+
+
+def shifted(block: Block, watts: float) -> Block:
+    (factor,) = block.factors
+    return Block(block.run, block.start, block.stop, block.rows, (factor + watts * factor[:, :1] * [0, 0, 1],))
 
 
 def replaced(block: Block, place: int) -> Block:

@@ -11,6 +11,7 @@ from irtwin.errors import InputError
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.signals.conditioning import condition, condition_for_fit
 from irtwin.twin.identify import identify
+from irtwin.twin.price import cost
 from irtwin.twin.validate import validate
 
 ALL = (*BASELINE, "copper_loss")
@@ -55,6 +56,28 @@ def test_power_is_found_on_top_of_torque():
     assert fit.power_r_squared > 0.999
     assert fit.r_squared.min() > 0.999
     assert twin.unidentified == ()
+
+
+def test_friction_that_the_twin_lacks_is_no_heat_of_drives():
+    robot, true = with_constants(arm(4)), truth(arm(4))
+
+    def rubbing(seed):
+        measured = measure(robot, swing(robot, seed), noise=0.1, seed=seed)
+        real = measured.torque - true["c"]
+        more = 0.1 * np.abs(real) * np.sign(measured.dq)
+        heat = (true["R"] * ((real + more) ** 2 - real**2) / 8.0**2).sum(axis=1)
+        return replace(
+            measured,
+            torque=measured.torque + more,
+            current=None,
+            power=measured.power + (more * measured.dq).sum(axis=1) + heat,
+        )
+
+    twin = identify(robot, [rubbing(seed) for seed in range(4)], ALL)
+    np.testing.assert_allclose(values(twin, "copper_loss")[:2], true["R"][:2], rtol=0.03)
+    new = rubbing(99)
+    figure = cost(twin, [new]).energy
+    assert abs(figure.value - np.trapezoid(new.power, new.time)) < figure.half_width
 
 
 def test_through_the_whole_chain_from_positions_alone():

@@ -298,6 +298,13 @@ class Stack:
             return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
         return self.torque_of(self._real, motion, values, sparse=sparse)
 
+    def logged_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, as the log shows it, less what sensors add; else the predicted."""
+        if motion.torque is None:
+            return self.real_torque(motion, values, sparse=sparse)
+        sensors = [effect for effect in self._torque if effect.channel == "measurement"]
+        return np.asarray(motion.torque - self.torque_of(sensors, motion, values))
+
     def told_by_log(self, motion: Motion) -> np.ndarray:
         """Return where a log alone tells a joint's torque, (N, n): at rest dry friction holds what it has to."""
         return np.zeros(motion.dq.shape, dtype=bool) if motion.torque is None else self.undecided(motion)
@@ -305,10 +312,7 @@ class Stack:
     def borne_torque(self, motion: Motion, values: np.ndarray) -> np.ndarray:
         """Return the real joint torque, (N, n) N m: what the log shows, less what sensors add, where it alone tells."""
         torque, told = self.real_torque(motion, values), self.told_by_log(motion)
-        if not told.any():
-            return torque
-        sensors = [effect for effect in self._torque if effect.channel == "measurement"]
-        return np.where(told, motion.torque - self.torque_of(sensors, motion, values), torque)
+        return np.where(told, self.logged_torque(motion, values), torque) if told.any() else torque
 
     def torque_of(
         self, effects: Sequence[Effect], motion: Motion, values: np.ndarray, *, sparse: bool = False
@@ -338,18 +342,23 @@ class Stack:
         torque_values: np.ndarray,
         power_values: np.ndarray | None = None,
         torque: np.ndarray | None = None,
+        *,
+        logged: bool = False,
     ) -> np.ndarray:
-        """Return the (N, L) power regressor of the torque that (K,) coefficients predict.
+        """Return the (N, L) power regressor of the torque that (K,) coefficients predict, or of the `logged_torque`.
 
         `power_values` (L,): coefficients with which effects predict the power that others are built on; None: as
-        expected. `torque` (N, n): the real joint torque by `torque_values`, N m, where that is known already.
+        expected. `torque` (N, n): that torque, N m, where it is known already.
         """
         if not self.power_coupled:
-            known = self.real_torque(motion, torque_values) if torque is None else torque
+            known = self._torque_by(motion, torque_values, logged) if torque is None else torque
             return self.power_columns(motion, known)
-        below = self._powers(motion, torque_values, power_values)
+        below = self._powers(motion, torque_values, power_values, logged)
         parts = [self.columns(effect, motion, below[effect.stage]) for effect in self._power]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
+
+    def _torque_by(self, motion: Motion, values: np.ndarray, logged: bool) -> np.ndarray:
+        return self.logged_torque(motion, values) if logged else self.real_torque(motion, values)
 
     def power_columns(self, motion: Motion, torque: np.ndarray) -> np.ndarray:
         """Return the (N, L) power regressor of real joint torques (N, n), N m; zero where predicted power is needed."""
@@ -454,21 +463,20 @@ class Stack:
         return _Torques(whole, values.tobytes(), below, real)
 
     def _powers(
-        self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None
+        self, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray | None, logged: bool
     ) -> dict[int, Predicted]:
         """Return what lower stages predict, for each stage of power, over the whole run."""
         whole = motion.whole or motion
-        key = torque_values.tobytes() + (b"" if power_values is None else power_values.tobytes())
+        key = logged, torque_values.tobytes(), b"" if power_values is None else power_values.tobytes()
         if self._last_powers is None or self._last_powers[0] is not whole or self._last_powers[1] != key:
             values = self._expected(self.power_terms) if power_values is None else power_values
-            self._last_powers = whole, key, self._predict_powers(whole, torque_values, values)
+            pieces = [self._torque_by(piece, torque_values, logged) for piece in whole.pieces(_PIECE)]
+            self._last_powers = whole, key, self._predict_powers(whole, np.concatenate(pieces), values)
         return self._last_powers[2]
 
-    _last_powers: tuple[Motion, bytes, dict[int, Predicted]] | None = None
+    _last_powers: tuple[Motion, tuple[bool, bytes, bytes], dict[int, Predicted]] | None = None
 
-    def _predict_powers(self, whole: Motion, torque_values: np.ndarray, values: np.ndarray) -> dict[int, Predicted]:
-        pieces = [self.real_torque(piece, torque_values) for piece in whole.pieces(_PIECE)]
-        torque = np.concatenate(pieces)
+    def _predict_powers(self, whole: Motion, torque: np.ndarray, values: np.ndarray) -> dict[int, Predicted]:
         power, axes = np.zeros(len(torque)), np.zeros(len(torque))
         below: dict[int, Predicted] = {}
         owned = list(_slices(self._power, self.robot))

@@ -52,23 +52,16 @@ def fit_torque(
 def fit_power(
     stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, every: int = 1, *, switching: bool = False
 ) -> tuple[list[Block], Estimate]:
-    """Fit the free coefficients of power on top of the torque that was found; as `fit_torque` returns them.
+    """Fit the free coefficients of power on the torque that was logged, as `fit_torque` returns them.
 
-    `every` as in `accumulate`; `switching`: moments at which brakes open or close count, too, as they tell when.
+    What sensors add is taken off, by the coefficients that were found; where none was logged it is the predicted one.
+    On the predicted one, what laws of friction miss would be heat of drives. `every` as in `accumulate`; `switching`:
+    moments at which brakes open or close count, too, as they tell when.
     """
     free = free_terms(stack)
 
     def fit(values: np.ndarray) -> tuple[list[Block], Estimate]:
-        def equations(motion: Motion) -> Rows:
-            assert motion.power is not None
-            torque = stack.real_torque(motion, torque_values, sparse=True)
-            columns = stack.predicted_power_columns(motion, torque_values, values, torque)
-            burnt = _burnt(stack, motion, torque, columns, values)
-            known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
-            known -= burnt[:, ~stack.fixed] @ values[~stack.fixed]
-            unsure = None if switching or (near := stack.switching(motion)) is None else near[:, None]
-            return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None], unsure)
-
+        equations = _losses_equations(stack, torque_values, values, logged=True, switching=switching)
         return _of_one(motions, equations, free, stack.prior_rows(free), every)
 
     values = _expected(stack.power_terms)
@@ -81,6 +74,35 @@ def fit_power(
         values[~stack.fixed] = found.values
         blocks, found = fit(values)
     return blocks, found
+
+
+def predicted_losses(
+    stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, free_values: np.ndarray
+) -> list[Block]:
+    """Return the equations of power on the torque that is predicted, reduced, about free coefficients of power."""
+    values = _expected(stack.power_terms)
+    values[~stack.fixed] = free_values
+    equations = _losses_equations(stack, torque_values, values, logged=False)
+    return accumulate(motions, equations, np.ones((1, len(free_values)), dtype=bool))
+
+
+def _losses_equations(
+    stack: Stack, torque_values: np.ndarray, values: np.ndarray, *, logged: bool, switching: bool = False
+) -> Equations:
+    """Return the equation of power in its free coefficients, about coefficients of power `values` (L,)."""
+    torque_of = stack.logged_torque if logged else stack.real_torque
+
+    def equations(motion: Motion) -> Rows:
+        assert motion.power is not None
+        torque = torque_of(motion, torque_values, sparse=True)
+        columns = stack.predicted_power_columns(motion, torque_values, values, torque, logged=logged)
+        burnt = _burnt(stack, motion, torque, columns, values)
+        known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        known -= burnt[:, ~stack.fixed] @ values[~stack.fixed]
+        unsure = None if switching or (near := stack.switching(motion)) is None else near[:, None]
+        return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None], unsure)
+
+    return equations
 
 
 def _burnt(stack: Stack, motion: Motion, torque: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -38,21 +38,24 @@ class Remainder:
         return self.mean * seconds * float(np.sqrt(max(1.0, self.seconds / max(seconds, 1e-9))))
 
 
-def remainder(blocks: Sequence[Block], terms: Sequence[Term], known: np.ndarray | None, ones: int) -> Remainder | None:
+def remainder(
+    blocks: Sequence[Block], predicted: Sequence[Block], terms: Sequence[Term], known: np.ndarray | None, ones: int
+) -> Remainder | None:
     """Return the remainder of a fit of power, of one equation; None where there are too few blocks to tell.
 
-    Each run, or stretch of time where runs are few, is left out in turn. Its mean residual is that of the others' fit;
-    what is more than their coefficients are unsure by is the remainder. `terms`, `known`: of the fit, as `estimate`
-    takes them; `ones`: the place of the column of ones, whose product with the residual is the residual's sum.
+    Each run, or stretch of time where runs are few, is left out in turn. Its mean residual is that of the others' fit,
+    by the same stretches as `predicted`; what is more than their coefficients are unsure by is the remainder. `terms`,
+    `known`: of the fit, as `estimate` takes them; `ones`: the place of the column of ones, whose product with the
+    residual is the residual's sum.
     """
-    groups = _groups(blocks)
+    by_stretch, groups = {(block.run, block.start): block for block in predicted}, _groups(blocks)
     if len(groups) < _FEWEST:
         return None
     pattern = np.ones((1, len(terms)), dtype=bool)
     more, squares, seconds = [], 0.0, 0.0
     for group in groups:
         others = estimate([block for block in blocks if block not in group], pattern, terms, known)
-        factor = np.concatenate([block.factors[0] for block in group])
+        factor = np.concatenate([by_stretch[block.run, block.start].factors[0] for block in group])
         rows = sum(int(block.rows[0]) for block in group)
         left = factor @ np.append(-others.values, 1.0)
         row = factor[:, ones] @ factor[:, :-1] / rows

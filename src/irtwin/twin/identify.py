@@ -25,6 +25,7 @@ from irtwin.identification.fits import (
     fit_through_power,
     fit_torque,
     free_terms,
+    predicted_losses,
     real_terms,
 )
 from irtwin.identification.friction_near_zero import with_friction_near_zero
@@ -71,7 +72,7 @@ def identify(
     robot, reduced = with_friction_near_zero(robot, with_torque, effects)
     stack = _visible(Stack(robot, effects, prior), torque=bool(with_torque), power=bool(with_power))
     open_shapes = {effect for effect in effects if isinstance(effect, str)}
-    left: list[Block] = []
+    left, predicted = list[Block](), list[Block]()
     base: tuple[BaseParameter, ...] = ()
     condition: float | None = None
     change: float | None = None
@@ -96,6 +97,7 @@ def identify(
         found: list[Found] = [(stack.torque_terms, torque)]
         if powered:
             left, power = fit_power(stack, with_power, torque.values)
+            predicted = predicted_losses(stack, with_power, torque.values, power.values)
             found.append((free_terms(stack), power))
         factors = [combine([block.factors[e] for block in counting], used) for e, used in enumerate(stack.pattern)]
         base, condition = _base(stack, factors, torque)
@@ -103,8 +105,9 @@ def identify(
     else:
         terms = [*real_terms(stack), *free_terms(stack)]
         left, through = fit_through_power(stack, with_power)[2:]
+        predicted = left
         found = [(terms, with_consistent_bodies(stack, terms, through))]
-    remaining = _remainder(stack, left, found[-1][0])
+    remaining = _remainder(stack, left, predicted, found[-1][0])
     if constants:
         found.append((constants.terms, constants.estimate))
     parameters = [parameter for terms, result in found for parameter in _parameters(stack, terms, result, remaining)]
@@ -144,12 +147,12 @@ def _widened(one: Parameter, half: float) -> Parameter:
     return replace(one, lower=max(one.value - width, 0.0), upper=one.value + width)
 
 
-def _remainder(stack: Stack, blocks: Sequence[Block], terms: Terms) -> Remainder | None:
+def _remainder(stack: Stack, blocks: Sequence[Block], predicted: Sequence[Block], terms: Terms) -> Remainder | None:
     """Return what the fit of power, of these terms, leaves; None where there is none, or no standby in it."""
     ones = [k for k, (effect, _) in enumerate(terms) if effect.drawn_at_rest]
     if not blocks or not ones:
         return None
-    return remainder(blocks, [term for _, term in terms], stack.prior_rows(terms), ones[0])
+    return remainder(blocks, predicted, [term for _, term in terms], stack.prior_rows(terms), ones[0])
 
 
 def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
