@@ -238,7 +238,7 @@ class _Search:
             for place, member in enumerate(structure):
                 posterior = self.instead(member, structure, noise)
                 other = posterior.likeliest_at(member[0])
-                if _place(posterior.hypotheses[other]) != _place(member[0]):
+                if posterior.log_odds[other] > 0 and _place(posterior.hypotheses[other]) != _place(member[0]):
                     structure = [*structure]
                     structure[place] = posterior.hypotheses[other], posterior.variant(other)
                     noise = self.left(structure, noise)
