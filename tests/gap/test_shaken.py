@@ -17,6 +17,7 @@ from irtwin.gap.regression.channel_equations import torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
+from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.conditioning import condition_for_fit
@@ -47,7 +48,7 @@ def equations(runs: list[Run], *, told: bool) -> System:
 def blamed(system: System) -> list[str]:
     """The effects that are found missing."""
     candidates = hypotheses(system.columns, system.base, MISSING)
-    return [cause.effect for cause in attribute(system, candidates, DEFAULT.criterion).causes]
+    return [cause.effect for cause in attribute(system.by_speed, candidates, DEFAULT.criterion).causes]
 
 
 def test_shaking_adds_as_much_noise_as_there_is() -> None:
@@ -60,6 +61,29 @@ def test_shaking_adds_as_much_noise_as_there_is() -> None:
         added, there = (np.std(getattr(a, name) - getattr(motion, name), axis=0) for a in (again, clean))
         assert added == pytest.approx(there, rel=0.15)
     assert again.torque is motion.torque
+
+
+def test_of_a_coarse_encoder_shaking_adds_what_its_filter_passes() -> None:
+    """Shaken positions lie on no grid; filtered as if their encoder were fine they would be several times as noisy."""
+    step = 2e-3
+    motion = measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
+    run = replace(as_run(motion, q=np.round(motion.q / step) * step), name="coarse", role="observed")
+    taken = condition_for_fit(run, ROBOT, CUTOFF)
+    ((_, again),) = shaken([run], {"coarse": taken}, ROBOT, DEFAULT.data)
+    added, there = (np.std(one.dq - other.dq, axis=0) for one, other in ((again, taken), (taken, motion)))
+    assert added == pytest.approx(there, rel=0.3)
+
+
+def test_rounding_of_what_stands_still_is_no_noise() -> None:
+    motion = measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
+    second = len(motion.time) // 2
+    q = np.concatenate([motion.q[:second], np.repeat(motion.q[second : second + 1], len(motion.q) - second, axis=0)])
+    run = replace(as_run(motion, q=np.round(q / 2e-4) * 2e-4), name="halts", role="observed")
+    taken = condition_for_fit(run, ROBOT, CUTOFF)
+    ((_, again),) = shaken([run], {"halts": taken}, ROBOT, DEFAULT.data)
+    at_rest = slice(second + 100, None)
+    np.testing.assert_allclose(again.dq[at_rest], taken.dq[at_rest], atol=1e-9)
+    assert np.std(again.dq[:second] - taken.dq[:second], axis=0).min() > 1e-4
 
 
 def test_of_a_long_run_the_middle_is_shaken(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,6 +106,21 @@ def test_noise_of_positions_is_no_elastic_joint() -> None:
     runs = [logged(seed) for seed in range(1, 6)]
     assert blamed(equations(runs, told=False)) == ["joint_elasticity"]
     assert blamed(equations(runs, told=True)) == []
+
+
+def test_noise_of_positions_explains_no_more_than_what_is_left() -> None:
+    system = equations([logged(seed) for seed in range(1, 6)], told=True).by_speed
+    assert system.shaken is not None
+    assert system.shaken_twin is not None
+    coefficients = np.append(-system.solution((), Summed(system.group_moments(system.noise_before))), 1.0)
+    ten_times = {name: tuple(100 * each for each in getattr(system, name)) for name in ("shaken", "shaken_twin")}
+    more = replace(system, **ten_times)
+    own, of_more = (one.shaken_products(coefficients, one.noise_before) for one in (system, more))
+    assert own is not None
+    assert of_more is not None
+    made = coefficients @ of_more.sum(axis=0)
+    assert made <= 1.001 * system.rows.sum()
+    assert np.all(np.abs(own) <= 1.001 * np.abs(of_more))
 
 
 def test_what_noise_of_positions_makes_is_no_gap() -> None:

@@ -4,12 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.errors import InputError
-from irtwin.signals.conditioning import choose_cutoff, condition, condition_for_fit, cutoff_of_motion, differentiate
+from irtwin.signals.conditioning import (
+    choose_cutoff,
+    condition,
+    condition_for_fit,
+    cutoff_of_motion,
+    differentiate,
+    lag_of,
+)
 
 ROBOT = arm(3)
 
@@ -117,6 +125,24 @@ def test_logged_speed_is_taken_where_it_agrees_with_the_positions():
     assert relative(good.dq[25:-25], motion.dq[25:-25]) < 1e-3
     np.testing.assert_array_equal(degrees.dq, alone.dq)
     np.testing.assert_allclose(good.ddq, differentiate(good.dq, good.rate))
+
+
+@pytest.mark.parametrize("lag", [2e-3, -1.3e-3, 20e-3])
+def test_a_speed_that_a_filter_made_late_is_taken_as_much_earlier(lag):
+    """Noise of positions, which are derived, and of the speed do not move it."""
+    random, motion = np.random.default_rng(0), swing(ROBOT, 7, rate=250.0)
+    late = scipy.interpolate.CubicSpline(motion.time, motion.dq)(motion.time - lag)
+    noisy = late + 5e-3 * random.standard_normal(late.shape)
+    run = as_run(motion, q=np.round(motion.q / 1e-4) * 1e-4, dq=noisy)
+    found = condition(run, ROBOT)
+    assert lag_of(noisy, motion.dq, motion.rate) == pytest.approx(lag, rel=0.05)
+    assert relative(found.dq[25:-25], motion.dq[25:-25]) < 0.003
+
+
+def test_a_joint_at_rest_tells_no_lag():
+    still, noise = np.zeros((100, 1)), np.random.default_rng(0).standard_normal((100, 1))
+    assert lag_of(still, still, 100.0) == 0.0
+    assert np.isfinite(lag_of(still, noise, 100.0))
 
 
 def test_every_measurement_passes_the_same_filter():

@@ -202,8 +202,8 @@ def diagnose(
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
         torque, floor, refusals = search.torque_causes(_tried(search, plain))
-        if lag := common_lag(case.robot, torque.finding, case.with_torque):
-            tell(f"Trying every effect on torque {1e3 * lag:.2g} ms earlier, as it lags in most joints")
+        if lag := common_lag(torque.finding, case.with_torque):
+            tell(f"Trying every effect on torque {1e3 * lag:.2g} ms earlier, as it lags in several joints")
             case = case.without_lag(lag).with_friction_near_zero()
             search = replace(search, case=case)
             plain, twin_torque = search.plain, search.twin.torque

@@ -15,7 +15,7 @@ from irtwin.signals.filter import FEWEST_PERIODS, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
-from irtwin.signals.sampling import holes, interpolated, interval
+from irtwin.signals.sampling import earlier, holes, interpolated, interval
 
 _BAND_SHARE = 0.99  # of the speed's power lies below the band of the motion
 _BAND_FACTOR = 10.0  # Gautier 1997 asks for at least five times the band of the motion
@@ -66,8 +66,8 @@ def condition(
     logged = {name: it for name, it in signals.logged().items() if name not in REQUIRED}
     measured: dict[str, Any] = {name: clean(it, cutoffs.get(name, float(cutoff))) for name, it in logged.items()}
     q = clean(signals.q, cutoffs["q"], order=3)
-    dq = _agreeing(measured.pop("dq", None), differentiate(q, rate))
-    ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate))
+    dq = _agreeing(measured.pop("dq", None), differentiate(q, rate), time)
+    ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate), time)
     return Motion(
         time,
         q,
@@ -86,24 +86,25 @@ def condition_for_fit(run: Run, robot: Robot, cutoff: float) -> Motion:
     """Return the run's signals as `condition` does, its states filtered more widely.
 
     What a fit computes of states passes the filter of the measurement, as the measurement does; states that had passed
-    it before would pass it twice, and what they lose there looks like an elastic joint. They pass no more than their
-    encoder resolves: by noise of its steps a joint that hardly moves would seem to turn back and forth.
+    it before would pass it twice, and what they lose there looks like an elastic joint.
     """
-    return condition(run, robot, cutoff, states_cutoff=np.clip(_resolved(run, cutoff), cutoff, _STATES_WIDER * cutoff))
+    return condition(run, robot, cutoff, states_cutoff=states_cutoff(run, cutoff))
 
 
-def _resolved(run: Run, cutoff: float) -> np.ndarray:
-    """Return up to which frequency (n,), Hz, each joint's speed stands out from the noise of its encoder's steps.
+def states_cutoff(run: Run, cutoff: float) -> np.ndarray:
+    """Return the cutoff (n,), Hz, of each joint's states for a fit: wider than `cutoff`, if its encoder resolves that.
 
-    That is where it agrees, or is standstill. Positions between two steps are off by white noise of a twelfth of the
-    step's square, of whose derivative (2 pi)^2 2 f^3 / (3 rate) times as much lies below a frequency f.
+    By noise of the encoder's steps a joint that hardly moves would seem to turn back and forth, so its speed has to
+    stand out from it: that is where it agrees, or is standstill. Positions between two steps are off by white noise of
+    a twelfth of the step's square; of its derivative (2 pi)^2 2 f^3 / (3 rate) times as much is below a frequency f.
     """
     time = _even_time(run)
     rate = 1 / (time[1] - time[0])
     speed = rate * np.diff(low_pass(interpolated(run.signals.time, run.signals.q, time), rate, cutoff), axis=0)
     least = np.maximum(_AGREEMENT * np.sqrt(np.mean(speed**2, axis=0)), STANDSTILL)
     steps = np.array([max(_step(positions), _SAME) for positions in run.signals.q.T])
-    return np.asarray(np.cbrt(18 * rate * (least / (2 * np.pi * steps)) ** 2))
+    resolved = np.cbrt(18 * rate * (least / (2 * np.pi * steps)) ** 2)
+    return np.asarray(np.clip(resolved, cutoff, _STATES_WIDER * cutoff))
 
 
 def choose_cutoff(runs: Iterable[Run]) -> float:
@@ -207,9 +208,25 @@ def _of_exponential(power: np.ndarray) -> np.ndarray:
     return np.asarray(np.median(power, axis=0) / np.log(2))
 
 
-def _agreeing(logged: np.ndarray | None, derived: np.ndarray) -> np.ndarray:
-    """Return what was logged where it agrees, over all joints, with what the positions say; else the latter."""
+def _agreeing(logged: np.ndarray | None, derived: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return what was logged where it agrees, over all joints, with what the positions say; else the latter.
+
+    Robots log speeds that a filter has made late: they are taken as much earlier.
+    """
     if logged is None:
         return derived
-    scale = np.sqrt(np.mean(derived**2))
-    return logged if np.sqrt(np.mean((logged - derived) ** 2)) <= _AGREEMENT * scale else derived
+    aligned = earlier(time, logged, lag_of(logged, derived, 1 / (time[1] - time[0])))
+    best = min(aligned, logged, key=lambda one: np.mean((one - derived) ** 2))
+    return best if np.mean((best - derived) ** 2) <= _AGREEMENT**2 * np.mean(derived**2) else derived
+
+
+def lag_of(logged: np.ndarray, derived: np.ndarray, rate: float) -> float:
+    """Return by how much signals (N, n) come later than others, s; small beside the time in which these change.
+
+    Their difference is the lag times the slope of these. That of the logged ones is the instrument: noise of positions
+    is in both others.
+    """
+    slope, instrument = (differentiate(one, rate) for one in (derived, logged))
+    weights = 1 / np.maximum(np.mean(instrument**2, axis=0), np.finfo(float).tiny)
+    across, along = (np.sum(weights * np.mean(one * instrument, axis=0)) for one in (derived - logged, slope))
+    return float(across / along) if along > 0 else 0.0

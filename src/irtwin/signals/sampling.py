@@ -64,6 +64,11 @@ def interpolated(time: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.nda
     return np.asarray(scipy.interpolate.make_interp_spline(time, values, k=1)(at))
 
 
+def earlier(time: np.ndarray, values: np.ndarray, lag: float) -> np.ndarray:
+    """Return values (N, ...) as they are a `lag` (s) later, as splines say; beyond the ends, as there."""
+    return np.asarray(scipy.interpolate.CubicSpline(time, values)(np.clip(time + lag, time[0], time[-1])))
+
+
 def holes(time: np.ndarray) -> np.ndarray:
     """Return the samples (from 1 on) before which nothing was sampled for far longer than the interval."""
     if len(time) < FEWEST:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
@@ -27,6 +26,7 @@ from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import earlier
 from irtwin.twin.shapes import shaped
 from irtwin.twin.torque_scale import of_sensor
 from irtwin.twin.twin import Twin
@@ -156,8 +156,11 @@ class Case:
 
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
-        motions = {run: _earlier(motion, lag) for run, motion in self.motions.items()}
-        said = f"torque comes {1e3 * lag:.2g} ms later than positions in most joints, as filters make it: taken out"
+        motions = {
+            run: motion if motion.torque is None else replace(motion, torque=earlier(motion.time, motion.torque, lag))
+            for run, motion in self.motions.items()
+        }
+        said = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
         cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {said}")
         return replace(self, motions=motions, cutoff=cutoff)
 
@@ -189,13 +192,6 @@ def _turned(before: Joint, joint: Joint) -> Joint:
     if joint.friction_width is None:
         return replace(before, dry_friction=joint.dry_friction or before.dry_friction)
     return replace(joint, friction_widest=max(before.friction_width or 0.0, joint.friction_width))
-
-
-def _earlier(motion: Motion, lag: float) -> Motion:
-    if motion.torque is None:
-        return motion
-    later = np.clip(motion.time + lag, motion.time[0], motion.time[-1])
-    return replace(motion, torque=scipy.interpolate.CubicSpline(motion.time, motion.torque)(later))
 
 
 def _stated(data_set: DataSet) -> Stated:

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import condition_for_fit
+from irtwin.signals.conditioning import condition, states_cutoff
 from irtwin.signals.filter import kernel, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -107,23 +108,33 @@ def _above(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: 
     return None if variance is None else variance * _share(motion)
 
 
-def white_noise(time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Data) -> np.ndarray | None:
+def white_noise(
+    time: np.ndarray, signal: np.ndarray | None, motion: Motion, limits: Data, shows: np.ndarray | None = None
+) -> np.ndarray | None:
     """Return the variance of white noise that has above the band what the filter takes away; NaN if smoothed.
 
     The lesser of two medians: that over time, which no jump of friction moves, and that over frequency, which no line
-    of the spectrum does. None where nothing is known of it.
+    of the spectrum does. None where nothing is known of it. `shows`, as the signal: where the noise is there at all.
     """
     share = _share(motion)
     if signal is None or motion.cutoff is None or share > _MOST_BAND:
         return None
     even = interpolated(time, signal, motion.time)
     above = even - low_pass(even, motion.rate, motion.cutoff)
-    over_time = np.median(above**2, axis=0) / 0.4549 / (1 - share)
+    noisy = np.ones(even.shape, dtype=bool) if shows is None else interpolated(time, shows, motion.time) > 0.5
+    over_time = _median(above**2, noisy) / 0.4549 / (1 - share)
     window = np.hanning(len(even)).reshape(-1, *(1,) * (even.ndim - 1))
     power = np.abs(np.fft.rfft(window * (even - even.mean(axis=0)), axis=0)) ** 2 / (window**2).sum()
     over_frequency = np.median(power[np.linspace(0.0, 1.0, len(power)) > share], axis=0) / np.log(2)
+    over_frequency /= np.maximum(noisy.mean(axis=0), 1 / len(even))
     variance = np.minimum(over_time, over_frequency)
     return np.atleast_1d(np.where(_smoothed(even, motion.rate, share * motion.rate / 2, limits), np.nan, variance))
+
+
+def _median(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Return the median over time of the values that are shown, 0 where none is."""
+    some = shown.any(axis=0)
+    return np.asarray(np.nan_to_num(np.nanmedian(np.where(shown | ~some, values, np.nan), axis=0)) * some)
 
 
 def _share(motion: Motion) -> float:
@@ -183,14 +194,26 @@ def _middle(motion: Motion, samples: int) -> Motion:
 
 
 def _shaken(run: Run, motion: Motion, robot: Robot, limits: Data, random: np.random.Generator) -> Motion | None:
+    if motion.cutoff is None:
+        return None
     noisy = {}
-    for name in ("q", "dq", "ddq"):
-        signal = getattr(run.signals, name)
-        variance = white_noise(run.signals.time, signal, motion, limits)
+    states = {name: getattr(run.signals, name) for name in ("q", "dq", "ddq")}
+    for name, signal in states.items():
+        if signal is None:
+            continue
+        shows = _varies(signal, motion.rate, motion.cutoff)
+        variance = white_noise(run.signals.time, signal, motion, limits, shows)
         if variance is not None and np.nansum(variance) > 0:
-            noisy[name] = signal + random.standard_normal(signal.shape) * np.sqrt(np.nan_to_num(variance))
+            noisy[name] = signal + random.standard_normal(signal.shape) * np.sqrt(np.nan_to_num(variance)) * shows
     if not noisy:
         return None
-    assert motion.cutoff is not None
-    again = condition_for_fit(replace(run, signals=replace(run.signals, **noisy)), robot, motion.cutoff)
+    cutoffs = states_cutoff(run, motion.cutoff)  # shaken positions lie on no grid, and tell nothing of the encoder
+    signals = replace(run.signals, **noisy)
+    again = condition(replace(run, signals=signals), robot, motion.cutoff, states_cutoff=cutoffs)
     return replace(motion, q=again.q, dq=again.dq, ddq=again.ddq)
+
+
+def _varies(signal: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
+    """Return 1 where a signal varies within the filter's reach, else 0: rounding of what stands still is no noise."""
+    changes = np.diff(signal, axis=0, prepend=signal[:1]) != 0
+    return np.asarray(scipy.ndimage.maximum_filter1d(changes.astype(float), len(kernel(rate, cutoff)), axis=0))

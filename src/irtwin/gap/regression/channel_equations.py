@@ -161,23 +161,16 @@ def shaken_products(
             undecided = one.undecided | other.undecided
         return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided, one.slow)
 
-    whole = [np.zeros((size, size)) for size in pattern.sum(axis=1) + 1]
-    own = [np.append(np.arange(count), -1) for count in pattern[:, :twin].sum(axis=1)] * 2
-    parts = [np.zeros((len(some), len(some))) for some in own]
-    rows = np.zeros(len(parts))
+    whole = [np.zeros((size, size)) for size in np.tile(pattern.sum(axis=1) + 1, 2)]
+    rows = np.zeros(len(whole))
     for motion, _ in pairs:  # one by one: blocks of all together take many times what their products do
-        blocks = accumulate_any([motion], difference, pattern, by_products=True)
-        apart = [block.apart for block in blocks]
-        rows += sum(block.rows for block in apart)
+        blocks = [block.apart for block in accumulate_any([motion], difference, pattern, by_products=True)]
+        rows += sum(block.rows for block in blocks)
         for total, *factors in zip(whole, *(block.factors for block in blocks), strict=True):
             total += _products(factors)
-        for total, some, *factors in zip(parts, own, *(block.factors for block in apart), strict=True):
-            total += _products([factor[:, some] for factor in factors])
-    of_both = rows.reshape(2, -1).sum(axis=0)
-    return Shaking(
-        tuple(total / max(count, 1.0) for total, count in zip(whole, of_both, strict=True)),
-        tuple(total / max(count, 1.0) for total, count in zip(parts, rows, strict=True)),
-    )
+    shaken = tuple(total / max(count, 1.0) for total, count in zip(whole, rows, strict=True))
+    own = [np.append(np.arange(count), -1) for count in pattern[:, :twin].sum(axis=1)] * 2
+    return Shaking(shaken, tuple(each[np.ix_(some, some)] for each, some in zip(shaken, own, strict=True)))
 
 
 def _products(factors: Sequence[np.ndarray]) -> np.ndarray:

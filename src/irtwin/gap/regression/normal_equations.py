@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -34,10 +35,10 @@ class System:
     whether the block belongs to an observed run. `prior_rows` (K, K): what is known of the twin's terms, as
     `effects.prior` gives it; None: each by itself, as its spread says. With any that does not, each candidate column
     stands there twice: as it is, and (from index K + M) zero in all but observed runs. `beside_power`: the last
-    equation is power's, beside those of torque. `shaken`: the products
-    a row, (k + 1, k + 1) of each equation's columns and measurement, that noise of positions makes; `shaken_twin` those
-    of the twin's columns alone in fast rows of each equation, then in slow ones; None: of none. `apart`: the second
-    half of the equations are the first half's rows in which dry friction turns.
+    equation is power's, beside those of torque. `shaken`: the products a row, (k + 1, k + 1) of each equation's columns
+    and measurement, that noise of positions makes in fast rows of each equation, then in slow ones; `shaken_twin` those
+    of the twin's columns alone; None: of none. `apart`: the second half of the equations are the first half's rows in
+    which dry friction turns.
     """
 
     terms: tuple[tuple[Effect, Term], ...]
@@ -64,7 +65,6 @@ class System:
             self,
             pattern=np.concatenate([self.pattern, self.pattern]),
             blocks=tuple(block.apart for block in self.blocks),
-            shaken=None if self.shaken is None else self.shaken * 2,
             apart=True,
         )
 
@@ -308,18 +308,13 @@ class System:
         That is the noise of all columns times their (D + 1,) coefficients, in units of the prior. Equations are
         weighted by `noise` (g,). None where no noise of positions is known.
         """
-        if self.shaken is None:
+        if self.shaken is None or not self.apart:
             return None
-        weights = np.maximum(noise, self.quietest) ** -2.0
-        a_row = np.array(
-            [
-                [
-                    weight * self._among_all(k, observed, _times(products, self._held(k, observed, coefficients)))
-                    for k, (weight, products) in enumerate(zip(weights, self.shaken, strict=True))
-                ]
-                for observed in (False, True)
-            ]
-        )
+        weights = self._shaken_share * np.maximum(noise, self.quietest) ** -2.0
+        a_row = np.empty((2, len(weights), self.size + 1))
+        for observed, (k, products) in product((False, True), enumerate(self.shaken)):
+            explained = _times(products, self._held(k, observed, coefficients))
+            a_row[int(observed), k] = weights[k] * self._among_all(k, observed, explained)
         return np.array(
             [self.rows[group, kind] @ a_row[int(self.group_observed[group])][kind] for kind, group in self.parts]
         )
@@ -355,12 +350,17 @@ class System:
         """(g,) RMS that the twin alone leaves of each equation, equations weighted alike."""
         return self.residual_rms((), np.ones(len(self.pattern)))
 
-    @cached_property
+    @property
     def position_noise(self) -> np.ndarray:
         """(g,) RMS that noise of positions makes of what the twin alone leaves; no more than that, 0 where unknown.
 
         Of rows apart alone: where dry friction turns it makes far more.
         """
+        return np.asarray(np.minimum(self._shaken_rms, self.noise_before))
+
+    @cached_property
+    def _shaken_rms(self) -> np.ndarray:
+        """(g,) the same, as shaking alone says."""
         left = self.noise_before
         if self.shaken_twin is None or not self.apart:
             return np.zeros_like(left)
@@ -371,7 +371,13 @@ class System:
             own = self._held(equation, True, coefficients)
             held = np.append(own[: len(products) - 1], own[-1])
             squares.append(held @ products @ held)
-        return np.asarray(np.minimum(np.sqrt(np.maximum(squares, 0.0)), left))
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    @property
+    def _shaken_share(self) -> np.ndarray:
+        """(g,) of the products that shaking makes: as much as makes no more than what the twin leaves."""
+        made, left = self._shaken_rms, self.noise_before
+        return np.asarray((left / np.maximum(made, left)) ** 2)
 
     def rms(
         self,
