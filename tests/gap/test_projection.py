@@ -34,7 +34,7 @@ def system(*, shaken: bool) -> System:
     parts = [rng.standard_normal((9, row.sum() + 1)) for row in pattern]
     noise = tuple(0.1 * part.T @ part / len(part) for part in parts) if shaken else None
     observed = np.arange(GROUPS) >= GROUPS // 2
-    return System(terms, columns, pattern, tuple(blocks), np.arange(GROUPS), observed, shaken=noise)
+    return System(terms, columns, pattern, tuple(blocks), np.arange(GROUPS), observed, shaken=noise, apart=shaken)
 
 
 @pytest.mark.parametrize("chosen", [(), (7,), (7, 10, 6)])
@@ -97,7 +97,7 @@ def test_the_twin_may_have_no_terms() -> None:
         for block in own.blocks
     )
     shaken = tuple(np.eye(int(row.sum()) + 1) for row in pattern)
-    own = replace(own, terms=(), pattern=pattern, blocks=blocks, shaken=shaken)
+    own = replace(own, terms=(), pattern=pattern, blocks=blocks, shaken=shaken, apart=True)
     some = [Variant(EFFECT, (k,), (Term("k", "1", spread=0.5),)) for k in (0, 1)]
     found = evidence(Projection(own, NOISE, [*some, Variant(EFFECT, (2,), ())]), (2,), some)
     total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))

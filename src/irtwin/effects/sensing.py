@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -46,6 +46,20 @@ class TorqueOffset(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return ones."""
         return (np.ones_like(motion.dq),)
+
+
+@dataclass(frozen=True)
+class OffsetOfRun(TorqueOffset):
+    """The same in some runs, as it differs from run to run: by a `share` of the joint's dry friction, where known."""
+
+    share: float | None = None
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return c."""
+        (term,) = super().joint_terms(joint)
+        if self.share is None or not joint.dry_friction:
+            return (term,)
+        return (replace(term, spread=min(self.share * joint.dry_friction, term.spread)),)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import power_system, torque_system, with_load
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
+from irtwin.gap.regression.run_to_run import share_of_offsets
 from irtwin.gap.regression.torque_from_power import ThroughPower
 
 
@@ -45,8 +46,13 @@ class Search:
 
     @cached_property
     def stack(self) -> Stack:
-        """The twin's effects."""
-        return self.case.stack.with_effects([*self.case.effects, *self.case.run_offsets])
+        """The twin's effects; where runs are few, with the offset of each, as far as runs of one side differ by it."""
+        case = self.case
+        if not (case.with_torque and case.run_offsets()):
+            return case.stack.with_effects(case.effects)
+        free = case.stack.with_effects([*case.effects, *case.run_offsets()])
+        share = share_of_offsets(torque_system(free, case.with_torque, case.grouping, (), None), case.robot, case.sides)
+        return case.stack.with_effects([*case.effects, *case.run_offsets(share)])
 
     @cached_property
     def plain(self) -> System | None:

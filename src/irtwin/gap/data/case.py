@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
 from irtwin.effects.prior import Prior
-from irtwin.effects.sensing import TorqueOffset
+from irtwin.effects.sensing import OffsetOfRun
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
@@ -89,6 +89,11 @@ class Case:
         return [motion for run, motion in self.motions.items() if run not in self.observed]
 
     @property
+    def sides(self) -> list[frozenset[str]]:
+        """The runs of the robot as it is, and as it was before: a simulator's do not differ as a robot's do."""
+        return [self.observed, frozenset(run.name for run in self.runs if run.role == "reference")]
+
+    @property
     def against(self) -> str | None:
         """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
         roles = {run.role for run in self.runs}
@@ -131,14 +136,13 @@ class Case:
         """Whether there are so many samples that work on all of them is worth a copy of the process."""
         return sum(len(motion.time) for motion in self.motions.values()) >= _LONG
 
-    @property
-    def run_offsets(self) -> list[Effect]:
-        """What the torque of each run but the first is off by, where the runs are few.
+    def run_offsets(self, share: float | None = None) -> list[Effect]:
+        """Return what the torque of each run but the first is off by, where the runs are few: as `OffsetOfRun` says.
 
         Two runs differ in the mean of many things; no other run tells which of these is an effect.
         """
         runs = [motion.run for motion in self.with_torque]
-        return [TorqueOffset(runs=(run,)) for run in runs[1:]] if self.grouping.few(runs) else []
+        return [OffsetOfRun(runs=(run,), share=share) for run in runs[1:]] if self.grouping.few(runs) else []
 
     def with_friction_near_zero(self) -> Case:
         """Return the case with the turn of each joint's dry friction.

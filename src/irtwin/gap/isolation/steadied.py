@@ -31,9 +31,7 @@ class Steadied:
     def of(cls, case: Case, system: System) -> Steadied:
         """Estimate it from the runs of a case; a simulator's friction does not differ."""
         runs = list(dict.fromkeys(block.run for block in system.blocks))
-        sides = [{run for run in runs if run in case.observed}]
-        if case.against != "simulated":
-            sides.append(set(runs) - sides[0])
+        sides = [own for side in case.sides if (own := side & set(runs))]
         differing = RunToRun.of(system, sides)
         rows = {run: np.sum([block.rows for block in system.blocks if block.run == run], axis=0) for run in runs}
         made = differing.mean_squares(_alike(case, runs, sides), rows)

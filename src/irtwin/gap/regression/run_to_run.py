@@ -13,12 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.effects.sensing import OffsetOfRun
 from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.identification.accumulate import Block
+from irtwin.robot.description import Robot
 
 _SHARES = np.array([0.0, *np.geomspace(0.0025, 0.32, 15)])  # of a coefficient
 _ONE_JOINT = 3.0  # of log likelihood, the most that one joint has against a share: it may be modelled badly
+_LEAST, _BEYOND = 0.02, 2.0  # of dry friction, what no run tells of its neighbours; deviations
+_NONE = 1e-6  # N m or N: dry friction of no joint
 _KNOWN = 1e-8  # of the best known combination of coefficients: a run with less of another does not tell them apart
 
 
@@ -197,3 +201,26 @@ def _share(kind: str, frictions: Sequence[RunFriction | None], sides: Sequence[S
             likely = np.sum([friction.likelihood(friction.kinds.index(kind), side) for side in sides], axis=0)
             total += np.maximum(likely - likely.max(), -_ONE_JOINT)
     return float(_SHARES[np.argmax(total)])
+
+
+def share_of_offsets(system: System, robot: Robot, sides: Sequence[Set[str]]) -> float | None:
+    """Return by how much the offset of a run may differ, as a share of each joint's dry friction; None: nobody knows.
+
+    Twice what runs of one of the `sides` differ by; each run of the system but the first has an `OffsetOfRun`.
+    """
+    vector = system.solution((), Summed(system.group_moments(system.noise_before)))
+    values = twin_values(system, vector)
+    offsets = {block.run: np.zeros(len(robot.joints)) for block in system.blocks}
+    for value, (effect, term) in zip(values, system.terms, strict=True):
+        if isinstance(effect, OffsetOfRun) and effect.runs and term.joint and effect.runs[0] in offsets:
+            offsets[effect.runs[0]][robot.joint_names.index(term.joint)] = value
+    friction = np.array([joint.dry_friction or 0.0 for joint in robot.joints])
+    known = friction > _NONE
+    squares = more = 0.0
+    for side in sides:
+        own = [offsets[run] for run in offsets if run in side]
+        if len(own) > 1:
+            differing = np.array(own)[:, known] / friction[known]
+            squares += float(((differing - differing.mean(axis=0)) ** 2).sum())
+            more += (len(own) - 1) * differing.shape[1]
+    return max(_BEYOND * float(np.sqrt(squares / more)), _LEAST) if more else None
