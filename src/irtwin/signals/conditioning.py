@@ -102,7 +102,7 @@ def states_cutoff(run: Run, cutoff: float) -> np.ndarray:
     rate = 1 / (time[1] - time[0])
     speed = rate * np.diff(low_pass(interpolated(run.signals.time, run.signals.q, time), rate, cutoff), axis=0)
     least = np.maximum(_AGREEMENT * np.sqrt(np.mean(speed**2, axis=0)), STANDSTILL)
-    steps = np.array([max(_step(positions), _SAME) for positions in run.signals.q.T])
+    steps = np.array([max(encoder_step(positions), _SAME) for positions in run.signals.q.T])
     resolved = np.cbrt(18 * rate * (least / (2 * np.pi * steps)) ** 2)
     return np.asarray(np.clip(resolved, cutoff, _STATES_WIDER * cutoff))
 
@@ -147,7 +147,7 @@ def _standing(q: np.ndarray, logged: np.ndarray, rate: float) -> np.ndarray:
     """
     standing = np.zeros(q.shape, dtype=bool)
     for joint, positions in enumerate(q.T):
-        half = round(_step(logged[:, joint]) / STANDSTILL * rate / 2) + 1
+        half = round(encoder_step(logged[:, joint]) / STANDSTILL * rate / 2) + 1
         lowest, highest = (
             extreme(positions, 2 * half + 1, mode="nearest")
             for extreme in (scipy.ndimage.minimum_filter1d, scipy.ndimage.maximum_filter1d)
@@ -156,7 +156,7 @@ def _standing(q: np.ndarray, logged: np.ndarray, rate: float) -> np.ndarray:
     return standing
 
 
-def _step(positions: np.ndarray) -> float:
+def encoder_step(positions: np.ndarray) -> float:
     """Return by how much two positions (N,) differ that are not the same, at least; 0 where all are the same.
 
     So it is where they lie on no grid of such steps: a joint that only ever moves fast does not show its encoder.

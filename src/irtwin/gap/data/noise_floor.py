@@ -11,7 +11,7 @@ import scipy
 from irtwin.gap.data.differences import Pair, pairs_of
 from irtwin.gap.thresholds import Data
 from irtwin.robot.description import Robot
-from irtwin.signals.conditioning import condition, states_cutoff
+from irtwin.signals.conditioning import condition, encoder_step, states_cutoff
 from irtwin.signals.filter import kernel, low_pass
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -203,6 +203,8 @@ def _shaken(run: Run, motion: Motion, robot: Robot, limits: Data, random: np.ran
             continue
         shows = _varies(signal, motion.rate, motion.cutoff)
         variance = white_noise(run.signals.time, signal, motion, limits, shows)
+        if variance is not None and name == "q":  # at a steady speed rounding makes lines, which no median shows
+            variance = np.fmax(variance, np.square([encoder_step(own) for own in signal.T]) / 12)
         if variance is not None and np.nansum(variance) > 0:
             noisy[name] = signal + random.standard_normal(signal.shape) * np.sqrt(np.nan_to_num(variance)) * shows
     if not noisy:
