@@ -29,7 +29,7 @@ from irtwin.gap.thresholds import Criterion
 
 _TRIED = 3  # of those that explain most
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
-_SIZES = tuple(5.0**-k for k in range(-1, 5))  # in units of what is expected, alike for a base and a wrist
+_SIZES = tuple(4.0**-k for k in range(-1, 5))  # in units of what is expected, alike for a base and a wrist
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
