@@ -10,13 +10,12 @@ import re
 import struct
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import count
 from typing import Any
 
 from irtwin.alarms.mqtt import Broker, BrokerConnection
 from irtwin.announce import Announce
-from irtwin.report.questions import Row
 
 METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
@@ -42,7 +41,7 @@ class EdgeNode(BrokerConnection):
         self._client.on_message = lambda *_: self._be_born()
         self.begin()
 
-    def tell(self, rows: Iterable[Row]) -> None:
+    def tell(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Tell what is new of robots since the last time: births of new ones, data, deaths of those that are gone."""
         now = {_NO_ID.sub("_", row["robot"]): _metrics(row) for row in rows}
         with self._lock:
@@ -94,7 +93,7 @@ class EdgeNode(BrokerConnection):
         return "/".join(["spBv1.0", self._group, kind, self._node, *([] if robot is None else [robot])])
 
 
-def _metrics(row: Row) -> tuple[Metric, ...]:
+def _metrics(row: Mapping[str, Any]) -> tuple[Metric, ...]:
     kinds = {column: _STRING if column == "state" else _DOUBLE for column in METRICS}
     return tuple((name, kinds[column], row[column]) for column, name in METRICS.items())
 
