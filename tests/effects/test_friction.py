@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.synthetic import arm, swing
@@ -13,10 +14,12 @@ from tests.synthetic import arm, swing
 from irtwin.effects.effect import Coefficients
 from irtwin.effects.friction import (
     ChangedFrictionWithTemperature,
+    FrictionTurn,
     NonlinearViscousFriction,
     PreslidingHysteresis,
     StribeckFriction,
     TemperatureDependentFriction,
+    sharp_sign,
 )
 from irtwin.effects.stack import Stack
 from irtwin.signals.motion import Motion
@@ -58,6 +61,24 @@ def test_no_stribeck_friction_is_tried_at_speeds_over_which_a_joints_dry_frictio
     }
     slow, fast = ("joint_1",), ("joint_1", "joint_2")
     assert tried == {(0.01, slow), (0.025, slow), (0.05, fast), (0.1, fast), (0.2, fast)}
+
+
+@given(width=st.floats(3e-3, 0.025), law=st.sampled_from(["tanh", "arctangent", "root"]))
+def test_however_dry_friction_turns_a_mixture_of_turns_is_near(width: float, law: str) -> None:
+    dq = np.tile(np.linspace(-0.5, 0.5, 2001)[:, None], 2)
+    motion = Motion(np.arange(len(dq)) / 100, 0 * dq, dq, 0 * dq, run="sweep")
+    own = sharp_sign(dq[:, 0])
+    u = dq[:, 0] / width
+    wanted = {"tanh": np.tanh(u), "arctangent": np.arctan(u) * 2 / np.pi, "root": u / np.sqrt(1 + u**2)}[law]
+    columns = [own, dq[:, 0], -dq[:, 0], *(one[:, 0] for one in FrictionTurn().samples(ROBOT, motion, None))]
+    _, left = scipy.optimize.nnls(np.column_stack(columns), wanted)
+    assert left < 0.1 * np.linalg.norm(wanted - own)
+
+
+def test_what_of_a_turn_nobody_states_is_no_more_than_the_joints_dry_friction() -> None:
+    terms = FrictionTurn().joint_terms(replace(ROBOT.joints[0], dry_friction=5.0))
+    assert {(term.spread, term.lowest) for term in terms} == {(5.0, 0.0)}
+    assert len({term.name for term in terms}) == len(terms)
 
 
 @pytest.mark.parametrize("friction", [StribeckFriction(), NonlinearViscousFriction()])

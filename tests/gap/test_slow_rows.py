@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from tests.data_sets import write
 from tests.synthetic import arm, as_run, measure, swing, truth
 
+from irtwin.document.document import Document
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import turning
@@ -53,6 +55,37 @@ def test_a_turn_over_another_speed_is_no_change_of_friction(tmp_path: Path, widt
 
 def test_a_change_of_dry_friction_is_told_beside_a_turn_over_another_speed(tmp_path: Path) -> None:
     assert causes(tmp_path, 0.025, stronger=1.3) == {"coulomb_friction": ("joint_1",)}
+
+
+def diagnosed(folder: Path, law: Callable[[np.ndarray], np.ndarray], way: float = 1.0) -> Document:
+    """What is told of three runs of a robot whose dry friction goes with speed by a law, joint 2 a part of its way."""
+    runs = []
+    for seed in (1, 2, 3):
+        moved, part = swing(ROBOT, seed), np.array([1.0, way])
+        moved = replace(moved, q=part * moved.q, dq=part * moved.dq, ddq=part * moved.ddq)
+        motion = measure(ROBOT, moved, noise=0.05, seed=seed)
+        assert motion.torque is not None
+        torque = motion.torque + truth(ROBOT)["Fc"] * (law(motion.dq) - np.sign(motion.dq))
+        runs.append(as_run(replace(motion, torque=torque, current=None, power=None)))
+    return diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document
+
+
+@pytest.mark.parametrize(
+    ("law", "way"),
+    [(lambda dq: np.tanh(dq / 0.008), 0.03), (lambda dq: np.arctan(dq / 0.015) * 2 / np.pi, 0.2)],
+    ids=["a joint that hardly moves", "long tails"],
+)
+def test_a_turn_that_few_blocks_show_or_no_width_describes_is_no_cause(tmp_path: Path, law, way: float) -> None:
+    found = diagnosed(tmp_path, law, way)
+    assert found.verdict == "no_gap"
+    assert found.causes == ()
+
+
+def test_friction_that_falls_with_speed_is_told_beside_a_turn(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, lambda dq: np.tanh(dq / 0.01) * (1 + 0.4 * np.exp(-((dq / 0.05) ** 2))))
+    assert [(cause.effect, sorted(cause.joints)) for cause in found.causes] == [
+        ("stribeck_friction", ["joint_1", "joint_2"])
+    ]
 
 
 def reduced(noise: float, last: float | None = None) -> System:

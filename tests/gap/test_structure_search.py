@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
+from irtwin.effects.friction import FrictionTurn
 from irtwin.gap.isolation.posterior import HypothesisPrior
-from irtwin.gap.isolation.structure_search import _Search, attribute
+from irtwin.gap.isolation.structure_search import _Search, attribute, judged
 from irtwin.gap.regression.evidence import evidence
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System
@@ -268,6 +269,19 @@ def test_of_equals_that_is_not_taken_whose_place_screening_chose():
     placed = replace(candidates[0].variants[0], effect=catalogue()["local_wear"])
     (cause,) = causes(system, [replace(candidates[0], variants=(placed,)), candidates[1]])
     assert cause.effect == "effect_1" and cause.probability > 0.5
+
+
+def test_a_nuisance_shares_the_probability_and_is_named_nowhere():
+    system, (one, other) = system_of([[1, 0], [1, 0.05]], [0.3, 0.0])
+    nameless = replace(other, variants=(replace(other.variants[0], effect=FrictionTurn()),))
+    found = attribute(system, [one, nameless], DEFAULT.criterion)
+    (alone,) = attribute(system, [one], DEFAULT.criterion).causes
+    assert [cause.nuisance for cause in found.causes] == [True]
+    assert [each.effect for each in found.hypotheses] == ["effect_0"] and len(found.visible) == len(found.log_odds) == 1
+    prior = HypothesisPrior.of([one, nameless])
+    assert (prior.log_odds(nameless, []), prior.log_odds(one, []) < 0) == (0.0, True)
+    beside = judged(system, [one], [one, nameless], DEFAULT.criterion, None, found.noise)
+    assert beside[0].probability < alone.probability and beside[0].rivals == {}
 
 
 def test_effects_that_share_nothing_are_no_rivals():

@@ -146,7 +146,8 @@ class Effect(ABC):
     from what was measured; `stage` orders them: each is given the sum over lower stages. An effect with `memory` is
     computed over the whole motion that it is given, as it depends on what went before; with `reach`, on no more than
     so many seconds on either side. A shape `of_change` is a change's alone: in a twin, part of it is another effect;
-    one that is `never_changed` has such a shape for its changes. Columns of one that is `smooth` depend on their
+    one that is `never_changed` has such a shape for its changes. A `nuisance` is what nobody states of any robot: it is
+    as likely there as not, explains what it can, and is no cause. Columns of one that is `smooth` depend on their
     sample's states alone, and vary no faster than these. `differs_by_run`: what its coefficients are called, which are
     others in each run.
 
@@ -191,6 +192,7 @@ class Effect(ABC):
     in_mjcf: ClassVar[Mapping[str, str]] = {}
     of_change: ClassVar[bool] = False
     never_changed: ClassVar[bool] = False
+    nuisance: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     lately: ClassVar[frozenset[str]] = frozenset()
 

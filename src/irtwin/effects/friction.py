@@ -27,6 +27,7 @@ from irtwin.signals.motion import Motion
 
 SLOW = 0.02  # rad/s, across which friction surely changes its sign, whatever its law
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
+_TURNS = ((4e-3, 4.0), (0.01, 4.0), (0.025, 4.0), (0.025, 1.25))  # of a mixture: three ramps and a tail, as of `turn`
 _TURNED = 2.0  # widths, where most of a turn is over
 _OVER = 3.0  # widths, where a turn is over
 _FROM_REST, _REST = 0.06, 0.2  # rad, over which friction builds up again, and s, after which a joint rested
@@ -75,6 +76,34 @@ def _rested(standing: np.ndarray, count: int) -> np.ndarray:
 def _law(joint: Joint) -> float:
     """Return how well the law of a joint's dry friction is known, N m or N."""
     return _LAW * (joint.dry_friction or 0.0)
+
+
+@dataclass(frozen=True)
+class FrictionTurn(JointEffect):
+    """Sum of Fc_w (s_w - s): dry friction that turns about zero speed over several speeds w, by `turn`.
+
+    The joint's own s is one such turn, or none; what of it no other law says is a mixture, as friction only drags. In a
+    twin the mixture is known but for its size.
+    """
+
+    id: ClassVar[str] = "friction_turn"
+    family: ClassVar[str] = "friction"
+    nuisance: ClassVar[bool] = True
+    never_changed: ClassVar[bool] = True
+
+    mixture: tuple[float, ...] | None = None  # the share of each speed; None: open
+
+    def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
+        """Return the friction that turns over each speed, or all of it."""
+        unit, spread = force_unit(joint), joint.dry_friction or 15.0
+        names = ["Fc"] if self.mixture else [f"Fc_{width:g}_{exponent:g}" for width, exponent in _TURNS]
+        return tuple(Term(name, unit, joint.name, spread=spread, lowest=0.0) for name in names)
+
+    def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
+        """Return s_w - s of each w, or of the mixture."""
+        own = direction(robot, motion.dq)
+        each = tuple(turn(motion.dq, width, exponent) - own for width, exponent in _TURNS)
+        return (np.tensordot(self.mixture, each, 1),) if self.mixture else each
 
 
 @dataclass(frozen=True)

@@ -83,12 +83,13 @@ def _findings(case: Case) -> Iterator[ChannelFinding]:
     """Yield what torque shows, then what power shows on the torque that is explained."""
     search, of_torque = Search(case), None
     floor = search.floor
-    tried = _standing(case, "torque"), _standing(case, "power")
     if case.shows("torque"):
-        of_torque, floor, _ = search.torque_causes(tried)
+        search, of_torque, floor, _ = search.causes_of_torque(
+            lambda search: (_standing(search.case, "torque"), _standing(search.case, "power"))
+        )
         yield of_torque.finding
     if case.shows("power"):
-        yield search.power_causes(tried[1], floor, of_torque)[0].finding
+        yield search.power_causes(_standing(case, "power"), floor, of_torque)[0].finding
 
 
 def _standing(case: Case, signal: str) -> list[Effect]:

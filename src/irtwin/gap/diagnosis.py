@@ -11,7 +11,6 @@ from irtwin.document.curves import Curves
 from irtwin.document.document import Cutoff, Document, GapLocation, Untestable, cause_ids
 from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Effect
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
 from irtwin.gap.beside_file import Simulator, alone_in_file, beside
@@ -40,12 +39,11 @@ from irtwin.gap.isolation.verdict import (
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
 from irtwin.gap.next_experiment import next_experiment
 from irtwin.gap.not_repeating import DifferingRepeats, with_removed
-from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.rehearsal import channel_equations
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
-from irtwin.gap.search import Search, check_observed, variants
+from irtwin.gap.search import Search, Tried, check_observed, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.progress import tell, tell_step
 from irtwin.identification.two_processes import begun, one_blas_thread
@@ -201,14 +199,12 @@ def diagnose(
     torque: ExplainedTorque | None = None
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        torque, floor, refusals = search.torque_causes(_tried(search, plain))
+        search, torque, floor, refusals = search.causes_of_torque(_tried)
         if lag := common_lag(torque.finding, case.with_torque):
             tell(f"Trying every effect on torque {1e3 * lag:.2g} ms earlier, as it lags in several joints")
-            case = case.without_lag(lag).with_friction_near_zero()
-            search = replace(search, case=case)
-            plain, twin_torque = search.plain, search.twin.torque
-            assert plain is not None
-            torque, floor, refusals = search.torque_causes(_tried(search, plain))
+            search = replace(search, case=search.case.without_lag(lag).with_friction_near_zero())
+            search, torque, floor, refusals = search.causes_of_torque(_tried)
+        case, twin_torque = search.case, search.twin.torque
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)
     energies: EnergyErrors | None = None
@@ -285,10 +281,11 @@ def diagnose(
     )
 
 
-def _tried(search: Search, plain: System) -> tuple[Sequence[Effect], Sequence[Effect]]:
+def _tried(search: Search) -> Tried:
     """Return the effects on torque and on power that are tried, those that a screening proposes among them."""
     case = search.case
-    screened = screen(case, search.stack, plain)
+    assert search.plain is not None
+    screened = screen(case, search.stack, search.plain)
     if case.long:  # what is needed next is worked out beside the search for contacts
         for motion in case.measured:
             search.below(motion)

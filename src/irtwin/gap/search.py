@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,15 +10,17 @@ import numpy as np
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
+from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
 from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
-from irtwin.gap.isolation.finding import ChannelFinding, find
+from irtwin.gap.isolation.finding import ChannelFinding, estimate_of, find
 from irtwin.gap.isolation.refusal import Refusals, find_possible
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Without
@@ -28,6 +30,12 @@ from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.run_to_run import share_of_offsets
 from irtwin.gap.regression.torque_from_power import ThroughPower
+from irtwin.identification.progress import tell
+
+_LOOKS = 3  # at torque: in the last, dry friction turns as the others found
+
+Tried = tuple[Sequence[Effect], Sequence[Effect]]
+"""Effects on torque, and on power, that a search tries."""
 
 
 def check_observed(system: System) -> None:
@@ -46,13 +54,30 @@ class Search:
 
     @cached_property
     def stack(self) -> Stack:
-        """The twin's effects; where runs are few, with the offset of each, as far as runs of one side differ by it."""
+        """The twin's effects, with what nobody states of how dry friction turns.
+
+        Where runs are few, they are beside the offset of each, as far as runs of one side differ by it.
+        """
         case = self.case
+        known = [*case.effects, *self._mixtures()]
         if not (case.with_torque and case.run_offsets()):
-            return case.stack.with_effects(case.effects)
-        free = case.stack.with_effects([*case.effects, *case.run_offsets()])
+            return case.stack.with_effects(known)
+        free = case.stack.with_effects([*known, *case.run_offsets()])
         share = share_of_offsets(torque_system(free, case.with_torque, case.grouping, (), None), case.robot, case.sides)
-        return case.stack.with_effects([*case.effects, *case.run_offsets(share)])
+        return case.stack.with_effects([*known, *case.run_offsets(share)])
+
+    def _mixtures(self) -> list[Effect]:
+        """Return how dry friction of the turning joints turns beside its one width, each a mixture of its own."""
+        case = self.case
+        if not (open_turns := case.turns(known=True)):
+            return []
+        stack = case.stack.with_effects([*case.effects, *open_turns])
+        values = estimate_of(torque_system(stack, case.with_torque, case.grouping, (), None), ()).values
+        shares: dict[str, list[float]] = {}
+        for (effect, term), value in zip(stack.torque_terms, values, strict=True):
+            if effect in open_turns and term.joint:
+                shares.setdefault(term.joint, []).append(float(value))
+        return [FrictionTurn(tuple(own), joints=(joint,)) for joint, own in shares.items() if sum(own) > 0]
 
     @cached_property
     def plain(self) -> System | None:
@@ -95,13 +120,8 @@ class Search:
         """The power that the twin takes by its own torque."""
         return TwinPower(self.power_stack, self.case.with_power, self.case.grouping, self.twin.torque)
 
-    def torque_causes(
-        self, tried: tuple[Sequence[Effect], Sequence[Effect]]
-    ) -> tuple[ExplainedTorque, Floor, Refusals]:
-        """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both.
-
-        tried: effects on torque, and on power.
-        """
+    def torque_causes(self, tried: Tried) -> tuple[ExplainedTorque, Floor, Refusals]:
+        """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
         case = self.case
         if case.shows("power"):
             possible = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
@@ -112,9 +132,28 @@ class Search:
         finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
-    def _beside_power(
-        self, tried: tuple[Sequence[Effect], Sequence[Effect]], without: Set[Without]
-    ) -> tuple[ChannelFinding, Floor]:
+    def causes_of_torque(self, tried: Callable[[Search], Tried]) -> tuple[Search, ExplainedTorque, Floor, Refusals]:
+        """Find the causes of torque, and with them the search that knows how dry friction turns.
+
+        Joints in which it turns otherwise than the twin's have that in the twin, and all is tried anew.
+        """
+        search = self
+        for look in range(_LOOKS):
+            torque, floor, refusals = search.torque_causes(tried(search))
+            causes = [cause for cause in torque.finding.causes if not cause.nuisance]
+            turning = {joint for cause in torque.finding.causes if cause.nuisance for joint in cause.joints}
+            if not turning:
+                break
+            tell(
+                f"Trying every effect on torque again, as dry friction turns otherwise in {', '.join(sorted(turning))}"
+            )
+            unknown = search.unknown | ({FrictionTurn.id} if look == _LOOKS - 2 else set())
+            case = replace(search.case, turning=search.case.turning | turning)
+            case = case.with_friction_near_zero(added(search.case, causes))
+            search = replace(search, case=case, unknown=unknown)
+        return search, torque, floor, refusals
+
+    def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         about = self.below, self.twin.torque, self.before
         return find_beside_power(self.case, self.stack, tried, *about, self.floor, self.seed, without=without)
 
@@ -156,7 +195,7 @@ def variants(case: Case, signal: str) -> list[Effect]:
     bodies = any(run.role == "simulated" for run in case.runs)
     return [
         shape
-        for effect in catalogue().values()
+        for effect in (*catalogue().values(), *case.turns(known=False))
         if effect.signal == signal
         and not effect.disturbance
         and (bodies or not effect.bodies)

@@ -7,7 +7,7 @@ of a long log a part proposes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -34,11 +34,12 @@ _NOTHING = 1e-9  # of the largest column: less is not shown
 
 
 def with_friction_near_zero(
-    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]
+    robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect], turning: Set[str] = frozenset()
 ) -> tuple[Robot, ReducedTorque | None]:
     """Return the robot with each joint's dry friction and its turn, as its torque shows them beside some effects.
 
-    A joint whose torque shows no turn, or in which it makes no sure difference, has friction that turns at once.
+    A joint whose torque shows no turn, or in which it makes no sure difference, has friction that turns at once; of
+    those that are known to be `turning` the difference need not be sure.
     Beside it stand the equations of torque from which that was found, of columns as this robot has them; None where
     there was no torque.
     """
@@ -63,13 +64,14 @@ def with_friction_near_zero(
     laws = [shape for shape in shapes_over_speed(_WIDEST) if shape.id not in stack.ids]
     tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
     every = part_read(measured)
-    found, blocks = _found(stack, open_shapes, laws, measured, tried, every)
+    known = [joint.name in turning for joint in robot.joints]
+    found, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
     if any(turn for both in found for turn, _ in both):
         tried = [_around([turn for turn, _ in both if turn]) for both in found]
-        found, blocks = _found(stack, open_shapes, laws, measured, tried, every)
+        found, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
     if every > 1:  # a part of the log chose, all of it says whether that is so
         tried = [[turn] if turn else [] for (turn, _), *_ in found]
-        found, blocks = _found(stack, open_shapes, (), measured, tried)
+        found, blocks = _found(stack, open_shapes, (), measured, tried, known)
     turned = replace(
         plain, joints=tuple(_with(joint, likelier) for joint, (likelier, *_) in zip(plain.joints, found, strict=True))
     )
@@ -88,12 +90,13 @@ def _found(
     laws: Sequence[JointEffect],
     motions: Sequence[Motion],
     tried: Sequence[Sequence[Turn]],
+    known: Sequence[bool],
     every: int = 1,
 ) -> tuple[list[list[Dry]], list[Block]]:
     """Return in each joint the best of the turns that are tried, alone and beside a law over speed, the likelier first.
 
-    Each has the friction by it, and is None where there is none. Beside them stand the equations, reduced; `every` as
-    in `accumulate`.
+    Each has the friction by it, and is None where there is none; joints whose friction is `known` to turn have one.
+    Beside them stand the equations, reduced; `every` as in `accumulate`.
     """
     blocks, pattern = _reduced(stack, open_shapes, laws, motions, tried, every)
     told = track(enumerate(tried), "friction near zero speed of each joint")
@@ -102,7 +105,8 @@ def _found(
         np.flatnonzero([stack.torque_terms[k][0].id not in imitating for k in np.flatnonzero(used)])
         for used in stack.pattern
     ]
-    return [_best(blocks, pattern, joint, turns, sure[joint], len(laws)) for joint, turns in told], blocks
+    best = [_best(blocks, pattern, joint, turns, sure[joint], len(laws), known[joint]) for joint, turns in told]
+    return best, blocks
 
 
 def _around(found: Sequence[Turn]) -> list[Turn]:
@@ -186,9 +190,15 @@ def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
 
 
 def _best(
-    blocks: Sequence[Block], pattern: np.ndarray, joint: int, turns: Sequence[Turn], sure: np.ndarray, laws: int
+    blocks: Sequence[Block],
+    pattern: np.ndarray,
+    joint: int,
+    turns: Sequence[Turn],
+    sure: np.ndarray,
+    laws: int,
+    known: bool,
 ) -> list[Dry]:
-    """Return the turn that leaves least of a joint's torque, and the friction by it; at once if it does not always.
+    """Return the turn that leaves least of a joint's torque, and the friction by it; none if not always, nor `known`.
 
     The likelier of two comes first: alone, or beside the one of the `laws` over speed, the last columns, that leaves
     least of sharp friction. What thins as a joint speeds up bends near zero, too: a turn alone would stand for it.
@@ -214,7 +224,8 @@ def _best(
     if _everywhere(alone[best[0]] - both[-1][0]):
         both.reverse()
         best.reverse()
-    best = [place if _everywhere(left[0] - left[place]) else 0 for place, left in zip(best, both, strict=True)]
+    sure_of = [known or _everywhere(left[0] - left[place]) for place, left in zip(best, both, strict=True)]
+    best = [place if so else 0 for place, so in zip(best, sure_of, strict=True)]
     return [(turns[place - 1] if place else None, max(float(friction[place]), 0.0)) for place in dict.fromkeys(best)]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
+from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.prior import Prior
 from irtwin.effects.sensing import OffsetOfRun
 from irtwin.effects.stack import Stack
@@ -40,7 +41,8 @@ class Case:
 
     `prior`: what is known of the twin's coefficients; None: what the catalogue expects; `stated`: what bounds the
     causes. `robot` has the torque constants that a balance of power told where nobody knew them, and `motions` the
-    torque that follows; `given` are the robot and the motions without. `cutoff` is that of all motions.
+    torque that follows; `given` are the robot and the motions without. `cutoff` is that of all motions. `turning` are
+    the joints of which a search found that their dry friction turns otherwise than by one width.
     """
 
     robot: Robot
@@ -52,6 +54,7 @@ class Case:
     prior: Prior | None = None
     stated: Stated = NOTHING_STATED
     cutoff: Cutoff | None = None
+    turning: frozenset[str] = frozenset()
 
     @cached_property
     def stack(self) -> Stack:
@@ -144,18 +147,28 @@ class Case:
         runs = [motion.run for motion in self.with_torque]
         return [OffsetOfRun(runs=(run,), share=share) for run in runs[1:]] if self.grouping.few(runs) else []
 
-    def with_friction_near_zero(self) -> Case:
-        """Return the case with the turn of each joint's dry friction.
+    def turns(self, *, known: bool) -> list[Effect]:
+        """Return what dry friction of the joints that are known to turn, or of the others, does beside its turn."""
+        joints = tuple(joint for joint in self.robot.joint_names if (joint in self.turning) == known)
+        return [FrictionTurn(joints=joints)] if joints else []
+
+    def with_friction_near_zero(self, beside: Sequence[Effect] = ()) -> Case:
+        """Return the case with the turn of each joint's dry friction, `beside` what a search found.
 
         It is as the runs show it that observed ones are held against; where these show none, as the observed ones do.
-        Where it turns over another speed in these, both turns are nobody's.
+        Where it turns over another speed in these, both turns are nobody's. Of joints of which a search found that it
+        turns, all runs say how.
         """
-        robot = self.robot
+        robot, effects = self.robot, [*self.effects, *beside]
         for motions in (self.seen, self.others):
             if motions:
-                turned, _ = with_friction_near_zero(self.robot, motions, self.effects)
+                turned, _ = with_friction_near_zero(self.robot, motions, effects)
                 both = zip(robot.joints, turned.joints, strict=True)
                 robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
+        if self.turning:
+            turned, _ = with_friction_near_zero(self.robot, self.with_torque, effects, self.turning)
+            both = zip(robot.joints, turned.joints, strict=True)
+            robot = replace(robot, joints=tuple(one if one.name in self.turning else own for own, one in both))
         return replace(self, robot=robot)
 
     def without_lag(self, lag: float) -> Case:

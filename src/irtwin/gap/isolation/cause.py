@@ -31,6 +31,11 @@ class FoundCause:
         return tuple(sorted(named, key=lambda rival: -self.rivals[rival]))
 
     @property
+    def nuisance(self) -> bool:
+        """Whether it is what nobody states of any robot, and so no cause."""
+        return self.variants[0].effect.nuisance
+
+    @property
     def of_bodies(self) -> bool:
         """Whether it is the robot's bodies that differ."""
         return self.variants[0].effect.bodies

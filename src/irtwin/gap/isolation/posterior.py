@@ -47,7 +47,9 @@ class HypothesisPrior:
         return cls(len(effects), Counter((one.effect, one.scope) for one in candidates if one.joint))
 
     def log_odds(self, one: Hypothesis, structure: Sequence[Hypothesis]) -> float:
-        """Return the log odds of a hypothesis beside those that were found."""
+        """Return the log odds of a hypothesis beside those that were found; a nuisance's are even."""
+        if one.nuisance:
+            return 0.0
         places = self.joints[one.effect, one.scope] if one.joint else 1
         count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in structure) if one.joint else 0
         if count:  # sets of so many joints are as likely as one another
@@ -151,8 +153,12 @@ class Posterior:
         return float(own - self.log_odds[place])
 
     def likeliest_at(self, one: Hypothesis) -> int:
-        """Return the place of the likeliest hypothesis of those that could be where one is."""
+        """Return the place of the likeliest hypothesis of those that could be where one is, and have data for them.
+
+        Where the data speak against all of them, of all.
+        """
         near = [k for k, other in enumerate(self.hypotheses) if overlap(other, one)]
+        near = [k for k in near if self.log_odds[k] > self.log_prior[k]] or near
         return near[int(np.argmax(self.weights(near)[0]))]
 
     def weights(self, near: Sequence[int]) -> tuple[np.ndarray, float]:

@@ -67,7 +67,9 @@ def attribute(
     after = search.beside(structure, noise)
     odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
     beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
-    return Attribution(search.causes(structure, noise), noise, tuple(candidates), visible, beside)
+    named = [k for k, one in enumerate(candidates) if not one.nuisance]
+    hypotheses = tuple(candidates[k] for k in named)
+    return Attribution(search.causes(structure, noise), noise, hypotheses, visible[named], beside[named])
 
 
 def judged(
@@ -296,7 +298,7 @@ class _Search:
 def _cause(member: Member, posterior: Posterior) -> FoundCause:
     """Return one hypothesis of a structure as a cause, with what could stand in its place.
 
-    What the catalogue lacks could, too: its part is no effect's.
+    What the catalogue lacks could, too, and a nuisance: their part is no effect's.
     """
     hypothesis, variant = member
     own = _index(posterior, hypothesis)
@@ -308,9 +310,11 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
         key = posterior.hypotheses[k].effect, posterior.hypotheses[k].scope
         sure[key] = sure.get(key, 0.0) + float(np.exp(weight - whole))
     probability = sure.pop((hypothesis.effect, hypothesis.scope))
+    nameless = {one.effect for one in posterior.hypotheses if one.nuisance}
     rivals: dict[str, float] = {}
     for (effect, _), chance in sure.items():
-        rivals[effect] = rivals.get(effect, 0.0) + chance
+        if effect not in nameless:
+            rivals[effect] = rivals.get(effect, 0.0) + chance
     rivals.pop(hypothesis.effect, None)
     return FoundCause(
         effect=hypothesis.effect,

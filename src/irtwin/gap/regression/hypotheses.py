@@ -32,6 +32,11 @@ class Hypothesis:
     scope: str
     variants: tuple[Variant, ...]
 
+    @property
+    def nuisance(self) -> bool:
+        """Whether it is what nobody states of any robot."""
+        return self.variants[0].effect.nuisance
+
 
 @dataclass(frozen=True)
 class CandidateColumn:
