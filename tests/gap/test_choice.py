@@ -77,6 +77,14 @@ def test_the_heat_of_every_drive_needs_no_proof_where_power_was_logged():
     assert begin(dark) == BASELINE
 
 
+def test_oil_that_thins_needs_no_proof_where_joints_were_logged_cold_and_warm():
+    run = logged()[0].runs[0]
+    rows = len(run.signals.time)
+    cold, warm = (replace(run, signals=replace(run.signals, temperature=np.full((rows, 2), t))) for t in (20.0, 40.0))
+    assert "temperature_dependent_friction" in begin([cold, warm])
+    assert "temperature_dependent_friction" not in begin([cold, cold])
+
+
 def test_runs_that_show_nothing_leave_the_effects_of_every_robot():
     data, motions = logged()
     short = replace(data, runs=tuple(replace(run, signals=run.signals.rows(np.arange(60))) for run in data.runs[:1]))

@@ -266,6 +266,7 @@ class TemperatureDependentFriction(JointEffect):
     id: ClassVar[str] = "temperature_dependent_friction"
     family: ClassVar[str] = "friction"
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    of_every_drive: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "log joint temperatures, from a cold start"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"k": (0.005, 0.06)}
 

@@ -25,13 +25,24 @@ from irtwin.signals.motion import Motion
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Choice, Twin
 
+_WARMED = 5.0  # K: friction differs as much from run to run by itself
+
 Places = list[tuple[str | None, float]]
 
 
 def begin(runs: Sequence[Run]) -> tuple[str, ...]:
-    """Return the effects that need no proof: the baseline's, and the heat of every drive, where power was logged."""
-    heat = (one.id for one in catalogue().values() if one.of_every_drive)
-    return (*BASELINE, *(heat if any(run.signals.power is not None for run in runs) else ()))
+    """Return the effects that need no proof: the baseline's, and those of every drive that the logs bear.
+
+    These are its heat, where power was logged, and oil that thins, where joints were logged cold and warm.
+    """
+    signals = {"torque"}
+    if any(run.signals.power is not None for run in runs):
+        signals.add("power")
+    warmth = [run.signals.temperature for run in runs if run.signals.temperature is not None]
+    if warmth and np.nanmax(np.ptp(np.concatenate(warmth), axis=0)) > _WARMED:
+        signals.add("temperature")
+    own = (one.id for one in catalogue().values() if one.of_every_drive and {one.signal, *one.requires} <= signals)
+    return (*BASELINE, *own)
 
 
 def identified(data_set: DataSet, motions: Sequence[Motion]) -> Twin:
