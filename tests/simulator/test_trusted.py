@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests import servo_arm
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, write
+from tests.synthetic import arm, as_run, measure, swing, truth
 
+from irtwin.diagnosing import diagnose as diagnose_torque
+from irtwin.effects.catalogue import catalogue
 from irtwin.errors import InputError
 from irtwin.simulator.playing import diagnose
 from irtwin.simulator.servos import NAMES
@@ -37,6 +42,20 @@ def test_numbers_that_are_trusted_stay_the_simulators(tmp_path):
     rows = [NAMES.index(name) for name in names]
     np.testing.assert_allclose(found.chosen.numbers[rows], own.numbers[rows], rtol=1e-12)
     assert "servo_stiffness" in {one.effect for one in found.document.causes}
+
+
+@pytest.mark.slow
+def test_of_logged_torque_too_what_is_trusted_is_no_cause(tmp_path):
+    robot, runs = arm(2), []
+    for seed, role in enumerate(["reference"] * 3 + ["observed"] * 3):
+        motion = replace(measure(robot, swing(robot, seed), noise=0.05, seed=seed), current=None, power=None)
+        more = 0.5 * truth(robot)["Fc"] * [role == "observed", 0] * np.sign(motion.dq)
+        run = as_run(replace(motion, torque=motion.torque + more))
+        runs.append(replace(run, name=f"{role}_{seed}", role=role))
+    folder = write(tmp_path / "set", robot, runs)
+    doubted, held = (diagnose_torque(folder, trust=trust).document for trust in ((), ("friction",)))
+    assert [(one.effect, one.joints) for one in doubted.causes] == [("coulomb_friction", ("joint_1",))]
+    assert not {one.effect for one in held.causes} & {e.id for e in catalogue().values() if e.family == "friction"}
 
 
 @pytest.mark.slow
