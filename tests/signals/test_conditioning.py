@@ -18,6 +18,8 @@ from irtwin.signals.conditioning import (
     differentiate,
     lag_of,
 )
+from irtwin.signals.filter import low_pass
+from irtwin.signals.motion import Motion
 
 ROBOT = arm(3)
 
@@ -153,6 +155,20 @@ def test_every_measurement_passes_the_same_filter():
     np.testing.assert_allclose(found.temperature, found.q, atol=1e-12)
     assert found.power.shape == (len(found.time),)
     assert found.current.shape == found.q.shape
+
+
+def test_what_logged_torque_carries_is_filtered_with_the_power():
+    time = np.arange(0, 10, 2e-3)
+    q = np.column_stack([np.sin(2 * np.pi * 0.5 * time)] * 2)
+    torque = np.column_stack([np.sign(np.cos(2 * np.pi * 0.5 * time))] * 2)  # as fast as dry friction that turns
+    still = 0 * q
+    run = as_run(Motion(time, q, still, still, torque=torque, run="turns"))
+    motion = condition_for_fit(run, arm(2), 4.0)
+    fast = motion.torque + motion.fast_torque
+    wanted = low_pass(torque * np.pi * np.cos(2 * np.pi * 0.5 * time)[:, None], motion.rate, 4.0)
+    whole, slow = (low_pass(one * motion.dq, motion.rate, 4.0) - wanted for one in (fast, motion.torque))
+    assert np.abs(whole).max() < 0.25 * np.abs(slow).max()
+    assert condition(run, arm(2), 4.0).fast_torque is None
 
 
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, float("nan")])

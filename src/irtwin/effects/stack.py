@@ -299,11 +299,15 @@ class Stack:
         return self.torque_of(self._real, motion, values, sparse=sparse)
 
     def logged_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
-        """Return the real joint torque, (N, n) N m, as the log shows it, less what sensors add; else the predicted."""
+        """Return the real joint torque, (N, n) N m, as the log shows it, less what sensors add; else the predicted.
+
+        It is as fast as the states are: what it carries is filtered with the measured power.
+        """
         if motion.torque is None:
             return self.real_torque(motion, values, sparse=sparse)
         sensors = [effect for effect in self._torque if effect.channel == "measurement"]
-        return np.asarray(motion.torque - self.torque_of(sensors, motion, values))
+        fast = 0.0 if motion.fast_torque is None else motion.fast_torque
+        return np.asarray(motion.torque + fast - self.torque_of(sensors, motion, values))
 
     def told_by_log(self, motion: Motion) -> np.ndarray:
         """Return where a log alone tells a joint's torque, (N, n): at rest dry friction holds what it has to."""

@@ -168,7 +168,8 @@ class Search:
     ) -> tuple[Explained, Refusals]:
         """Find the causes of power on the joint torque that is explained, None: on that of the twin.
 
-        `floor`: what causes of torque leave.
+        They are told by the logged torque: what the explained one misses is no cause of power. `floor`: what causes
+        of torque leave.
         """
         case, torque = self.case, explained or self.twin.torque
         power_of = TwinPower(self.power_stack, case.with_power, case.grouping, torque) if explained else self.before
@@ -176,9 +177,13 @@ class Search:
         check_observed(system)
         level = None if floor.power is None else np.array([floor.power])
         plain = self.before.system if explained else None
+        telling: System | None = None
+        if explained is not None:
+            about = self.power_stack, case.with_power, case.grouping
+            telling = power_system(*about, tried, explained.logged, TwinPower(*about, explained.logged))
 
         def search(without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-            finding = find("power", case, system, level, self.seed, without, plain)
+            finding = find("power", case, system, level, self.seed, without, plain, telling)
             of_power = explained_power(self.power_stack, finding, torque, power_of)
             left = floor_left(case, floor, of_power) if finding.causes else floor
             return replace(finding, signal_floor=None if left.power is None else np.array([left.power])), left

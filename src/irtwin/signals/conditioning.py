@@ -68,6 +68,8 @@ def condition(
     q = clean(signals.q, cutoffs["q"], order=3)
     dq = _agreeing(measured.pop("dq", None), differentiate(q, rate), time)
     ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate), time)
+    if states_cutoff is not None and signals.torque is not None:
+        measured["fast_torque"] = clean(signals.torque, states_cutoff) - measured["torque"]
     return Motion(
         time,
         q,

@@ -21,6 +21,7 @@ class Motion(Signals):
 
     standing: (N, n) whether a joint stood still, as seen before any filter; payload_com: (3,) m in the flange frame.
     `cutoff` is that of the zero-phase filter that the signals went through, Hz; None for a planned motion.
+    fast_torque: (N, n) what of torque that filter took and the wider one of the states leaves; None: nothing.
     A part knows the `whole` that it was cut from, and its first sample there: what depends on the past is computed
     over the whole.
     """
@@ -32,6 +33,7 @@ class Motion(Signals):
     payload_mass: float = field(default=0.0, kw_only=True)  # kg
     payload_com: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), kw_only=True)
     cutoff: float | None = field(default=None, kw_only=True)
+    fast_torque: np.ndarray | None = field(default=None, repr=False, compare=False, kw_only=True)
     whole: Motion | None = field(default=None, repr=False, compare=False, kw_only=True)
     start: int = field(default=0, compare=False, kw_only=True)
 

@@ -173,10 +173,7 @@ class Case:
 
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
-        motions = {
-            run: motion if motion.torque is None else replace(motion, torque=earlier(motion.time, motion.torque, lag))
-            for run, motion in self.motions.items()
-        }
+        motions = {run: _earlier(motion, lag) for run, motion in self.motions.items()}
         said = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
         cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {said}")
         return replace(self, motions=motions, cutoff=cutoff)
@@ -202,6 +199,14 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     case = case.with_friction_near_zero()
     sides = [case.others, case.seen] if case.against == "reference" else [case.seen]
     return replace(case, effects=shaped(case.robot, sides, case.effects))
+
+
+def _earlier(motion: Motion, lag: float) -> Motion:
+    """Return a motion with its torque so much earlier, s."""
+    if motion.torque is None:
+        return motion
+    fast = None if motion.fast_torque is None else earlier(motion.time, motion.fast_torque, lag)
+    return replace(motion, torque=earlier(motion.time, motion.torque, lag), fast_torque=fast)
 
 
 def _turned(before: Joint, joint: Joint) -> Joint:

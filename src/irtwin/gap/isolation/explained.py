@@ -76,6 +76,7 @@ class ExplainedTorque(Explained):
         """Take what torque showed, and what candidates were built on."""
         super().__init__(stack, finding, below)
         self._held: tuple[str, np.ndarray] | None = None
+        self._logged: tuple[str, np.ndarray] | None = None
 
     def __call__(self, motion: Motion) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of a run or a part of one."""
@@ -86,6 +87,15 @@ class ExplainedTorque(Explained):
                 torque = torque + np.where(told, 0.0, self.added(cause, whole, real=True))
             self._held = whole.run, torque
         return self._held[1][motion.start : motion.start + len(motion.time)]
+
+    def logged(self, motion: Motion) -> np.ndarray:
+        """Return the real joint torque, (N, n) N m, as the log shows it, less what sensors add by the causes, too."""
+        whole = motion.whole or motion
+        if self._logged is None or self._logged[0] != whole.run:
+            sensors = self._all(whole) - self._all(whole, real=True) if whole.torque is not None else 0.0
+            real = self.stack.logged_torque(whole, self.values) if whole.torque is not None else self(whole)
+            self._logged = whole.run, real - sensors
+        return self._logged[1][motion.start : motion.start + len(motion.time)]
 
     def off(self, motion: Motion, power_of: PowerOf | None = None) -> Motion:
         """Return a run without the causes, as above."""

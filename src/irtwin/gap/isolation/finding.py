@@ -154,14 +154,19 @@ def find(
     seed: int,
     without: Set[Without] = frozenset(),
     plain: System | None = None,
+    telling: System | None = None,
 ) -> ChannelFinding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
 
-    `plain` as a finding's.
+    `plain` as a finding's. `telling`: the same equations on what was logged, by which the causes are found.
     """
     places = (None,) if name == "power" else case.robot.joint_names
     steadied = Steadied.of(case, system)
-    attribution = attributed(case, system, steadied, floor, without)
+    if telling is None:
+        attribution = attributed(case, system, steadied, floor, without)
+    else:
+        attribution = attributed(case, telling, Steadied.of(case, telling), floor, without)
+        attribution = replace(attribution, noise=_left(system, attribution))
     return finding_of(name, places, case.observed, system, steadied, attribution, floor, seed, plain)
 
 
@@ -213,8 +218,13 @@ def attributed(
     if level is not None:
         level = np.tile(level, len(apart.halves))
     attribution = attribute(apart, candidates, case.thresholds.criterion, level, without)
+    return replace(attribution, noise=_left(system, attribution))
+
+
+def _left(system: System, attribution: Attribution) -> np.ndarray:
+    """Return (g,) RMS that the causes leave of all rows."""
     alone, chosen = system.with_columns([k for cause in attribution.causes for k in cause.columns])
-    return replace(attribution, noise=alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before)))
+    return alone.residual_rms(chosen, alone.residual_rms(chosen, alone.noise_before))
 
 
 def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
