@@ -18,6 +18,7 @@ from irtwin.identification.progress import track
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
+_SILENT = 0.1  # of log odds: data that say less of a hypothesis say nothing
 _KEPT = 2  # projections, each by another noise: a look by what is left, and one back
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
@@ -176,13 +177,14 @@ class _Search:
         """Return what explains most beside a structure, or is likelier in its place; None below the `least` log odds.
 
         All are judged by what the first leaves: noise that holds its own effect would hide it. Where that is hopeless,
-        what explains less may be likely. What the data speak against is not tried.
+        what explains less may be likely. What the data speak against is not tried, nor what they say nothing of: it
+        would hide others.
         """
         for first, enough in zip(posterior.promising(least), chain([least], repeat(0.0)), strict=False):
             member = posterior.hypotheses[first], posterior.variant(first)
             judged = self.beside(structure, self.left([*structure, member], noise))
             place = judged.likeliest_at(member[0])
-            if judged.log_odds[place] > max(enough, judged.log_prior[place]):
+            if judged.log_odds[place] > max(enough, judged.log_prior[place] + _SILENT):
                 return judged.hypotheses[place], judged.variant(place)
         return None
 
