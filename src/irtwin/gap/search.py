@@ -164,12 +164,12 @@ class Search:
         return replace(first, signal_floor=left.torque), left
 
     def power_causes(
-        self, tried: Sequence[Effect], floor: Floor, explained: ExplainedTorque | None
+        self, tried: Sequence[Effect], floor: Floor, explained: ExplainedTorque | None, *, by_log: bool = True
     ) -> tuple[Explained, Refusals]:
         """Find the causes of power on the joint torque that is explained, None: on that of the twin.
 
-        They are told by the logged torque: what the explained one misses is no cause of power. `floor`: what causes
-        of torque leave.
+        They are told `by_log`, on the logged torque: what the explained one misses is no cause of power. `floor`: what
+        causes of torque leave.
         """
         case, torque = self.case, explained or self.twin.torque
         power_of = TwinPower(self.power_stack, case.with_power, case.grouping, torque) if explained else self.before
@@ -178,7 +178,7 @@ class Search:
         level = None if floor.power is None else np.array([floor.power])
         plain = self.before.system if explained else None
         telling: System | None = None
-        if explained is not None:
+        if explained is not None and by_log:
             about = self.power_stack, case.with_power, case.grouping
             telling = power_system(*about, tried, explained.logged, TwinPower(*about, explained.logged))
 
