@@ -144,9 +144,8 @@ class Search:
             turning = {joint for cause in torque.finding.causes if cause.nuisance for joint in cause.joints}
             if not turning:
                 break
-            tell(
-                f"Trying every effect on torque again, as dry friction turns otherwise in {', '.join(sorted(turning))}"
-            )
+            said = f"dry friction near zero speed of {', '.join(sorted(turning))} has a form of its own"
+            tell(f"Trying every effect on torque again, as {said}")
             unknown = search.unknown | ({FrictionTurn.id} if look == _LOOKS - 2 else set())
             case = replace(search.case, turning=search.case.turning | turning)
             case = case.with_friction_near_zero(added(search.case, causes))
