@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, measure, swing
+from tests.data_sets import write
+from tests.synthetic import arm, as_run, measure, swing
 
+from irtwin.document.document import Document
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.sensing import OffsetOfRun
 from irtwin.effects.stack import Stack
+from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.regression.channel_equations import torque_system
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.run_to_run import share_of_offsets
+from irtwin.signals.log import read_data_set
 
 DRY = 4.0  # N m
 ROBOT = replace(arm(2), joints=tuple(replace(joint, dry_friction=DRY) for joint in arm(2).joints))
@@ -55,3 +60,30 @@ def test_a_share_is_of_the_dry_friction_where_that_is_known() -> None:
     )
     assert narrow == pytest.approx(0.1 * DRY)
     assert wide == unknown > 1.0
+
+
+def diagnosed(folder: Path, changed: float) -> Document:
+    """What is told where offsets differ by 0.1 N m a run, and that of joint 2 by `changed` in observed ones."""
+    differs, runs = np.random.default_rng(5), []
+    for number, role in enumerate(["reference"] * 3 + ["observed"] * 3):
+        motion = measure(ROBOT, swing(ROBOT, number, rate=100.0), noise=0.05, seed=number)
+        assert motion.torque is not None
+        offset = 0.1 * differs.standard_normal(2) + [0.0, changed if role == "observed" else 0.0]
+        logged = replace(motion, torque=motion.torque + offset, current=None, power=None)
+        runs.append(replace(as_run(logged), name=f"run_{number}", role=role))
+    return diagnose(read_data_set(write(folder / "set", arm(2), runs))).document
+
+
+def test_an_offset_that_changed_by_more_than_runs_differ_is_told_and_closes_the_gap(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, 1.0)
+    assert [(cause.effect, cause.joints, cause.scope) for cause in found.causes] == [
+        ("torque_offset", ("joint_2",), "changed")
+    ]
+    assert found.verdict == "attributed"
+    assert found.shrink is not None
+    assert found.shrink.closed_fraction is not None
+    assert found.shrink.closed_fraction.value > 0.8
+
+
+def test_offsets_that_differ_from_run_to_run_are_no_change(tmp_path: Path) -> None:
+    assert diagnosed(tmp_path, 0.0).verdict == "no_gap"

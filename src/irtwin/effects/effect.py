@@ -149,7 +149,7 @@ class Effect(ABC):
     one that is `never_changed` has such a shape for its changes. A `nuisance` is what nobody states of any robot: it is
     as likely there as not, explains what it can, and is no cause. Columns of one that is `smooth` depend on their
     sample's states alone, and vary no faster than these. `differs_by_run`: what its coefficients are called, which are
-    others in each run.
+    others in each run. `prior_tells`: that its coefficients lie far from what is known of them is evidence by itself.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
@@ -193,6 +193,7 @@ class Effect(ABC):
     of_change: ClassVar[bool] = False
     never_changed: ClassVar[bool] = False
     nuisance: ClassVar[bool] = False
+    prior_tells: ClassVar[bool] = False
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     lately: ClassVar[frozenset[str]] = frozenset()
 

@@ -22,6 +22,7 @@ from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
 from irtwin.gap.regression.joint_equations import JointEquations
 from irtwin.gap.regression.normal_equations import System, observed_rms
+from irtwin.gap.regression.run_to_run import with_offsets_held
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
@@ -184,10 +185,12 @@ def finding_of(
 ) -> ChannelFinding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
     chosen = [k for cause in attribution.causes for k in cause.columns]
+    fitted = estimate_of(steadied.system, chosen) if beside is None else beside.estimate(chosen)
+    system = with_offsets_held(system, chosen)
+    steadied = replace(steadied, system=with_offsets_held(steadied.system, chosen))
     alone, inside = system.with_columns(chosen)
     judged = held_out(alone, (plain or alone).noise_before, attribution.noise, inside, plain)
     apart = Apart.of(plain or steadied.system, steadied.system, [cause.columns for cause in attribution.causes])
-    fitted = estimate_of(steadied.system, chosen) if beside is None else beside.estimate(chosen)
     return ChannelFinding(
         name,
         places,

@@ -119,8 +119,24 @@ class Posterior:
     def _by_shape(self) -> np.ndarray:
         """(V,) log odds of each variant against nothing."""
         counts = np.array([len(values) for values in self.evidence.values], dtype=int)
-        explained = self._explaining(self.evidence.gain, self.variance, counts)
-        return np.asarray(self.prior + explained - self._sizes(np.arange(len(counts)), self.variance))
+        explained = self._explaining(self._told, counts)
+        return np.asarray(self.prior + explained - self._sizes(np.arange(len(counts)), self._scale))
+
+    @cached_property
+    def _told(self) -> np.ndarray:
+        """(V,) what each variant explains, in units of what is left along its columns.
+
+        That the twin's numbers are nearer to what is known of them has no misfit.
+        """
+        seen = self.evidence
+        known = seen.of_prior / (1 + seen.unnamed)
+        return np.asarray((seen.explained - seen.of_prior) / (seen.rows_that_speak * self.variance) + known)
+
+    @cached_property
+    def _scale(self) -> np.ndarray:
+        """(V,) the squares that are left along a variant's columns."""
+        every, shown = self.evidence.rows_that_speak * self.variance, self._told > 0
+        return np.asarray(np.where(shown, self.evidence.explained / np.where(shown, self._told, 1.0), every))
 
     def variant(self, place: int) -> Variant:
         """Return the shape of a hypothesis that explains most."""
@@ -142,14 +158,12 @@ class Posterior:
 
     def scale(self, place: int) -> float:
         """Return the squares that count as one: those of its misfit, as often as that is known."""
-        shape = self.shape[place]
-        return float(self.evidence.rows_that_speak[shape] * self.limits.certainty * self.variance[shape])
+        return float(self.limits.certainty * self._scale[self.shape[place]])
 
     def cost(self, place: int) -> float:
         """Return how much less likely a hypothesis is than what it explains: its prior, and its freedom."""
         shape = int(self.shape[place])
-        seen = self.evidence
-        own = self._explaining(seen.gain[shape], self.variance[shape], len(seen.information[shape]))
+        own = self._explaining(self._told[shape], len(self.evidence.information[shape]))
         return float(own - self.log_odds[place])
 
     def likeliest_at(self, one: Hypothesis) -> int:
@@ -172,22 +186,18 @@ class Posterior:
         """
         seen = self.evidence
         best = int(places[np.argmax(seen.explained[places])])
-        variance, rows, count = float(self.variance[best]), seen.rows_that_speak[best], len(seen.information[best])
+        rows, count = float(seen.rows_that_speak[best] * self.variance[best]), len(seen.information[best])
+        known = seen.of_prior[places]
+        told = (seen.explained[places] - known) / rows + known / (1 + seen.unnamed[best])
+        size = self._sizes(places, np.full(len(places), self._scale[best]))
+        left = -np.asarray(self._explaining(told.max() - told, count))
+        return self.prior[places] - size + left, -float(self._explaining(told.max(), count))
 
-        def left(squares: np.ndarray) -> np.ndarray:
-            return -np.asarray(self._explaining(squares / rows, variance, count))
-
-        size = self._sizes(places, np.full(len(places), variance))
-        behind = seen.explained[best] - seen.explained[places]
-        return self.prior[places] - size + left(behind), float(left(seen.explained[best]))
-
-    def _explaining(
-        self, gain: np.ndarray | float, variance: np.ndarray | float, count: np.ndarray | int
-    ) -> np.ndarray | float:
+    def _explaining(self, told: np.ndarray | float, count: np.ndarray | int) -> np.ndarray | float:
         certainty = self.limits.certainty
-        return 0.5 * (certainty + count) * np.log1p(gain / (certainty * variance))
+        return 0.5 * (certainty + count) * np.log1p(told / certainty)
 
-    def _sizes(self, places: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    def _sizes(self, places: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """Return the log of what variants pay, (P,): the room that their coefficients have, and what these miss in it.
 
         They are off what is expected by one of `_SIZES`, each as likely. Variants of one count are solved at once.
@@ -199,9 +209,8 @@ class Posterior:
             own = np.flatnonzero(counts == count)
             information = np.stack([seen.information[place] for place in places[own]])
             values = np.stack([seen.values[place] for place in places[own]])
-            scale = seen.rows_that_speak[places[own]] * variance[own]
             squares, axes = np.linalg.eigh(information)
-            known = np.maximum(squares / scale[:, None], 0.0)
+            known = np.maximum(squares / scale[own, None], 0.0)
             room = 1 + sizes[..., None] ** 2 * known
             missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
             each = 0.5 * (np.log(room).sum(axis=-1) + missed)

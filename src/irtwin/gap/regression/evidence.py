@@ -30,7 +30,8 @@ class HypothesisEvidence:
 
     explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; values (V, k each),
     beyond what is expected, in units of the prior; information (V, k, k each); rows (G,); by_kind (V, `System.kinds`):
-    of what is explained.
+    of what is explained; of_prior (V,): of it, what is none of rows: with the variant those of the twin's numbers whose
+    `prior_tells` are nearer to what is known of them.
     """
 
     variants: tuple[Variant, ...]
@@ -41,6 +42,7 @@ class HypothesisEvidence:
     information: tuple[np.ndarray, ...]
     rows: np.ndarray
     by_kind: np.ndarray
+    of_prior: np.ndarray
 
     @cached_property
     def rows_that_speak(self) -> np.ndarray:
@@ -79,7 +81,7 @@ class HypothesisEvidence:
 def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[Variant]) -> HypothesisEvidence:
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
     system = projection.system
-    explained, (said, missed) = np.zeros(len(variants)), np.zeros((2, len(variants), len(system.parts)))
+    (explained, nearer), (said, missed) = np.zeros((2, len(variants))), np.zeros((2, len(variants), len(system.parts)))
     information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
     values: list[np.ndarray] = [np.zeros(0)] * len(variants)
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
@@ -92,6 +94,7 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
         products, right = whole[..., :-1], whole[..., -1]
         fit = _bounded(products + np.eye(products.shape[1]), right + expected, lowest)
         explained[places] = 2 * (fit * right).sum(axis=1) - _squares(products, fit)
+        nearer[places] = beside.nearer(columns, fit)
         squares, measured = beside.in_parts(columns, parts, fit)
         said[places], missed[places] = squares.T, (measured - squares).T
         for place, known_of, value in zip(places, products, fit - expected, strict=True):
@@ -101,7 +104,8 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     halves = product(system.halves, range(system.groups))
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in halves])
     shown = np.maximum(explained, 0.0), said, missed
-    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows, by_kind)
+    of_prior = np.clip(nearer, 0.0, shown[0])
+    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows, by_kind, of_prior)
 
 
 def _in_halves(system: System, squares: np.ndarray) -> np.ndarray:

@@ -202,6 +202,11 @@ class System:
             products[: self.base, : self.base] = self._prior_products
         return products
 
+    def told_by_prior(self, values: np.ndarray) -> np.ndarray:
+        """Return the prior's rows (..., K) times the twin's coefficients (..., K) of effects whose `prior_tells`."""
+        told = values * np.array([effect.prior_tells for effect, _ in self.terms])
+        return told if self.prior_rows is None else np.asarray(told @ self.prior_rows.T)
+
     @cached_property
     def _prior_products(self) -> np.ndarray:
         assert self.prior_rows is not None

@@ -118,6 +118,20 @@ class Projection:
         left, every = np.array([self._squares[one.columns] for one in variants]).reshape(-1, 2).T
         return np.column_stack([left / rows, left / np.maximum(every, 1e-300)])
 
+    def nearer(
+        self, tried: tuple[np.ndarray, np.ndarray], beside: tuple[np.ndarray, np.ndarray], chosen: np.ndarray
+    ) -> np.ndarray:
+        """Return (V,) as `Beside.nearer`, of columns `tried` at places (V, k), times their values.
+
+        `beside`: the places (c,) of chosen columns, and how these imitate what is tried (V, c); `chosen` (c,): their
+        coefficients.
+        """
+        (columns, values), (at, own) = tried, beside
+        before = self._imitated[-1] - chosen @ self._imitated[at]
+        less = np.einsum("vik,vi->vk", self._imitated[columns], values) - own @ self._imitated[at]
+        before, less = (self.system.told_by_prior(one) for one in (before, less))
+        return np.asarray(((2 * before - less) * less).sum(axis=1))
+
     def at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
         """Return the places of columns among those that are asked for."""
         return np.searchsorted(self._asked, np.array(columns, dtype=int))
@@ -245,6 +259,14 @@ class Beside:
         gained = np.vstack(self.projection.less_noise(np.concatenate([one.ravel() for one in at]), self.shaken))
         ends = np.cumsum([one.size for one in at])[:-1]
         return [own.reshape(-1, *one.shape) for own, one in zip(np.split(gained, ends, axis=1), at, strict=True)]
+
+    def nearer(self, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return (V,) by how much nearer the twin is to what is known of it with columns times values (V, k).
+
+        In squares of the prior's rows of the effects whose `prior_tells`.
+        """
+        own = np.einsum("cvi,vi->vc", self.imitated[:, columns], values)
+        return self.projection.nearer((columns, values), (self.at, own), self.imitated[:, -1])
 
     def in_parts(self, columns: np.ndarray, products: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the squares (P, V) of columns (V, k) times values (V, k), and their products with the measurement.

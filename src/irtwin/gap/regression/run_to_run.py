@@ -23,6 +23,7 @@ _SHARES = np.array([0.0, *np.geomspace(0.0025, 0.32, 15)])  # of a coefficient
 _ONE_JOINT = 3.0  # of log likelihood, the most that one joint has against a share: it may be modelled badly
 _LEAST, _BEYOND = 0.02, 2.0  # of dry friction, what no run tells of its neighbours; deviations
 _NONE = 1e-6  # N m or N: dry friction of no joint
+_HELD = 1e-6  # of the spread of a number that is not fitted
 _KNOWN = 1e-8  # of the best known combination of coefficients: a run with less of another does not tell them apart
 
 
@@ -224,3 +225,21 @@ def share_of_offsets(system: System, robot: Robot, sides: Sequence[Set[str]]) ->
             squares += float(((differing - differing.mean(axis=0)) ** 2).sum())
             more += (len(own) - 1) * differing.shape[1]
     return max(_BEYOND * float(np.sqrt(squares / more)), _LEAST) if more else None
+
+
+def with_offsets_held(system: System, chosen: Sequence[int]) -> System:
+    """Return the system with the offset of each run as it is beside the chosen columns.
+
+    So what these close is not made up for by offsets where they are left out.
+    """
+    if not chosen or not any(isinstance(effect, OffsetOfRun) for effect, _ in system.terms):
+        return system
+    noise = system.residual_rms(chosen, system.noise_before)
+    values = twin_values(system, system.solution(chosen, Summed(system.group_moments(noise))))
+    held = tuple(
+        (effect, replace(term, expected=float(value), spread=_HELD * term.spread))
+        if isinstance(effect, OffsetOfRun)
+        else (effect, term)
+        for (effect, term), value in zip(system.terms, values, strict=True)
+    )
+    return replace(system, terms=held)
