@@ -54,6 +54,20 @@ def test_the_slope_of_an_ordinary_arm_needs_no_ballast():
     np.testing.assert_array_equal(torque_slope(robot, None, motion), expected)
 
 
+@pytest.mark.parametrize(
+    ("weight", "mass", "expected"),
+    [(None, 1.0, 4 * (8.0 + 4.0 + 8.0 / 3) / 3), (60.0, 1.0, 80.0), (None, 0.0, 50.0)],
+    ids=["four times what bodies weigh in the mean", "the robot weighs more", "nobody says"],
+)
+def test_a_body_may_be_off_by_what_bodies_of_its_robot_weigh(weight, mass, expected):
+    robot = replace(arm(3), weight=weight)
+    for inertia in list(robot.model.inertias)[1:]:
+        inertia.mass *= mass
+    spreads = {term.name: term.spread for term in RigidBody().terms(robot)}
+    assert spreads["m"] == pytest.approx(expected)
+    assert spreads["mx"] / spreads["m"] == pytest.approx((spreads["Izz"] / spreads["m"]) ** 0.5)
+
+
 def test_bodies_and_payload_share_a_regressor_that_goes_with_its_motion(monkeypatch):
     asked = []
 

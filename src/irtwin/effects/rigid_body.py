@@ -22,7 +22,8 @@ NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 _UNITS = ("kg",) + ("kg m",) * 3 + ("kg m^2",) * 6
 _LIGHT = 1e-6  # kg
 _HEAVIEST, _FARTHEST = 1e5, 1e3  # kg, m: of a payload
-_SPREAD = 50.0  # kg: no link of an arm that lifts up to some ten kg is farther off
+_OFF = 4.0  # times what bodies weigh in the mean: so far a drawing may be off in one
+_UNKNOWN = 50.0  # kg: a body of an arm of which no mass is stated
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,14 @@ class RigidBody(Effect):
     id: ClassVar[str] = "rigid_body"
     family: ClassVar[str] = "bodies"
     bodies: ClassVar[bool] = True
+    prior_tells: ClassVar[bool] = True
     smooth: ClassVar[bool] = True
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
-        """Return ten terms per moving body, expected as in the URDF."""
+        """Return ten terms per moving body, expected as in the URDF, give or take what a body weighs in the mean."""
         model = robot.model
-        spread = max(_SPREAD, robot.weight or 0.0)
+        drawn = sum(max(inertia.mass, 0.0) for inertia in model.inertias[1:])
+        spread = _OFF * max(drawn, robot.weight or 0.0) / model.nv or _UNKNOWN
         reach = sum(float(np.linalg.norm(place.translation)) for place in model.jointPlacements[1:]) / model.njoints
         arm = max(reach, 0.1)
         spreads = [spread] + [spread * arm] * 3 + [spread * arm**2] * 6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.log import Run
 
+_ANY = 100.0  # times what bodies may be off
 _OF_BODY = 10  # parameters: mass, first moments, inertia
 _AS_MUCH, _COMPARABLE = 2.0, 10.0  # times: friction that only has another sign, and friction beside which it is none
 
@@ -31,6 +33,7 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
     if not system.both:
         return
     others = [run for run in runs if run.role != "observed"]
+    system = _with_any_bodies(system)
     moments = system.moments(system.noise_before)
     seen = system.group_observed
     sides = [Summed([m for m, own in zip(moments, seen, strict=True) if own == side]) for side in (True, False)]
@@ -51,6 +54,14 @@ def check_same_robot(runs: Sequence[Run], stack: Stack, system: System, limits: 
             f"{others[0].file}: the torque of the {others[0].role} runs is nothing like that of the observed runs (on "
             f"{', '.join(named)}), as of another robot, unit or sign; mend these runs, or leave them out"
         )
+
+
+def _with_any_bodies(system: System) -> System:
+    """Return the system with bodies of which hardly anything is known: another robot's, or those of another unit."""
+    terms = (
+        (effect, replace(term, spread=_ANY * term.spread) if effect.bodies else term) for effect, term in system.terms
+    )
+    return replace(system, terms=tuple(terms), prior_rows=None)
 
 
 def _foreign_share(system: System, sides: Sequence[Moments], alone: Sequence[np.ndarray]) -> np.ndarray:
