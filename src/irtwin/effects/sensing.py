@@ -28,6 +28,7 @@ from irtwin.signals.motion import Motion
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
 _GAINS = (0.7, 1.4)  # of a meter, the range of the ontology, `effects.ttl`
 _FARTHEST = 0.35  # rad or m, of a zero
+_LAG = 5e-3  # s, of all joints' torque: filters of drives pass 100 Hz and more
 _APART = 2.5e-4  # s, of channels: clocks, filters and samples put them so far apart, one standard deviation
 
 
@@ -51,6 +52,8 @@ class TorqueOffset(JointEffect):
 @dataclass(frozen=True)
 class OffsetOfRun(TorqueOffset):
     """The same in some runs, as it differs from run to run: by a `share` of the joint's dry friction, where known."""
+
+    prior_tells: ClassVar[bool] = True
 
     share: float | None = None
 
@@ -172,6 +175,28 @@ class TimeDelay(JointEffect):
         near = slice(max(0, start - int(self.d * whole.rate) - 2), start + len(motion.time))
         late = [np.interp(motion.time - self.d, whole.time[near], torque) for torque in before[near].T]
         return ((np.array(late).T - predicted.torque) / self.d,)
+
+
+@dataclass(frozen=True)
+class TorqueLag(Effect):
+    """tau(t - d) of all joints alike, as filters of drives and of loggers make it; the column as in `TimeDelay`."""
+
+    id: ClassVar[str] = "torque_lag"
+    family: ClassVar[str] = "sensing"
+    channel: ClassVar[str] = "measurement"
+    needs: ClassVar[str | None] = "torque"
+    stage: ClassVar[int] = 3
+    nuisance: ClassVar[bool] = True
+    never_changed: ClassVar[bool] = True
+
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return d."""
+        return (Term("d", "s", spread=_LAG, lowest=0.0, unnamed=_APART),)
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, 1)."""
+        (late,) = TimeDelay(d=_LAG).samples(robot, motion, predicted)
+        return late[..., None]
 
 
 @dataclass(frozen=True)

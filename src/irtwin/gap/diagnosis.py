@@ -21,7 +21,6 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.common_lag import common_lag
 from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
 from irtwin.gap.isolation.finding import ChannelFinding
@@ -200,10 +199,6 @@ def diagnose(
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
         search, torque, floor, refusals = search.causes_of_torque(_tried)
-        if lag := common_lag(torque.finding, case.with_torque):
-            tell(f"Trying every effect on torque {1e3 * lag:.2g} ms earlier, as it lags in several joints")
-            search = replace(search, case=search.case.without_lag(lag).with_friction_near_zero())
-            search, torque, floor, refusals = search.causes_of_torque(_tried)
         case, twin_torque = search.case, search.twin.torque
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)

@@ -11,6 +11,7 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect
 from irtwin.effects.friction import FrictionTurn
+from irtwin.effects.sensing import TorqueLag
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.gap.closed_twin import added
@@ -32,7 +33,8 @@ from irtwin.gap.regression.run_to_run import share_of_offsets
 from irtwin.gap.regression.torque_from_power import ThroughPower
 from irtwin.identification.progress import tell
 
-_LOOKS = 3  # at torque: in the last, dry friction turns as the others found
+_LOOKS = 3  # at torque: in the last, dry friction turns and torque lags as the others found
+NUISANCES = frozenset({FrictionTurn.id, TorqueLag.id})
 
 Tried = tuple[Sequence[Effect], Sequence[Effect]]
 """Effects on torque, and on power, that a search tries."""
@@ -133,24 +135,39 @@ class Search:
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
     def causes_of_torque(self, tried: Callable[[Search], Tried]) -> tuple[Search, ExplainedTorque, Floor, Refusals]:
-        """Find the causes of torque, and with them the search that knows how dry friction turns.
+        """Find the causes of torque, and with them the search that knows what is a cause of no gap.
 
-        Joints in which it turns otherwise than the twin's have that in the twin, and all is tried anew.
+        Joints in which dry friction turns otherwise than the twin's have that in the twin, a lag of all torque is taken
+        out, and all is tried anew.
         """
         search = self
         for look in range(_LOOKS):
             torque, floor, refusals = search.torque_causes(tried(search))
-            causes = [cause for cause in torque.finding.causes if not cause.nuisance]
-            turning = {joint for cause in torque.finding.causes if cause.nuisance for joint in cause.joints}
-            if not turning:
+            if not (known := search.knowing(torque.finding)):
                 break
-            said = f"dry friction near zero speed of {', '.join(sorted(turning))} has a form of its own"
-            tell(f"Trying every effect on torque again, as {said}")
-            unknown = search.unknown | ({FrictionTurn.id} if look == _LOOKS - 2 else set())
-            case = replace(search.case, turning=search.case.turning | turning)
-            case = case.with_friction_near_zero(added(search.case, causes))
-            search = replace(search, case=case, unknown=unknown)
+            search = replace(known, unknown=known.unknown | NUISANCES) if look == _LOOKS - 2 else known
         return search, torque, floor, refusals
+
+    def knowing(self, finding: ChannelFinding) -> Search | None:
+        """Return the search that knows the nuisances of a finding, None where there are none."""
+        causes = [cause for cause in finding.causes if not cause.nuisance]
+        turning = {joint for cause in finding.causes if cause.nuisance for joint in cause.joints}
+        lags = [cause for cause in finding.causes if cause.nuisance and not cause.joints]
+        if not (turning or lags):
+            return None
+        case, unknown, said = self.case, self.unknown, []
+        if turning:
+            said.append(f"dry friction near zero speed of {', '.join(sorted(turning))} has a form of its own")
+            case = replace(case, turning=case.turning | turning)
+        for cause in lags:
+            lag = float(finding.estimate.values[finding.used.index(cause.columns[0])])
+            if lag <= case.longest_lag:
+                said.append(f"it lags by {1e3 * lag:.2g} ms")
+                case = case.without_lag(lag)
+            else:
+                unknown |= {cause.effect}
+        tell(f"Trying every effect on torque again, as {' and '.join(said)}")
+        return replace(self, case=case.with_friction_near_zero(added(self.case, causes)), unknown=unknown)
 
     def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         about = self.below, self.twin.torque, self.before
@@ -199,7 +216,7 @@ def variants(case: Case, signal: str) -> list[Effect]:
     bodies = any(run.role == "simulated" for run in case.runs)
     return [
         shape
-        for effect in (*catalogue().values(), *case.turns(known=False))
+        for effect in (*catalogue().values(), *case.turns(known=False), TorqueLag())
         if effect.signal == signal
         and not effect.disturbance
         and (bodies or not effect.bodies)

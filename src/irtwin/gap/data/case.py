@@ -34,6 +34,8 @@ from irtwin.twin.twin import Twin
 
 _LONG = 12_000  # samples: at 12,000 a copy of the process neither wins nor costs (a diagnosis of 9 s)
 
+_LONGEST_LAG = 5e-3  # s: filters of drives pass 100 Hz and more
+
 
 @dataclass(frozen=True)
 class Case:
@@ -170,6 +172,11 @@ class Case:
             both = zip(robot.joints, turned.joints, strict=True)
             robot = replace(robot, joints=tuple(one if one.name in self.turning else own for own, one in both))
         return replace(self, robot=robot)
+
+    @property
+    def longest_lag(self) -> float:
+        """By how much filters make torque lag, and samples where they are longer, s."""
+        return max(_LONGEST_LAG, *(1 / motion.rate for motion in self.with_torque))
 
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
