@@ -34,10 +34,14 @@ VARIANT = SimpleNamespace(effect=catalogue()["coulomb_friction"])
 CAUSE = SimpleNamespace(rivals=(), scope="missing", joints=("j1",), variants=(VARIANT,))
 
 
-def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), **more):
-    """before, after: RMS of each joint, in floors; `closing`: what the causes close; `turned` as of `Apart.turned`.
+def disturbance(size, kind="line"):
+    return SimpleNamespace(channel="torque", joint="j1", kind=kind, size=size)
 
-    `more` as left_open.
+
+def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), known=1.0, made=0.0, **more):
+    """before, after: RMS of each joint, in floors; `closing`: what the causes close; `turned`, `known` as of `Apart`.
+
+    `made`: what friction makes that differs from run to run, floors squared; `more` as left_open.
     """
     floor = np.ones(len(before))
     finding = SimpleNamespace(
@@ -50,7 +54,9 @@ def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), **more):
             left=(np.array(before), np.array(after)),
             level=lambda floor: floor,
             turned=lambda floor: np.array(turned),
+            known=np.array(known),
         ),
+        steadied=SimpleNamespace(made=np.full(len(before), made)),
         closing=lambda some: closing,
     )
     return left_open([finding], DEFAULT, **more)
@@ -101,6 +107,11 @@ def test_a_gap_that_is_closed_is_not_left_open():
 def test_a_gap_that_nothing_closes_is_left_open():
     assert left([5.0, 1.0], [5.0, 1.0]) == MUCH_IS_LEFT
     assert left([5.0, 1.0], [4.0, 1.0], [CAUSE]) == MUCH_IS_LEFT
+
+
+def test_a_gap_is_a_mean_over_all_rows_as_those_in_which_friction_turns_have_none():
+    assert left([5.0, 1.0], [5.0, 1.0], known=[0.1, 1.0]) is None
+    assert left([5.0, 1.0], [5.0, 1.0], known=[0.2, 1.0]) == MUCH_IS_LEFT
 
 
 def test_a_gap_that_is_closed_at_the_worst_joint_alone_is_left_open():
@@ -158,7 +169,7 @@ def test_a_gap_that_only_an_impossible_number_closes_is_left_open():
 
 
 def test_what_does_not_repeat_is_left_open_where_nothing_else_is_found():
-    first, second = (SimpleNamespace(channel="torque", joint="j1", size=1.0) for _ in range(2))
+    first, second = disturbance(1.0), disturbance(1.0)
     assert left([1.0], [1.0], differing=[first, second]) == DOES_NOT_REPEAT
     assert left([1.0], [1.0], differing=[first, second], explained=[second]) == DOES_NOT_REPEAT
     assert left([1.0], [1.0], differing=[first, second], explained=[first]) is None
@@ -166,14 +177,14 @@ def test_what_does_not_repeat_is_left_open_where_nothing_else_is_found():
 
 
 def test_what_was_taken_out_counts_in_the_gap_that_there_was():
-    swings = SimpleNamespace(channel="torque", joint="j1", size=100.0)
+    swings = disturbance(100.0)
     assert left([1.0, 3.0], [1.0, 3.0]) == MUCH_IS_LEFT
     assert left([1.0, 3.0], [1.0, 3.0], differing=[swings], explained=[swings]) is None
     assert left([1.0, 7.0], [1.0, 7.0], differing=[swings], explained=[swings]) == MUCH_IS_LEFT
 
 
 def test_what_is_left_is_what_does_not_repeat_where_that_is_nearly_all():
-    drifts = SimpleNamespace(channel="torque", joint="j1", size=20.0)
+    drifts = disturbance(20.0)
     assert left([5.0, 1.0], [5.0, 1.0], differing=[drifts]) == DOES_NOT_REPEAT
     assert left([5.0, 5.0], [5.0, 5.0], differing=[drifts]) == MUCH_IS_LEFT
     assert left([5.0, 1.0], [4.0, 1.0], [CAUSE], differing=[drifts]) == MUCH_IS_LEFT
@@ -181,12 +192,15 @@ def test_what_is_left_is_what_does_not_repeat_where_that_is_nearly_all():
 
 def test_causes_that_close_nothing_do_not_close_a_gap():
     nothing = Closing(share=0.5, interval=(0.4, 0.6), floors=0.2, size=0.04)
-    assert (
-        left(
-            [1.0], [1.0], [CAUSE], closing=nothing, differing=[SimpleNamespace(channel="torque", joint="j1", size=1.0)]
-        )
-        == DOES_NOT_REPEAT
-    )
+    assert left([1.0], [1.0], [CAUSE], closing=nothing, differing=[disturbance(1.0)]) == DOES_NOT_REPEAT
+
+
+@pytest.mark.parametrize(
+    ("kind", "made", "why"),
+    [("offset", 2.0, None), ("drift", 2.0, None), ("offset", 0.5, DOES_NOT_REPEAT), ("line", 2.0, DOES_NOT_REPEAT)],
+)
+def test_an_offset_between_repeats_is_none_where_friction_differs_by_as_much(kind, made, why):
+    assert left([1.0], [1.0], differing=[disturbance(1.0, kind)], made=made) == why
 
 
 @pytest.mark.parametrize(

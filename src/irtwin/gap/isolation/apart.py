@@ -58,6 +58,13 @@ class Apart:
         before = observed_rms(self.plain, (), self.plain.noise_before)
         return before[known], observed_rms(self.system, self.chosen, self.noise)[known]
 
+    @cached_property
+    def known(self) -> np.ndarray:
+        """(g,) the part of observed runs' rows in which the law of friction is known."""
+        rows = self.plain.rows[self.plain.group_observed].sum(axis=0)
+        every = np.maximum(sum(rows[half] for half in self.plain.halves), 1)
+        return np.asarray(rows[self.plain.halves[0]] / every)
+
     def level(self, floor: np.ndarray) -> np.ndarray:
         """Return (g,) RMS beyond which a gap lies: the floor (g,), or what the other runs show, if that is more."""
         if not self.plain.both:

@@ -11,9 +11,9 @@ import numpy as np
 
 from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.apart import spread
+from irtwin.gap.isolation.apart import Apart, spread
 from irtwin.gap.isolation.finding import ChannelFinding, branches
-from irtwin.gap.repeats.disturbances import Disturbance
+from irtwin.gap.repeats.disturbances import DRIFT, OFFSET, Disturbance
 from irtwin.gap.thresholds import Thresholds
 
 NO_GAP, ATTRIBUTED, AMBIGUOUS, UNEXPLAINED = "no_gap", "attributed", "ambiguous", "unexplained"
@@ -40,6 +40,7 @@ def left_open(
     if unmatched:
         return IMPOSSIBLE_NUMBER
     located = [one for one in differing if not any(one is each for each in explained)]
+    located = [one for one in located if not any(_of_friction(one, finding) for finding in findings)]
     named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
     nameless = bool(located) and located[0] is differing[0] and not named
     excesses = (_largest(finding, explained, located) for finding in findings)
@@ -60,7 +61,7 @@ def most_left(findings: Sequence[ChannelFinding], limits: Thresholds, *, alike: 
     `alike` as of `left_open`: where dry friction turns otherwise than in the reference runs, that is the place.
     """
     left = (alike and _turned(findings, limits)) or {
-        (finding.name, place): float(((finding.apart.left[1] / finding.apart.level(finding.floor_within)) ** 2)[place])
+        (finding.name, place): float(_over(finding.apart, finding.floor_within)[1][place])
         for finding in findings
         if finding.floor_within is not None
         for place in range(len(finding.places))
@@ -126,9 +127,25 @@ def _largest(
     if finding.floor_within is None:
         return 0.0, 0.0, 0.0
     level = finding.apart.level(finding.floor_within)
-    before, after = ((rms / level) ** 2 - 1 for rms in finding.apart.left)
+    before, after = _over(finding.apart, finding.floor_within)
     before = before + _excess(explained, finding, level)
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
+
+
+def _over(apart: Apart, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (g,) the excess over a floor (g,) and reference runs, without causes and with them.
+
+    A mean over all of a joint's rows: those in which dry friction turns have none.
+    """
+    before, after = (apart.known * ((rms / apart.level(floor)) ** 2 - 1) for rms in apart.left)
+    return before, after
+
+
+def _of_friction(one: Disturbance, finding: ChannelFinding) -> bool:
+    """Return whether friction that differs from run to run makes as much at that place: an offset, or a drift."""
+    if one.channel != finding.name or one.kind not in (OFFSET, DRIFT):
+        return False
+    return bool(one.size < finding.steadied.made[finding.places.index(one.joint)])
 
 
 def _excess(some: Sequence[Disturbance], finding: ChannelFinding, level: np.ndarray) -> np.ndarray:
