@@ -70,11 +70,19 @@ class TorqueRipple(JointEffect):
 class JointCoupling(Effect):
     """Ia ddq_k + Fv dq_k + Fc sign(dq_j + dq_k) on joint j, the same with j and k exchanged on joint k.
 
-    `joints` are the pair (j, k): a wrist in which one motor turns two joints; None for the last two.
+    `joints` are the pair (j, k): a wrist in which one motor turns two joints; None for the last two. Where torque is
+    that of motors, the one that both joints turn, k, shows its own friction alone: it is not `mutual`.
     """
 
     id: ClassVar[str] = "joint_coupling"
     family: ClassVar[str] = "transmission"
+    lately: ClassVar[frozenset[str]] = frozenset({"mutual"})
+
+    mutual: bool = True
+
+    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+        """Return it as it is felt at both joints, and at one."""
+        return self.variants(mutual=(True, False))
 
     def pair(self, robot: Robot) -> tuple[Joint, ...]:
         """Return the two joints; none on a robot of one."""
@@ -86,8 +94,8 @@ class JointCoupling(Effect):
         return replace(self, joints=joints) if len(joints) > 1 else self
 
     def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
-        """Return both joints of the pair."""
-        return tuple(one.name for one in self.pair(robot))
+        """Return the joints of the pair that feel it."""
+        return tuple(one.name for one in self.pair(robot)[0 if self.mutual else 1 :])
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return Ia, Fv and Fc of the pair, named by its second joint."""
@@ -107,7 +115,7 @@ class JointCoupling(Effect):
         columns = np.zeros((*motion.dq.shape, 3 if places else 0))
         if places:
             rubs = sharp_sign(motion.dq[:, places].sum(axis=1))
-            for joint, other in (places, places[::-1]):
+            for joint, other in (places[::-1], *([places] if self.mutual else [])):
                 columns[:, joint] = np.column_stack([*self._turned(motion, joint, other), rubs])
         return columns
 
@@ -117,7 +125,7 @@ class JointCoupling(Effect):
 
     def changes(self) -> tuple[Effect, ...]:
         """Return the change of what turns with both joints: no friction of a joint beside it has to bring its part."""
-        return (ChangedJointCoupling(joints=self.joints, runs=self.runs),)
+        return ChangedJointCoupling(joints=self.joints, runs=self.runs).variants(mutual=(True, False))
 
 
 @dataclass(frozen=True)
@@ -128,7 +136,7 @@ class ChangedJointCoupling(JointCoupling):
 
     def standing(self) -> Effect:
         """Return it in a twin, whose rotors and friction have each joint's own part."""
-        return JointCoupling(joints=self.joints, runs=self.runs)
+        return JointCoupling(joints=self.joints, runs=self.runs, mutual=self.mutual)
 
     def _turned(self, motion: Motion, joint: int, other: int) -> tuple[np.ndarray, np.ndarray]:
         return motion.ddq[:, joint] + motion.ddq[:, other], motion.dq[:, joint] + motion.dq[:, other]
