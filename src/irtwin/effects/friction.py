@@ -91,12 +91,14 @@ class FrictionTurn(JointEffect):
     nuisance: ClassVar[bool] = True
     never_changed: ClassVar[bool] = True
 
-    mixture: tuple[float, ...] | None = None  # the share of each speed; None: open
+    mixture: tuple[float, ...] | None = None  # of each speed, N m or N; None: open
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return the friction that turns over each speed, or all of it."""
+        """Return the friction that turns over each speed, or how much of the mixture there is."""
+        if self.mixture:
+            return (Term("share", "1", joint.name, expected=1.0, spread=1.0, lowest=0.0),)
         unit, spread = force_unit(joint), joint.dry_friction or 15.0
-        names = ["Fc"] if self.mixture else [f"Fc_{width:g}_{exponent:g}" for width, exponent in _TURNS]
+        names = [f"Fc_{width:g}_{exponent:g}" for width, exponent in _TURNS]
         return tuple(Term(name, unit, joint.name, spread=spread, lowest=0.0) for name in names)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
