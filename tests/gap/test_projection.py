@@ -78,6 +78,34 @@ def test_it_is_what_a_fit_to_all_rows_leaves(
     assert seen == len(some)
 
 
+@pytest.mark.parametrize("chosen", [(), (7, 10)])
+@pytest.mark.parametrize("shaken", [False, True])
+def test_what_is_nearer_is_the_prior_of_both_fits(
+    chosen: tuple[int, ...], shaken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = system(shaken=shaken)
+    total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))
+    inside = [*range(BASE), *chosen]
+
+    def imitated(right: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(total[np.ix_(inside, inside)] + np.eye(len(inside)), right[inside])
+
+    measured = total[:, -1].copy()
+    if shaken:
+        left = np.append(np.zeros(own.size), 1.0)
+        left[inside] = -imitated(measured)
+        less = own.shaken_products(left, NOISE)
+        assert less is not None
+        measured -= less.sum(axis=0)
+    monkeypatch.setattr(type(EFFECT), "prior_tells", True)
+    beside = Projection(own, NOISE, [*VARIANTS, Variant(EFFECT, (7, 10), ())]).beside(chosen)
+    for which, columns, *_ in beside.batches(VARIANTS[:2]):
+        tried = 0.7 * total[:, VARIANTS[which[0]].columns].sum(axis=1)
+        before, after = imitated(measured)[:BASE], imitated(measured - tried)[:BASE]
+        nearer = beside.nearer(columns, np.full(columns.shape, 0.7))
+        np.testing.assert_allclose(nearer, [before @ before - after @ after], atol=1e-9)
+
+
 def test_what_is_visible_is_what_the_twin_does_not_imitate() -> None:
     own = system(shaken=False)
     total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))

@@ -135,7 +135,7 @@ class Search:
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
     def causes_of_torque(self, tried: Callable[[Search], Tried]) -> tuple[Search, ExplainedTorque, Floor, Refusals]:
-        """Find the causes of torque, and with them the search that knows what is a cause of no gap.
+        """Find the causes of torque, and with them the search that knows what is nobody's fault.
 
         Joints in which dry friction turns otherwise than the twin's have that in the twin, a lag of all torque is taken
         out, and all is tried anew.
@@ -165,6 +165,7 @@ class Search:
                 said.append(f"it lags by {1e3 * lag:.2g} ms")
                 case = case.without_lag(lag)
             else:
+                said.append(f"it lags by {1e3 * lag:.2g} ms, more than filters make")
                 unknown |= {cause.effect}
         tell(f"Trying every effect on torque again, as {' and '.join(said)}")
         return replace(self, case=case.with_friction_near_zero(added(self.case, causes)), unknown=unknown)

@@ -2,11 +2,11 @@
 
 What a structure leaves along a hypothesis' columns is noise, disagreement between groups, and a misfit that no effect
 names. Its variance, a row, is `v = misfit^2 + disagreement / rows`, known as from `certainty` earlier looks; what is
-left is then Student's, and what explains it has a Gaussian prior. The odds of k coefficients that explain `gain` a row,
-of the information `A`, and `missed` of it where they are as expected, give or take a size s, are
+left is then Student's, and what explains it has a Gaussian prior. What is explained is squares of rows, in units of v,
+and of the prior, in units of one: `told`. The odds of k coefficients of the information `A` that miss a size s of them
+by `missed` are
 
-    prior * (1 + gain / (certainty v)) ** ((certainty + k) / 2) * exp(-missed / (2 v))
-        / sqrt(det(1 + s^2 A / (rows v)))
+    prior * (1 + told / certainty) ** ((certainty + k) / 2) * exp(-missed / 2) / sqrt(det(1 + s^2 A / (rows v)))
 
 over the shapes and sizes of an effect, each as likely. An effect is at one of its joints as likely as at another; that
 it is at one more has even odds, whichever that is. In words: `docs/how-it-decides.md`.

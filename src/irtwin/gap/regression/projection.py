@@ -49,7 +49,7 @@ class Projection:
         self._inner = np.array(inner)  # (R, K, K)
         self._measured = np.array(measured)  # (R, K)
         self._factor = factored(self._inner.sum(axis=0), system.prior())
-        self._imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
+        self.imitated = np.ascontiguousarray(solved(self._factor, self._all.T).T)  # (A, K)
         self._rows: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # of a column: with all (A,), in each part (A, R)
         self.products: dict[int, tuple[dict[tuple[int, ...], int], np.ndarray, np.ndarray]] = {}  # by their number
         self._squares: dict[tuple[int, ...], tuple[float, float]] = {}  # of variants: what is left, and all
@@ -73,15 +73,15 @@ class Projection:
             for products_of, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
         ]
         whole = [left.sum(axis=0) for left in by_part]
-        imitated = [self._imitated[columns] for columns in each]
+        imitated = [self.imitated[columns] for columns in each]
         places = {int(part): place for place, part in enumerate(self._telling)}
         for part, inner in enumerate(self._inner):
-            half = self._imitated @ (inner / -2)  # what is left is symmetric in it
+            half = self.imitated @ (inner / -2)  # what is left is symmetric in it
             if part in places:
                 half += self._across(places[part])
             else:
                 half[-1] += self._measured[part]
-            measured = half @ self._imitated[-1] + self._imitated @ half[-1]
+            measured = half @ self.imitated[-1] + self.imitated @ half[-1]
             for columns, own, left in zip(each, imitated, by_part, strict=True):
                 among = _pairs(own, half[columns])
                 left[part, ..., :-1] -= among + among.swapaxes(1, 2)
@@ -118,20 +118,6 @@ class Projection:
         left, every = np.array([self._squares[one.columns] for one in variants]).reshape(-1, 2).T
         return np.column_stack([left / rows, left / np.maximum(every, 1e-300)])
 
-    def nearer(
-        self, tried: tuple[np.ndarray, np.ndarray], beside: tuple[np.ndarray, np.ndarray], chosen: np.ndarray
-    ) -> np.ndarray:
-        """Return (V,) as `Beside.nearer`, of columns `tried` at places (V, k), times their values.
-
-        `beside`: the places (c,) of chosen columns, and how these imitate what is tried (V, c); `chosen` (c,): their
-        coefficients.
-        """
-        (columns, values), (at, own) = tried, beside
-        before = self._imitated[-1] - chosen @ self._imitated[at]
-        less = np.einsum("vik,vi->vk", self._imitated[columns], values) - own @ self._imitated[at]
-        before, less = (self.system.told_by_prior(one) for one in (before, less))
-        return np.asarray(((2 * before - less) * less).sum(axis=1))
-
     def at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
         """Return the places of columns among those that are asked for."""
         return np.searchsorted(self._asked, np.array(columns, dtype=int))
@@ -142,11 +128,11 @@ class Projection:
         if not new:
             return
         at = self.at(new)
-        mine = self._imitated[at]
+        mine = self.imitated[at]
         left, told = -(mine @ self._inner), np.zeros((len(new), len(self._asked)))  # (R, n, K)
         for place, part in enumerate(self._telling):
             left[part] += self._across(place, at)
-        own = left @ -self._imitated.T
+        own = left @ -self.imitated.T
         own[..., -1] -= self._measured @ mine.T
         for place, part in enumerate(self._telling):
             products = self._moments[place].among(np.array(new), self._asked)
@@ -180,7 +166,7 @@ class Projection:
         """
         coefficients = np.zeros(self.system.size + 1)
         coefficients[self._asked[at]] = -imitated
-        coefficients[: self.system.base] = imitated @ self._imitated[at] - self._imitated[-1]
+        coefficients[: self.system.base] = imitated @ self.imitated[at] - self.imitated[-1]
         coefficients[-1] = 1.0
         less = self.system.shaken_products(coefficients, self._noise)
         if less is None:
@@ -194,7 +180,7 @@ class Projection:
         """
         less, change = shaken
         of_base, of_own = less[:, : self.system.base] - self._inner @ change, less[:, self._asked[at]]
-        parts = of_base @ self._imitated[at].T - of_own
+        parts = of_base @ self.imitated[at].T - of_own
         parts[self._telling] += self._along(change, at)
         return self._all[at] @ change - of_own.sum(axis=0), parts
 
@@ -265,8 +251,14 @@ class Beside:
 
         In squares of the prior's rows of the effects whose `prior_tells`.
         """
-        own = np.einsum("cvi,vi->vc", self.imitated[:, columns], values)
-        return self.projection.nearer((columns, values), (self.at, own), self.imitated[:, -1])
+        of_base, chosen = self.projection.imitated, self.projection.imitated[self.at]
+        less = np.einsum("vik,vi->vk", of_base[columns], values)
+        less -= np.einsum("cvi,vi->vc", self.imitated[:, columns], values) @ chosen
+        before = of_base[-1] - self.imitated[:, -1] @ chosen
+        if self.shaken is not None:
+            before = before - self.shaken.change
+        before, less = (self.projection.system.told_by_prior(one) for one in (before, less))
+        return np.asarray(((2 * before - less) * less).sum(axis=1))
 
     def in_parts(self, columns: np.ndarray, products: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the squares (P, V) of columns (V, k) times values (V, k), and their products with the measurement.
