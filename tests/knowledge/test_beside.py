@@ -1,7 +1,7 @@
 """Facts closed beside an ontology give what both give when they are closed together."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Quad, RdfFormat, Triple, parse
 
@@ -71,6 +71,10 @@ def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
 
 @settings(max_examples=25)
 @given(st.lists(st.sampled_from(AXIOMS), unique=True), st.lists(st.sampled_from(FACTS), unique=True, max_size=12))
+@example(
+    ["ex:v rdfs:range xsd:integer .", "ex:I owl:onProperty ex:v ; owl:someValuesFrom xsd:integer ."],
+    ['ex:c ex:v "x" .', *(f"ex:a ex:{p} ex:{o} ." for p in "pq" for o in "abc"), "ex:a ex:r ex:a ."],
+)
 def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
     ontology, facts = triples(axioms), triples(said)
     try:

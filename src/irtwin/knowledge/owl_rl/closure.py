@@ -149,7 +149,8 @@ class Closure:
         for rule, join, arguments in self._program.concluding(conclusion):
             for values in join(self.facts, self.facts, *arguments):
                 premises = self._program.premises(rule, values)
-                if all(self.known[premise] < derived for premise in premises):
+                # what an ontology says of datatypes is applied, and is no fact beside it
+                if all(self.known.get(premise, derived) < derived for premise in premises):
                     yield rule, premises
 
     def _grounds(self, facts: Iterable[Fact]) -> set[Triple]:
