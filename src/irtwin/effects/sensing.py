@@ -28,7 +28,7 @@ from irtwin.signals.motion import Motion
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
 _GAINS = (0.7, 1.4)  # of a meter, the range of the ontology, `effects.ttl`
 _FARTHEST = 0.35  # rad or m, of a zero
-_LAG = 5e-3  # s, of all joints' torque: filters of drives pass 100 Hz and more
+LONGEST_LAG = 5e-3  # s, of all joints' torque: filters of drives pass 100 Hz and more
 _APART = 2.5e-4  # s, of channels: clocks, filters and samples put them so far apart, one standard deviation
 
 
@@ -191,11 +191,11 @@ class TorqueLag(Effect):
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return d."""
-        return (Term("d", "s", spread=_LAG, lowest=0.0, unnamed=_APART),)
+        return (Term("d", "s", spread=LONGEST_LAG, lowest=0.0, unnamed=_APART),)
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, n, 1)."""
-        (late,) = TimeDelay(d=_LAG).samples(robot, motion, predicted)
+        (late,) = TimeDelay(d=LONGEST_LAG).samples(robot, motion, predicted)
         return late[..., None]
 
 

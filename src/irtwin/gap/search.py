@@ -34,7 +34,7 @@ from irtwin.gap.regression.torque_from_power import ThroughPower
 from irtwin.identification.progress import tell
 
 _LOOKS = 3  # at torque: in the last, dry friction turns and torque lags as the others found
-NUISANCES = frozenset({FrictionTurn.id, TorqueLag.id})
+_NUISANCES = frozenset({FrictionTurn.id, TorqueLag.id})
 
 Tried = tuple[Sequence[Effect], Sequence[Effect]]
 """Effects on torque, and on power, that a search tries."""
@@ -145,7 +145,7 @@ class Search:
             torque, floor, refusals = search.torque_causes(tried(search))
             if not (known := search.knowing(torque.finding)):
                 break
-            search = replace(known, unknown=known.unknown | NUISANCES) if look == _LOOKS - 2 else known
+            search = replace(known, unknown=known.unknown | _NUISANCES) if look == _LOOKS - 2 else known
         return search, torque, floor, refusals
 
     def knowing(self, finding: ChannelFinding) -> Search | None:
@@ -166,7 +166,7 @@ class Search:
                 case = case.without_lag(lag)
             else:
                 said.append(f"it lags by {1e3 * lag:.2g} ms, more than filters make")
-                unknown |= {cause.effect}
+                unknown = unknown | {cause.effect}
         tell(f"Trying every effect on torque again, as {' and '.join(said)}")
         return replace(self, case=case.with_friction_near_zero(added(self.case, causes)), unknown=unknown)
 

@@ -12,7 +12,7 @@ from irtwin.document.document import Cutoff
 from irtwin.effects.effect import NOTHING_STATED, Effect, Stated
 from irtwin.effects.friction import FrictionTurn
 from irtwin.effects.prior import Prior
-from irtwin.effects.sensing import OffsetOfRun
+from irtwin.effects.sensing import LONGEST_LAG, OffsetOfRun
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.admission import admit
 from irtwin.gap.data.baseline import baseline
@@ -33,8 +33,6 @@ from irtwin.twin.torque_scale import of_sensor
 from irtwin.twin.twin import Twin
 
 _LONG = 12_000  # samples: at 12,000 a copy of the process neither wins nor costs (a diagnosis of 9 s)
-
-_LONGEST_LAG = 5e-3  # s: filters of drives pass 100 Hz and more
 
 
 @dataclass(frozen=True)
@@ -176,7 +174,7 @@ class Case:
     @property
     def longest_lag(self) -> float:
         """By how much filters make torque lag, and samples where they are longer, s."""
-        return max(_LONGEST_LAG, *(1 / motion.rate for motion in self.with_torque))
+        return max(LONGEST_LAG, *(1 / motion.rate for motion in self.with_torque))
 
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""

@@ -128,9 +128,14 @@ class Posterior:
 
         That the twin's numbers are nearer to what is known of them has no misfit.
         """
+        every = np.arange(len(self.evidence.explained))
+        return self._in_units_of(every, every)
+
+    def _in_units_of(self, like: np.ndarray | int, places: np.ndarray) -> np.ndarray:
+        """Return what some variants explain, (P,), in units of what is left along those that they are `like`."""
         seen = self.evidence
-        known = seen.of_prior / (1 + seen.unnamed)
-        return np.asarray((seen.explained - seen.of_prior) / (seen.rows_that_speak * self.variance) + known)
+        rows, known = (seen.rows_that_speak * self.variance)[like], seen.of_prior[places]
+        return np.asarray((seen.explained[places] - known) / rows + known / (1 + seen.unnamed[like]))
 
     @cached_property
     def _scale(self) -> np.ndarray:
@@ -186,9 +191,7 @@ class Posterior:
         """
         seen = self.evidence
         best = int(places[np.argmax(seen.explained[places])])
-        rows, count = float(seen.rows_that_speak[best] * self.variance[best]), len(seen.information[best])
-        known = seen.of_prior[places]
-        told = (seen.explained[places] - known) / rows + known / (1 + seen.unnamed[best])
+        told, count = self._in_units_of(best, places), len(seen.information[best])
         size = self._sizes(places, np.full(len(places), self._scale[best]))
         left = -np.asarray(self._explaining(told.max() - told, count))
         return self.prior[places] - size + left, -float(self._explaining(told.max(), count))

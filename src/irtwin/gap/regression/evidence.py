@@ -53,11 +53,6 @@ class HypothesisEvidence:
         return np.asarray(np.where(shown, total**2 / np.where(shown, squares, 1.0), self.rows.sum()))
 
     @cached_property
-    def gain(self) -> np.ndarray:
-        """(V,) squares explained, a row that speaks."""
-        return np.asarray(self.explained / self.rows_that_speak)
-
-    @cached_property
     def unnamed(self) -> np.ndarray:
         """(V,) squares that a variant explains where it is as large as any healthy robot may have it."""
         shares = [[term.unnamed / term.spread for term in variant.terms] for variant in self.variants]
