@@ -222,7 +222,7 @@ class _Search:
     def paired(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
         for _ in range(_SWEEPS):
-            pairs = [(a, b) for a, b in combinations(structure, 2) if a[0].joint and _where(a[0]) == _where(b[0])]
+            pairs = [(a, b) for a, b in combinations(structure, 2) if a[0].joint and a[0].joint == b[0].joint]
             for one, other in track(pairs, "two causes of one joint looked for anew"):
                 rest = [each for each in structure if each is not one and each is not other]
                 pair = self.likeliest_pair(rest, noise, one[0])
@@ -258,7 +258,7 @@ class _Search:
         """
         pairs: list[list[Member]] = []
         explained, costs, scales = [], [], []
-        there = [one for one in self.candidates if _where(one) == _where(like)]
+        there = [one for one in self.candidates if one.joint == like.joint]
         alone = self._beside(rest, noise, there)
         firsts = [(hypothesis, alone.variant(place)) for place, hypothesis in enumerate(alone.hypotheses)]
         self.projection(noise).prepare(_columns(firsts))
@@ -355,10 +355,6 @@ def _place(one: Hypothesis) -> tuple[str, str, str | None]:
 
 def _places(structure: Sequence[Member]) -> set[tuple[str, str, str | None]]:
     return {_place(member) for member, _ in structure}
-
-
-def _where(one: Hypothesis) -> tuple[str | None, str]:
-    return one.joint, one.scope
 
 
 def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
