@@ -63,10 +63,10 @@ def found(one: Case, *, power: bool = True):
     tried = [shape for name in TRIED for shape in catalogue()[name].candidates(ROBOT)]
     if not power:
         system = torque_system(stack, one.with_torque, one.grouping, tried, plain.below)
-        return find("torque", one, system, FLOOR.torque, 0)
+        return find("torque", one, system, FLOOR.torque)
     drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
     before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
-    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR, 0)[0]
+    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR)[0]
 
 
 def names(finding) -> list[str]:

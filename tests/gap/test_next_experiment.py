@@ -64,7 +64,7 @@ def channel_of(motions, tried, cause=None, rivals=(), part=1.0):
     none = np.full(2, np.inf)
     steadied = Steadied(system, {}, np.zeros(2), none, np.zeros((2, 2)))
     about = "torque", ROBOT.joint_names, frozenset(m.run for m in motions), system, steadied
-    finding = finding_of(*about, attribution, None, 0)
+    finding = finding_of(*about, attribution, None)
     vars(finding)["closed_squares"] = np.array([part * finding.counted.before for _ in causes])
     return finding, system_of
 

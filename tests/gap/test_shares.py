@@ -49,7 +49,7 @@ def apart(system, attribution):
 
 
 def shared(system, attribution):
-    return shares(closed_squares(apart(system, attribution), seed=0), system.rows, attribution.noise)
+    return shares(closed_squares(apart(system, attribution)), system.rows, attribution.noise)
 
 
 def test_independent_causes_share_by_their_squares():
@@ -96,5 +96,5 @@ def test_what_each_closes_adds_up_to_what_all_close():
     system, attribution = system_of([[1.0, 0.0], [0.6, 0.8]], [1.0, 2.0])
     chosen = [k for cause in attribution.causes for k in cause.columns]
     judged = held_out(system, system.noise_before, attribution.noise, chosen)
-    closed = closed_squares(apart(system, attribution), seed=0)
+    closed = closed_squares(apart(system, attribution))
     assert closed.sum(axis=0) == pytest.approx(judged.before - judged.after)

@@ -165,7 +165,7 @@ def test_what_is_closed_where_friction_turns_counts_by_the_noise_there() -> None
     plain = left_out(system, system.noise_before, (), np.arange(system.groups))
     assert np.all(held_out.before.sum(axis=0) < plain.sum(axis=0))
     np.testing.assert_array_equal(held_out.rows, system.rows)
-    closed = closed_squares(apart, seed=0)
+    closed = closed_squares(apart)
     np.testing.assert_allclose(closed.sum(axis=0), held_out.before - held_out.after, rtol=1e-6)
 
 

@@ -68,7 +68,6 @@ class Diagnosis:
     untestable: tuple[Untestable, ...]
     runs: tuple[str, ...]
     curves: Curves
-    seed: int = 0
     experiment: Experiment | None = None
     planned: Motion | None = None  # of the experiment's programme; each of its runs makes this motion
     twin: Twin | None = None  # with the causes added, fitted to all runs in which it holds
@@ -121,7 +120,7 @@ class Diagnosis:
         causes = writing.folded(causes, findings)
         judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
-        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, self.seed)
+        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of)
         return Document(
             verdict=verdict,
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
@@ -131,7 +130,7 @@ class Diagnosis:
             findings=findings,
             causes=causes,
             not_testable=self.untestable,
-            shrink=apart.shrink(shrink, self.seed),
+            shrink=apart.shrink(shrink),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
             refused=self.refusals.refused or None,
@@ -180,7 +179,7 @@ def diagnose(
     for line in said_of_twin(data_set, twin) if twin else ():
         tell(line)
     tell("Fitting the twin")
-    search = Search(case, frozenset(unknown), seed)
+    search = Search(case, frozenset(unknown))
     plain, differ = search.plain, disturbances(case)
     case, taken = removed(case, search.stack, plain, differ)
     if taken:
@@ -258,7 +257,6 @@ def diagnose(
         locations=tuple(located),
         untestable=lacking,
         runs=tuple(sorted(case.observed)),
-        seed=seed,
         experiment=None if proposal is None else proposal.experiment,
         planned=None if proposal is None or proposal.programme is None else proposal.programme.motions[0],
         curves=drawn(left, located, None if proposal is None else proposal.curve, friction(case, causes, identified)),

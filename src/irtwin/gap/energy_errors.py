@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from irtwin.document.document import Change
+from irtwin.gap.isolation.closing import half_width
 from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.moments import Summed
 from irtwin.signals.motion import Motion
-
-_RESAMPLED = 1000
 
 
 @dataclass(frozen=True)
@@ -27,13 +26,13 @@ class EnergyErrors:
         """Over groups, before and after."""
         return float(self.before.mean()), float(self.after.mean())
 
-    def change(self, seed: int) -> Change:
-        """Return the change, with its 95 % interval over groups."""
-        generator = np.random.default_rng(seed)
-        drawn = [generator.choice(self.after, len(self.after)).mean() for _ in range(_RESAMPLED)]
-        low, high = np.quantile(drawn, [0.025, 0.975])
+    @property
+    def change(self) -> Change:
+        """The change, with its 95 % interval over groups."""
         before, after = self.mean
-        return Change(before=before, after=after, noise_floor=None, interval95_after=(float(low), float(high)))
+        half = half_width(after, self.after, np.ones(len(self.after)))
+        ends = max(after - half, 0.0), after + half
+        return Change(before=before, after=after, noise_floor=None, interval95_after=ends)
 
 
 def energy_errors(

@@ -169,12 +169,12 @@ class DifferingRepeats:
             squares, squares.sum(axis=1) > 0, finding.counted, finding.floor_within, finding.attribution.noise
         )
 
-    def shrink(self, shrink: document.Shrink, seed: int) -> document.Shrink:
+    def shrink(self, shrink: document.Shrink) -> document.Shrink:
         """Return how far the gap shrinks, with what was taken out."""
         if not self.taken:
             return shrink
         changed = [one.name for one in self.channels if one.causes or self._of(one.name)]
-        fraction = fraction_closed(self.channels, changed, seed)
+        fraction = fraction_closed(self.channels, changed)
         return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
 
     def _of(self, channel: str) -> list[Removed]:

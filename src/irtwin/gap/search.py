@@ -48,11 +48,10 @@ def check_observed(system: System) -> None:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for the causes in a case: `unknown` are not known to it; `seed` draws orders of many causes."""
+    """The search for the causes in a case: `unknown` are not known to it."""
 
     case: Case
     unknown: Set[Without] = frozenset()
-    seed: int = 0
 
     @cached_property
     def stack(self) -> Stack:
@@ -172,10 +171,10 @@ class Search:
 
     def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         about = self.below, self.twin.torque, self.before
-        return find_beside_power(self.case, self.stack, tried, *about, self.floor, self.seed, without=without)
+        return find_beside_power(self.case, self.stack, tried, *about, self.floor, without=without)
 
     def _of_torque(self, system: System, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-        first = find("torque", self.case, system, self.floor.torque, self.seed, without)
+        first = find("torque", self.case, system, self.floor.torque, without)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
         return replace(first, signal_floor=left.torque), left
@@ -200,7 +199,7 @@ class Search:
             telling = power_system(*about, tried, explained.logged, TwinPower(*about, explained.logged))
 
         def search(without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-            finding = find("power", case, system, level, self.seed, without, plain, telling)
+            finding = find("power", case, system, level, without, plain, telling)
             of_power = explained_power(self.power_stack, finding, torque, power_of)
             left = floor_left(case, floor, of_power) if finding.causes else floor
             return replace(finding, signal_floor=None if left.power is None else np.array([left.power])), left

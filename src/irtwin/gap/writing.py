@@ -14,8 +14,9 @@ from irtwin.effects.effect import Quantity
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.closing import closed_fraction, half_width
 from irtwin.gap.isolation.finding import ChannelFinding, branches, quantities
-from irtwin.gap.regression.held_out import closed_fraction, held_out, pooled_interval
+from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.screening.screen import acting
 from irtwin.gap.thresholds import Criterion, Matters
 from irtwin.robot.description import Robot
@@ -205,13 +206,12 @@ def shrink(
     floor: Floor,
     energies: EnergyErrors | None,
     ids_of: Mapping[int, str],
-    seed: int,
 ) -> document.Shrink:
     """Return how far the gap shrinks on runs that took no part in the fit; `ids_of` as in `findings`.
 
     What is closed of it together is left out where causes act in a channel whose floor nobody knows.
     """
-    changes = {finding.name: _change(finding, seed) for finding in findings}
+    changes = {finding.name: _change(finding) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
     changed = [one.name for one in findings if one.causes or (torque_too and one.plain is not None)]
     return document.Shrink(
@@ -219,34 +219,33 @@ def shrink(
         noise_floor_from=floor.source,
         torque_rmse=changes.get("torque"),
         power_rmse=changes.get("power"),
-        energy_error_percent=energies.change(seed) if energies else None,
-        closed_fraction=fraction_closed(findings, changed, seed),
+        energy_error_percent=energies.change if energies else None,
+        closed_fraction=fraction_closed(findings, changed),
         by_cause=tuple(
             _by_cause(robot, finding, each, ids_of[id(each)]) for finding in findings for each in finding.causes
         ),
     )
 
 
-def fraction_closed(
-    findings: Sequence[ChannelFinding], changed: Container[str], seed: int
-) -> document.ClosedFraction | None:
+def fraction_closed(findings: Sequence[ChannelFinding], changed: Container[str]) -> document.ClosedFraction | None:
     """Return what closes in the channels that are `changed`, whose floor is known; None as `shrink` leaves it out."""
     with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.name in changed]
     if not with_floor or any(one.floor is None for one in findings if one.causes):
         return None
-    closed = closed_fraction(with_floor, seed)
-    return closed and document.ClosedFraction(value=closed[0], interval95=(closed[1][0], closed[1][1]))
+    closed = closed_fraction(with_floor)
+    return closed and document.ClosedFraction(value=closed[0], interval95=closed[1])
 
 
-def _change(finding: ChannelFinding, seed: int) -> document.Change:
+def _change(finding: ChannelFinding) -> document.Change:
     judged = finding.held_out
-    rows = judged.rows.sum()
-    low, high = pooled_interval(judged.after, judged.rows, seed)
+    squares, rows = judged.after.sum(axis=1), judged.rows.sum(axis=1)
+    after = float(squares.sum() / rows.sum())
+    half = half_width(after, squares, rows)
     return document.Change(
-        before=float(np.sqrt(judged.before.sum() / rows)),
-        after=float(np.sqrt(judged.after.sum() / rows)),
+        before=float(np.sqrt(judged.before.sum() / rows.sum())),
+        after=float(np.sqrt(after)),
         noise_floor=None if finding.floor is None else float(np.sqrt(np.mean(finding.floor**2))),
-        interval95_after=(low, high),
+        interval95_after=(float(np.sqrt(max(after - half, 0.0))), float(np.sqrt(after + half))),
     )
 
 

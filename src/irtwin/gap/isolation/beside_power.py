@@ -33,7 +33,6 @@ def find_beside_power(
     predicted: Torque,
     before: TwinPower,
     floor: Floor,
-    seed: int,
     *,
     without: Set[Without] = frozenset(),
 ) -> tuple[ChannelFinding, Floor]:
@@ -48,7 +47,7 @@ def find_beside_power(
 
     def about(torque: Torque, power: TwinPower, level: Floor) -> ChannelFinding:
         both = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, case.shaken)
-        return _find(case, both, level, seed, without)
+        return _find(case, both, level, without)
 
     first = about(predicted, before, floor)
     if not any(cause.carries_power for cause in first.causes):
@@ -72,7 +71,7 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, without: Set[Without]) -> ChannelFinding:
+def _find(case: Case, equations: JointEquations, floor: Floor, without: Set[Without]) -> ChannelFinding:
     """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
@@ -82,7 +81,7 @@ def _find(case: Case, equations: JointEquations, floor: Floor, seed: int, withou
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), both.noise)
     where = "torque", case.robot.joint_names, case.observed, torque, Steadied.of(case, torque)
-    return finding_of(*where, _of_torque(both, equations), floor.torque, seed, beside=beside)
+    return finding_of(*where, _of_torque(both, equations), floor.torque, beside=beside)
 
 
 def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:

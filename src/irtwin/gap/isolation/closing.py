@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import scipy
 
 from irtwin.gap.regression.held_out import HeldOut
 from irtwin.gap.thresholds import Matters
+
+_MOST = 0.5  # of the whole: a group that has more says by itself what the ratio is
 
 
 @dataclass(frozen=True)
@@ -48,32 +51,54 @@ def closing(
     acting: (G,) whether the causes act in a group at all. Equations count by their mean square over the floor's, those
     that have a gap.
     """
-    before, rows = held_out.before, np.maximum(held_out.rows.sum(axis=0), 1)
-    mean = before.sum(axis=0) / rows
-    level = np.maximum(mean if floor is None else floor**2, np.finfo(float).tiny)
-    least = np.zeros_like(mean) if floor is None else floor**2
-    gap = mean > least
-    above = ((before - least * held_out.rows) / level / rows)[:, gap].sum(axis=1)
-    won = (closed / level / rows)[:, gap].sum(axis=1)
-    value, interval = share(won, above)
-    squares = closed.sum(axis=0) / rows
+    value, interval = share(*_above_floor(closed, held_out, floor))
+    squares = closed.sum(axis=0) / np.maximum(held_out.rows.sum(axis=0), 1)
     where = closed[acting].sum(axis=0) / np.maximum(held_out.rows[acting].sum(axis=0), 1)
     floors = None if floor is None else float(np.sqrt(np.max(np.maximum(where, 0.0) / floor**2)))
     size = float((squares / (noise if floor is None else floor) ** 2).sum())
     return Closing(value, interval, floors, size)
 
 
-def share(part: np.ndarray, whole: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Return which share of the whole a part is, each a sum over groups (G,), at most 1, with its 95 % interval.
+def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]]) -> tuple[float, tuple[float, float]] | None:
+    """Return the fraction of the gap above the floor that is closed, with its 95 % interval over groups.
 
-    The interval is Student's, of a ratio of sums (linearised): groups are few, and of groups drawn anew some sets have
-    no whole. It has no width where there is one group, or no whole.
+    parts: each channel's groups and noise floor (g,). None without a gap.
     """
-    total, groups = float(whole.sum()), len(whole)
-    if total <= 0:
+    each = [_above_floor(one.before - one.after, one, floor) for one, floor in parts]
+    closed, above = (np.concatenate(own) for own in zip(*each, strict=True))
+    return share(closed, above) if above.sum() > 0 else None
+
+
+def _above_floor(closed: np.ndarray, held_out: HeldOut, floor: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is closed and what lies above the floor in each group, (G,): a sum over equations that have a gap."""
+    before, rows = held_out.before, np.maximum(held_out.rows.sum(axis=0), 1)
+    mean = before.sum(axis=0) / rows
+    level = np.maximum(mean if floor is None else floor**2, np.finfo(float).tiny)
+    least = np.zeros_like(mean) if floor is None else floor**2
+    gap = mean > least
+    above = (before - least * held_out.rows) / level / rows
+    return (closed / level / rows)[:, gap].sum(axis=1), above[:, gap].sum(axis=1)
+
+
+def share(part: np.ndarray, whole: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Return which share of the whole a part is, each a sum over groups (G,), at most 1, with its 95 % interval."""
+    if whole.sum() <= 0:
         return 0.0, (0.0, 0.0)
-    value, half = min(float(part.sum()) / total, 1.0), 0.0
-    if groups > 1:
-        error = float(np.sqrt(np.sum((part - value * whole) ** 2) * groups / (groups - 1))) / total
-        half = float(scipy.special.stdtrit(groups - 1, 0.975)) * error
+    value = min(float(part.sum() / whole.sum()), 1.0)
+    half = half_width(value, part, whole)
     return value, (value - half, min(value + half, 1.0))
+
+
+def half_width(value: float, part: np.ndarray, whole: np.ndarray) -> float:
+    """Return half of the 95 % interval of a ratio of two sums over groups (G,), 0 where there is one group.
+
+    It is Student's, linearised: groups are few, and of groups drawn anew some sets have no whole. What a group misses
+    counts as if the ratio had been found without it (MacKinnon and White 1985).
+    """
+    groups = len(whole)
+    if groups < 2:
+        return 0.0
+    own = np.clip(whole / whole.sum(), 0.0, _MOST)
+    missed = (part - value * whole) / (1 - own)
+    error = float(np.sqrt(np.sum(missed**2) * (groups - 1) / groups) / whole.sum())
+    return float(scipy.special.stdtrit(groups - 1, 0.975)) * error

@@ -39,7 +39,7 @@ class ChannelFinding:
     groups left out, `counted` the same as `apart` counts it; `signal_floor` (g,) N m or W, of the measured signal, None
     where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is closed
     theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where `system`
-    stands on torque that causes explain. `seed` draws orders of many causes.
+    stands on torque that causes explain.
     """
 
     name: str
@@ -55,7 +55,6 @@ class ChannelFinding:
     estimate: Estimate
     part: float = 1.0
     plain: System | None = None
-    seed: int = 0
 
     @property
     def floor(self) -> np.ndarray | None:
@@ -70,7 +69,7 @@ class ChannelFinding:
     @cached_property
     def closed_squares(self) -> np.ndarray:
         """(C, G, g) what each cause closes of the squares of each group left out and equation."""
-        return closed_squares(self.apart, self.seed)
+        return closed_squares(self.apart)
 
     @property
     def causes(self) -> tuple[FoundCause, ...]:
@@ -152,7 +151,6 @@ def find(
     case: Case,
     system: System,
     floor: np.ndarray | None,
-    seed: int,
     without: Set[Without] = frozenset(),
     plain: System | None = None,
     telling: System | None = None,
@@ -168,7 +166,7 @@ def find(
     else:
         attribution = attributed(case, telling, Steadied.of(case, telling), floor, without)
         attribution = replace(attribution, noise=_left(system, attribution))
-    return finding_of(name, places, case.observed, system, steadied, attribution, floor, seed, plain)
+    return finding_of(name, places, case.observed, system, steadied, attribution, floor, plain)
 
 
 def finding_of(
@@ -179,7 +177,6 @@ def finding_of(
     steadied: Steadied,
     attribution: Attribution,
     floor: np.ndarray | None,
-    seed: int,
     plain: System | None = None,
     beside: BesidePower | None = None,
 ) -> ChannelFinding:
@@ -204,7 +201,6 @@ def finding_of(
         floor,
         fitted,
         plain=plain,
-        seed=seed,
     )
 
 
