@@ -116,6 +116,39 @@ def test_two_effects_of_a_joint_are_found_though_another_explains_most_by_itself
     assert {cause.effect for cause in found.causes} == {"coulomb", "viscous"}
 
 
+def changed_frictions(joint):
+    """A joint whose viscous friction changed, and whose dry friction turns more softly than its twin's in all runs."""
+    generator, blocks = np.random.default_rng(3), []
+    for run in range(RUNS):
+        phase, fastest = 2 * np.pi * generator.random(), generator.uniform(0.3, 1.0)
+        speed = fastest * np.sin(np.linspace(0, 20, ROWS) + phase)
+        sign, softly = np.sign(speed), np.arctan(speed / 0.05) * 2 / np.pi
+        columns = np.column_stack([sign, speed, sign * np.abs(speed) ** 0.5, softly - sign])
+        measured = columns @ [10.0, 2.0 + 3.0 * (run >= RUNS // 2), 0.0, 2.0] + NOISE * generator.standard_normal(ROWS)
+        factor = triangle(np.column_stack([np.ones((ROWS, 1)), sign, speed, columns, measured]))
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+    effects = {"coulomb": EFFECT, "viscous": EFFECT, "nonlinear": EFFECT, "turn": FrictionTurn()}
+    columns = tuple(
+        CandidateColumn(one, k, Term(name, "N m", spread=5.0)) for k, (name, one) in enumerate(effects.items())
+    )
+    known = tuple((EFFECT, Term(name, "N m", spread=5.0)) for name in ("constant", "dry", "viscous"))
+    observed = np.arange(RUNS) >= RUNS // 2
+    system = System(known, columns, np.ones((1, 7), dtype=bool), tuple(blocks), np.arange(RUNS), observed)
+    scopes = [(CHANGED, system.changed)] * 3 + [(MISSING, system.base)]
+    return system, [
+        Hypothesis(name, joint, scope, (Variant(effects[name], (first + k,), (columns[k].term,)),))
+        for k, (name, (scope, first)) in enumerate(zip(effects, scopes, strict=True))
+    ]
+
+
+def test_a_change_and_a_nuisance_are_looked_for_together():
+    system, candidates = changed_frictions("joint_1")
+    search = _Search(system, candidates, HypothesisPrior.of(candidates), DEFAULT.criterion, np.array([NOISE]))
+    wrong = [(one, one.variants[0]) for one in candidates if one.effect in ("coulomb", "nonlinear")]
+    right, _ = search.paired(wrong, search.left(wrong, system.noise_before))
+    assert {one.effect for one, _ in right} == {"viscous", "turn"}
+
+
 def test_of_two_shapes_that_one_is_taken_which_leaves_less():
     mix = [[0.98, 0.2], [1.0, 0.0]]
     system, (near, true) = system_of(mix, [2.0, 0.0])
