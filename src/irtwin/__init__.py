@@ -14,42 +14,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.2.0"
-__all__ = [
-    "DataSet",
-    "Diagnosis",
-    "Location",
-    "Robot",
-    "Twin",
-    "adopt",
-    "ask",
-    "catalogue",
-    "check_log",
-    "diagnose",
-    "explain",
-    "export",
-    "identify",
-    "import_logs",
-    "optimise",
-    "predict",
-    "read_data_set",
-    "read_urdf",
-    "run",
-]
-
 if TYPE_CHECKING:
-    from irtwin.asking import ask, explain, export
-    from irtwin.bring.bring import import_logs
-    from irtwin.diagnosing import diagnose
-    from irtwin.effects.catalogue import catalogue
-    from irtwin.gap.diagnosis import Diagnosis
-    from irtwin.location import Location
-    from irtwin.modelling import check_log, identify, predict
-    from irtwin.plans import optimise
-    from irtwin.robot.description import Robot
-    from irtwin.robot.urdf import read_urdf
-    from irtwin.signals.log import DataSet, read_data_set
-    from irtwin.twin.twin import Twin
-    from irtwin.workflow import adopt, run
+    from irtwin.asking import ask as ask
+    from irtwin.asking import explain as explain
+    from irtwin.asking import export as export
+    from irtwin.bring.bring import import_logs as import_logs
+    from irtwin.diagnosing import diagnose as diagnose
+    from irtwin.effects.catalogue import catalogue as catalogue
+    from irtwin.gap.diagnosis import Diagnosis as Diagnosis
+    from irtwin.location import Location as Location
+    from irtwin.modelling import check_log as check_log
+    from irtwin.modelling import identify as identify
+    from irtwin.modelling import predict as predict
+    from irtwin.plans import optimise as optimise
+    from irtwin.robot.description import Robot as Robot
+    from irtwin.robot.urdf import read_urdf as read_urdf
+    from irtwin.signals.log import DataSet as DataSet
+    from irtwin.signals.log import read_data_set as read_data_set
+    from irtwin.twin.twin import Twin as Twin
+    from irtwin.workflow import adopt as adopt
+    from irtwin.workflow import run as run
 
 _MODULES = {
     "DataSet": "signals.log",
@@ -72,6 +56,7 @@ _MODULES = {
     "read_urdf": "robot.urdf",
     "run": "workflow",
 }
+__all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
