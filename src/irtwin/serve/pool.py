@@ -13,8 +13,8 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
-from irtwin.knowledge.store.linked import remove_left_behind
 from irtwin.knowledge.store.readable import NOT_READABLE
+from irtwin.knowledge.store.snapshot import remove_left_behind
 from irtwin.location import Location
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.shares import Displaced

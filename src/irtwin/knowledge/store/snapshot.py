@@ -11,22 +11,26 @@ A writer that goes through many transactions before the graph is whole again kee
 
 from __future__ import annotations
 
+import os
+import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Self, TypeVar
 
 from irtwin.errors import InputError, WorkspaceFault
 from irtwin.knowledge.store.damage import check_files, damaged
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.store.linked import found, linked, published, remove_left_behind
+from irtwin.storage import files
 
 OLDEST = 0.5  # s; a view is not older than this when it answers
 _PATIENCE = 5.0  # s after which files that nobody changed, and that cannot be read, are damaged
 _MOST_PATIENCE = 20.0  # s that a writer may go on changing the files while they are opened
 _NO_DATA = ("LOG", "LOCK")
 _WRITTEN_ON = ("MANIFEST-*", "*.log")  # the others are complete when they get their names
+_PREFIX = ".view-"  # of a folder of links beside the graph's
+_PUBLISHED = f"{_PREFIX}of-all-"
 
 Stamp = tuple[tuple[str, int, int], ...]
 T = TypeVar("T")
@@ -46,8 +50,21 @@ def kept(folder: Path) -> Iterator[None]:
 
     Where no links can be made they see each transaction.
     """
-    with view(folder) as copy, nullcontext() if copy is None else published(copy):
-        yield
+    with view(folder) as copy:
+        if copy is None:
+            yield
+            return
+        name = copy.with_name(copy.name.replace(_PREFIX, _PUBLISHED, 1))
+        copy.rename(name)
+        try:
+            yield
+        finally:
+            name.rename(copy)
+
+
+def remove_left_behind(folder: Path) -> None:
+    """Remove the links that killed processes left beside a graph's folder."""
+    files.remove_left_behind(folder.parent, _PREFIX)
 
 
 class Snapshot:
@@ -81,7 +98,8 @@ class Snapshot:
 
     def _source(self) -> Path:
         """Return the folder that is to be seen: one that a writer keeps for readers, else the graph's own."""
-        return found(self._folder) or self._folder
+        published = self._folder.parent.glob(f"{_PUBLISHED}*")
+        return next(filter(files.is_locked, published), self._folder)  # else its process was killed
 
     def _state(self) -> tuple[Path, Stamp]:
         return (source := self._source()), _stamp(source)
@@ -98,10 +116,24 @@ class Snapshot:
 
 
 def _links(source: Path, held: ExitStack, copied: tuple[str, ...] = ()) -> Path | None:
-    """Return a folder of links to a store's files; None where none can be made."""
+    """Return a folder of links to a store's files; None where none can be made.
+
+    What is linked stays when its owner removes it, as in RocksDB's checkpoints. Files whose names match one of the
+    patterns `copied` are copied, as they will be written on.
+    """
     try:
-        return held.enter_context(linked(source, _NO_DATA, copied))
-    except FileNotFoundError:
+        with ExitStack() as made:
+            view = made.enter_context(files.folder_in_use(source.parent, _PREFIX))
+            for file in source.iterdir():
+                if file.name.startswith(_NO_DATA):
+                    continue
+                if any(map(file.match, copied)):
+                    shutil.copyfile(file, view / file.name)
+                else:
+                    os.link(file, view / file.name)
+            held.enter_context(made.pop_all())
+        return view
+    except FileNotFoundError:  # a file went meanwhile
         raise
     except (OSError, WorkspaceFault):  # read-only, full, another user's, or without links
         return None
