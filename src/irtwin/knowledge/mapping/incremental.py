@@ -61,13 +61,14 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
         planned(engine, documents, graph.base, seconds) as (connection, statements),
         RememberedRows(file) as remembered,
     ):
-        made_by = _digest(
+        parts = (
             metadata.version("irtwin"),
             schema_version(connection),
             graph.base,
             *(path.read_text(encoding="utf-8") for path in documents),
             *(statement.sql for statement in statements),
         )
+        made_by = hashlib.sha256("\0".join(parts).encode()).hexdigest()
         current = next((row["version"] for row in graph.query(_ASK_VERSION)), "")
         version = f"{made_by}.{uuid.uuid4().hex}"
         if current == remembered.version and current.startswith(made_by):
@@ -158,10 +159,6 @@ def _row_hash(row: Row) -> bytes:
 def _hashes(texts: Iterable[str]) -> npt.NDArray[np.uint64]:
     digests = (hashlib.blake2b(text.encode(), digest_size=8).digest() for text in texts)
     return np.frombuffer(b"".join(digests), np.uint64)
-
-
-def _digest(*parts: str) -> str:
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 def _version(name: str) -> Quad:

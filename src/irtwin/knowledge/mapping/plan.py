@@ -95,8 +95,11 @@ def plan(connection: Connection, document: MappingDocument, base_iri: str) -> It
         for item in triples_map.properties:
             for join in item.objects:
                 if isinstance(join, Join) and join.conditions:
-                    sides = select(child=triples_map.table, parent=maps[join.parent].table)
-                    yield _joined(sides, triples_map, item, join, maps[join.parent].subject)
+                    parent = maps[join.parent]
+                    sides = select(child=triples_map.table, parent=parent.table)
+                    sides.join(join)
+                    objects = (sides.maker(parent.subject, "parent"),)
+                    yield _statement(sides, triples_map, [_property(sides, triples_map, item, objects)])
 
 
 class _Select:
@@ -172,15 +175,6 @@ def _plain(select: _Select, triples_map: TriplesMap, document: MappingDocument) 
         if objects:
             properties.append(_property(select, triples_map, item, select.makers(objects)))
     return _statement(select, triples_map, properties)
-
-
-def _joined(
-    select: _Select, triples_map: TriplesMap, item: PredicateObjectMap, join: Join, parent: TermMap
-) -> Statement:
-    """The statement of one join: the parent's subjects as objects."""
-    select.join(join)
-    planned = _property(select, triples_map, item, (select.maker(parent, "parent"),))
-    return _statement(select, triples_map, [planned])
 
 
 def _property(

@@ -88,7 +88,7 @@ class _Reader:
             where=where,
             table=self.logical_table(node, where),
             subject=subject,
-            classes=self.classes(subject_node, where),
+            classes=tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.values(subject_node, "class")),
             graphs=self.graphs(subject_node, where),
             properties=tuple(
                 self.predicate_object_map(item, where) for item in self.graph.values(node, "predicateObjectMap")
@@ -116,9 +116,6 @@ class _Reader:
             self.fault(where, f"has {len(maps)} subject maps; give one rr:subjectMap or rr:subject")
         allowed = (TermType.IRI, TermType.BLANK_NODE)
         return maps[0], self.term_map(maps[0], f"{where}, subject map", allowed, extra="class graph graphMap")
-
-    def classes(self, node: Node, where: str) -> tuple[NamedNode, ...]:
-        return tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.values(node, "class"))
 
     def graphs(self, node: Node, where: str) -> tuple[TermMap, ...]:
         return self.iri_maps(node, "graph", f"{where}, graph map")

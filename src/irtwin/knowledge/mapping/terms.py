@@ -86,7 +86,7 @@ def _template_text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
             if value is None:
                 return None
             lexical = part.natural(value)[0]
-            result += _RESERVED.sub(_percent_encoded, lexical) if encoded else lexical
+            result += _RESERVED.sub(lambda match: quote(match[0], safe=""), lexical) if encoded else lexical
         return result, STRING
 
     return text
@@ -105,10 +105,6 @@ def values_in(iri: str, template: Template, base_iri: str) -> dict[str, str] | N
     fits = re.fullmatch(form, iri)
     names = [part.name for part in parts if isinstance(part, Identifier)]
     return None if fits is None else dict(zip(names, map(unquote, fits.groups()), strict=True))
-
-
-def _percent_encoded(match: re.Match[str]) -> str:
-    return quote(match[0], safe="")
 
 
 def _of_text(term_map: TermMap, base_iri: str) -> Callable[[str, NamedNode], Term]:

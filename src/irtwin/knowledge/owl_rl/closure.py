@@ -94,11 +94,8 @@ class Closure:
         other = copy.copy(self)
         other.terms, other.facts = self.terms.copy(), self.facts.copy((None,))
         other.known, other._groups = dict(self.known), copy.deepcopy(self._groups)
-        other._named_values, other._triples, other._given = (
-            set(self._named_values),
-            set(self._triples),
-            set(self._given),
-        )
+        other._named_values, other._triples = set(self._named_values), set(self._triples)
+        other._given = set(self._given)
         return other
 
     def inferred(self) -> Iterator[Triple]:
@@ -299,7 +296,7 @@ class Closure:
 
     def _use(self, number: Number) -> str:
         """Return a given triple, as people write it, whose object has the number."""
-        return " ".join(map(self._name, next(fact for fact in self._given if fact[2] == number)))
+        return self.in_words(next(fact for fact in self._given if fact[2] == number))
 
     def iri(self, number: Number) -> str:
         """Return the IRI that has a number, or nothing where it is of a literal or blank node."""

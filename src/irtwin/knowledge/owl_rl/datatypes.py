@@ -83,11 +83,6 @@ def is_datatype(iri: str) -> bool:
     return iri in _READERS or iri in _OTHERS
 
 
-def names() -> set[str]:
-    """Return the IRIs of all datatypes whose values are known here."""
-    return {*_READERS, *_OTHERS}
-
-
 def _datatypes_of(space: str, content: Hashable) -> Iterator[str]:
     yield RDFS + "Literal"
     if isinstance(content, Decimal):

@@ -23,7 +23,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import AnswerTable
 from irtwin.knowledge.vocabulary import ID, IRT, PREFIXES
-from irtwin.resources import MOST_BYTES, Files, Resources, shipped
+from irtwin.resources import MOST_BYTES, Resources, shipped
 
 _HEADER = re.compile(r"^# (title|question|theme|of|concluded): (.+)$", re.MULTILINE)
 THEMES = ("robot", "run", "joint", "energy", "ledger", "twin", "gap", "provenance", "fleet")
@@ -48,14 +48,10 @@ class NamedQuery:
     text: str
 
 
+@lru_cache(maxsize=16)
 def named_questions(resources: Resources | None = None) -> Mapping[str, NamedQuery]:
     """Return the questions that have a name, in the order of their themes and names; those that ship if None."""
-    return _questions((resources or shipped()).of("questions"))
-
-
-@lru_cache(maxsize=16)
-def _questions(files: Files) -> Mapping[str, NamedQuery]:
-    questions = [read_question(file.path) for file in files]
+    questions = [read_question(file.path) for file in (resources or shipped()).of("questions")]
     questions.sort(key=lambda question: (THEMES.index(question.theme), question.name))
     return {question.name: question for question in questions}
 

@@ -9,19 +9,15 @@ from irtwin.knowledge.rules import shacl, swrl
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.shacl.shapes import Shapes
 from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.resources import Files, Resources
+from irtwin.resources import Resources
 
 _SWRL = ".swrl.ttl"
 
 
+@lru_cache(maxsize=16)
 def all_rules(resources: Resources) -> tuple[Rule, ...]:
     """Return the rules that hold for a workspace."""
-    return _rules(resources.of("rules"))
-
-
-@lru_cache(maxsize=16)
-def _rules(files: Files) -> tuple[Rule, ...]:
-    return tuple(rule for file in files for rule in read_rules(file.path))
+    return tuple(rule for file in resources.of("rules") for rule in read_rules(file.path))
 
 
 def read_rules(file: Path) -> tuple[Rule, ...]:

@@ -8,8 +8,8 @@ ask for the absence of what rules of a lower order conclude, and for that alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from decimal import Decimal
 from itertools import groupby
+from operator import attrgetter
 from typing import cast
 
 from pyoxigraph import QueryTriples, Store, Triple
@@ -35,7 +35,8 @@ def conclusions(
     store = Store()
     store.extend(in_graph(triples))
     made: dict[str, set[Triple]] = {}
-    for _, turn in groupby(sorted(rules, key=_order), key=_order):
+    order = attrgetter("order")
+    for _, turn in groupby(sorted(rules, key=order), key=order):
         _run(store, tuple(turn), made, close)
     return made
 
@@ -68,7 +69,3 @@ def _construct(store: Store, rule: Rule) -> set[Triple]:
         return set(cast(QueryTriples, store.query(rule.construct, prefixes=PREFIXES)))
     except SyntaxError as error:
         raise InputError(f"the {rule.language} rule {rule.label!r} is not SPARQL: {error}") from error
-
-
-def _order(rule: Rule) -> tuple[Decimal, Decimal]:
-    return rule.order

@@ -29,12 +29,7 @@ from irtwin.knowledge.store.changes import DERIVED_FROM, nodes_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.knowledge.vocabulary import (
-    GRAPH_INFERRED,
-    GRAPH_REASONED,
-    GRAPH_VALIDATION,
-    shorten,
-)
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_REASONED, GRAPH_VALIDATION, shorten
 from irtwin.resources import Files
 
 Results = Iterator[tuple[rdflib.term.Node, rdflib.Graph]]  # with what is said of each

@@ -28,7 +28,9 @@ def told(folder: Path | None) -> Iterator[None]:
         if folder is None:
             raise
         if any(text in reason for text in _FULL):
-            raise full(folder, reason) from error
+            raise WorkspaceFault(
+                f"{folder}: the disk is full ({reason[:160]}); free some space and try again; nothing is lost"
+            ) from error
         if "lock" in reason.lower() and "LOCK" in reason:
             raise WorkspaceFault(f"{folder}: the graph cannot be opened, as it is open already ({reason})") from error
         if "Corruption" in reason or "IO error" in reason:
@@ -61,11 +63,4 @@ def damaged(folder: Path, reason: str) -> str:
     return (
         f"{folder}: the graph is damaged ({reason[:160]}); what the database holds is not lost: "
         f"`irtwin workspace repair --workspace {folder.parent}` rebuilds the graph from it"
-    )
-
-
-def full(folder: Path, reason: str) -> WorkspaceFault:
-    """Return the error of a disk that takes no more."""
-    return WorkspaceFault(
-        f"{folder}: the disk is full ({reason[:160]}); free some space and try again; nothing is lost"
     )

@@ -115,9 +115,6 @@ class KnowledgeGraph:
         """Return the IRI of an individual by its name below the base, \"robot/UR10\"; a whole IRI stays as it is."""
         return name if "://" in name or name.startswith("urn:") else self.base + name
 
-    def _term(self, value: str | Literal) -> str | Literal:
-        return self.iri(value) if isinstance(value, str) else value
-
     @property
     def has_ontology(self) -> bool:
         """Whether the ontology's graph is made of the modules and of the tariff that hold for the workspace now."""
@@ -261,7 +258,8 @@ class KnowledgeGraph:
         `bindings` gives variables the IRI that they stand for, whole or below the base. The usual prefixes need no
         PREFIX. InputError where the text is no such query, asks another server, or has too many answers.
         """
-        text = bound(text, {name: self._term(one) for name, one in (bindings or {}).items()})
+        given = (bindings or {}).items()
+        text = bound(text, {name: self.iri(one) if isinstance(one, str) else one for name, one in given})
         answers = self.answers
         kept = answers.get(text)
         if kept is None:

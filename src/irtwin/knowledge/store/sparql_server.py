@@ -87,14 +87,13 @@ class SparqlServer:
         triples = (quad.triple for quad in parse(response, RdfFormat.N_TRIPLES))
         return cast(QueryTriples, triples)  # an iterator, which is all that one makes of those
 
-    def update(self, text: str, *, base_iri: str | None = None, prefixes: Mapping[str, str] | None = None) -> None:
-        """Change the server's graphs, in the one transaction that it makes of a request."""
-        self._post(self.update_url, "update", _with_prologue(text, base_iri, prefixes), _UPDATE, "*/*").read()
+    def update(self, text: str) -> None:
+        """Do an update that irtwin wrote, in the one transaction that the server makes of a request.
 
-    def change(self, text: str) -> None:
-        """Do an update that irtwin wrote. Raises ServerFault where the server does not know SPARQL 1.1 well enough."""
+        Raises ServerFault where the server does not know SPARQL 1.1 well enough.
+        """
         try:
-            self.update(text)
+            self._post(self.update_url, "update", text, _UPDATE, "*/*").read()
         except SyntaxError as error:
             raise ServerFault(
                 f"{self.shown}: the server takes no SPARQL 1.1 Update on its default graph and named ones ({error}); "

@@ -126,7 +126,7 @@ class UnionStore:
 
     def replace(self, contents: dict[str, set[Triple]]) -> None:
         """Make triples the whole content of named graphs, in one transaction."""
-        self._write(";\n".join(_replacement(name, triples) for name, triples in contents.items()))
+        self._store.update(";\n".join(_replacement(name, triples) for name, triples in contents.items()))
 
     def exchange(self, taken: set[Quad], given: set[Quad]) -> None:
         """Take quads out of their named graphs and put others in, none of both, in one transaction."""
@@ -138,17 +138,10 @@ class UnionStore:
         elif taken or given:
             triples, new = ({quad.triple for quad in quads} for quads in (taken, given))
             lost = triples - new - {quad.triple for quad in self.holding(triples) if quad not in taken}
-            self._write(
+            self._store.update(
                 f"DELETE DATA {{ {_triple_data(lost)}\n{_quad_data(taken)} }} ;\n"
                 f"INSERT DATA {{ {_triple_data(new)}\n{_quad_data(given)} }}"
             )
-
-    def _write(self, text: str) -> None:
-        """Do an update of ours."""
-        if isinstance(self._store, SparqlServer):
-            self._store.change(text)
-        else:
-            self._store.update(text)
 
     def flush(self) -> None:
         """Put what was written into the store's files: who opens them to read replays the store's log."""

@@ -6,7 +6,8 @@ Where USING is to stand, the parser tells: at a place where it parses, and where
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import islice
 
 from pyoxigraph import NamedNode
 
@@ -61,11 +62,7 @@ def _pattern(text: str, place: int, base: str | None) -> str:
     start = place + len("WHERE")
     prologue = text[: after_prologue(text)]
     ends = (match.end() for match in re.compile("}").finditer(text, start))
-    for end in _first(ends):
+    for end in islice(ends, MOST_PLACES):
         if is_update(f"{prologue}DELETE WHERE {text[start:end]}", base):
             return text[start:end]
     raise InputError("a DELETE WHERE is too long to be given the graphs of the request: write DELETE { } WHERE { }")
-
-
-def _first(ends: Iterator[int]) -> Iterator[int]:
-    return (end for end, _ in zip(ends, range(MOST_PLACES), strict=False))
