@@ -17,10 +17,10 @@ from sqlalchemy.orm import Session
 
 from irtwin.knowledge.vocabulary import GRAPH_SOURCE, IRT, XSD
 from irtwin.storage import energy_schema, schema
-from irtwin.storage import gap_schema as gap
 from irtwin.storage import structure_schema as structure
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
+from irtwin.storage.gap_schema import CLASSES, GapDiagnosis
 from irtwin.storage.schema import Base
 
 SOFTWARE = "irtwin 0.1.0"
@@ -404,7 +404,7 @@ def _diagnoses() -> Iterator[Base]:
     yield from _cause("Arm_A", 1, "coulomb_friction", "j2", "changed", 0.9, ("Fc", 0.8, "N m", 0.4, 1.2))
     yield from _cause("Arm_A", 2, "viscous_friction", "j1", "changed", 0.6, ("Fv", 0.1, "N m s/rad", -0.1, 0.3))
     of = {"diagnosis_id": "Arm_A.d1", "activity_id": "diagnosis.Arm_A"}
-    yield gap.GapLocation(
+    yield CLASSES["gap_location"](
         **of,
         location_id="torque@j2:low_speed",
         robot_id="Arm_A",
@@ -416,43 +416,45 @@ def _diagnoses() -> Iterator[Base]:
         share=0.7,
         **_SURE,
     )
-    yield gap.GapLocation(**of, **_SURE, location_id="power", robot_id="Arm_A", rank=2, channel="power", share=0.2)
-    yield gap.GapShrinkage(**of, closed_fraction=0.8, lower=0.7, upper=0.9)
-    yield gap.GapChange(
+    yield CLASSES["gap_location"](
+        **of, **_SURE, location_id="power", robot_id="Arm_A", rank=2, channel="power", share=0.2
+    )
+    yield CLASSES["gap_shrinkage"](**of, closed_fraction=0.8, lower=0.7, upper=0.9)
+    yield CLASSES["gap_change"](
         **of, measure="torque_rmse", part="together", place="all", before=1.0, after=0.4, noise_floor=0.3, lower=0.35,
         upper=0.45, unit="N m",
     )  # fmt: skip
-    yield gap.GapChange(
+    yield CLASSES["gap_change"](
         **of, measure="torque_rmse", part="alone", place="coulomb_friction@j2", cause_id="coulomb_friction@j2",
         before=1.0, after=0.6, unit="N m",
     )  # fmt: skip
-    yield gap.GapNotTestable(**of, number=1, effect="payload", why="no run carries a load")
-    yield gap.GapRefused(
+    yield CLASSES["gap_not_testable"](**of, number=1, effect="payload", why="no run carries a load")
+    yield CLASSES["gap_refused"](
         **of, number=1, robot_id="Arm_A", effect="torque_constant_error", joint="j2", why="g = 2.1 (2 to 2.2)"
     )
-    yield gap.GapRefused(**of, number=2, robot_id="Arm_A", effect="payload", why="m = -9 kg (-9.5 to -8.5)")
+    yield CLASSES["gap_refused"](**of, number=2, robot_id="Arm_A", effect="payload", why="m = -9 kg (-9.5 to -8.5)")
     yield from _diagnosis("Arm_B", "ambiguous", 5.0)
     of = {"diagnosis_id": "Arm_B.d1", "activity_id": "diagnosis.Arm_B"}
     yield from _cause("Arm_B", 1, "payload", None, "missing", 0.5, ("m", 1.5, "kg", 1.3, 1.7))
     yield from _cause("Arm_B", 2, "torque_constant_error", "j2", "missing", 0.4, ("g", 0.1, "1", 0.05, 0.15))
-    yield gap.GapCauseRival(**of, cause_id="payload", effect="torque_constant_error")
-    yield gap.GapCauseRival(**of, cause_id="torque_constant_error@j2", effect="payload")
-    yield gap.GapCauseCompetitor(**of, cause_id="payload", effect="torque_constant_error", probability=0.4)
-    yield gap.GapCauseCompetitor(**of, cause_id="torque_constant_error@j2", effect="payload", probability=0.5)
-    yield gap.GapExperiment(
+    yield CLASSES["gap_cause_rival"](**of, cause_id="payload", effect="torque_constant_error")
+    yield CLASSES["gap_cause_rival"](**of, cause_id="torque_constant_error@j2", effect="payload")
+    yield CLASSES["gap_cause_competitor"](**of, cause_id="payload", effect="torque_constant_error", probability=0.4)
+    yield CLASSES["gap_cause_competitor"](**of, cause_id="torque_constant_error@j2", effect="payload", probability=0.5)
+    yield CLASSES["gap_experiment"](
         **of, purpose="tell payload from torque_constant_error", separation_now=1.5, expected_separation=8.0, enough=5.0
     )
-    yield gap.GapExperimentEffect(**of, effect="payload")
-    yield gap.GapExperimentEffect(**of, effect="torque_constant_error")
-    yield gap.GapExperimentInstruction(**of, number=1, text="lift a known mass")
-    yield gap.GapExperimentInstruction(**of, number=2, text="hang another on joint 2")
+    yield CLASSES["gap_experiment_effect"](**of, effect="payload")
+    yield CLASSES["gap_experiment_effect"](**of, effect="torque_constant_error")
+    yield CLASSES["gap_experiment_instruction"](**of, number=1, text="lift a known mass")
+    yield CLASSES["gap_experiment_instruction"](**of, number=2, text="hang another on joint 2")
     yield from _diagnosis("Arm_C", "unexplained", None)
 
 
 def _diagnosis(robot: str, verdict: str, error: float | None) -> Iterator[Base]:
     made = f"diagnosis.{robot}"
     yield _activity(made, robot, "diagnosis", "2026-03-06 12:00")
-    yield gap.GapDiagnosis(
+    yield GapDiagnosis(
         diagnosis_id=f"{robot}.d1", robot_id=robot, verdict=verdict, created=_moment("2026-03-06 12:00"),
         energy_error_percent=error, noise_floor_from="repeats", cutoff_hz=12.5, cutoff_why="stated",
         file=f"diagnoses/{robot}.d1.json", sha256="2" * 64,
@@ -471,14 +473,14 @@ def _cause(
 ) -> Iterator[Base]:
     cause_id = f"{effect}@{joint}" if joint else effect
     of: dict[str, Any] = {"diagnosis_id": f"{robot}.d1", "cause_id": cause_id, "activity_id": f"diagnosis.{robot}"}
-    yield gap.GapCause(
+    yield CLASSES["gap_cause"](
         **of, robot_id=robot, rank=rank, effect=effect, scope=scope, confidence=confidence, channel="torque",
         closed_where_it_acts=0.8, gain=2.0, log_odds=5.0,
     )  # fmt: skip
     if joint is not None:
-        yield gap.GapCauseJoint(**of, robot_id=robot, joint=joint)
+        yield CLASSES["gap_cause_joint"](**of, robot_id=robot, joint=joint)
     name, value, unit, lower, upper = parameter
-    yield gap.GapCauseParameter(
+    yield CLASSES["gap_cause_parameter"](
         **of, robot_id=robot, number=1, joint=joint, name=name, value=value, unit=unit, lower=lower, upper=upper
     )
 

@@ -19,8 +19,9 @@ from irtwin.providers.names import robot_iri, run_iri
 from irtwin.providers.records import ingest
 from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet
-from irtwin.storage import gap_schema, schema
+from irtwin.storage import schema
 from irtwin.storage.database import Workspace
+from irtwin.storage.gap_schema import CLASSES, GapDiagnosis
 from irtwin.twin.files import load, to_json
 from irtwin.twin.identify import identify
 
@@ -129,16 +130,16 @@ def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
         workspace.read_document(second.evidence_file, second.evidence_sha256)
         == b'{"experiment": null, "follows": [], "runs": []}'
     )
-    assert count(workspace, gap_schema.GapNotTestable) == 2
+    assert count(workspace, CLASSES["gap_not_testable"]) == 2
     assert count(workspace, schema.TwinRow) == count(workspace, schema.RunEnergy) == 1
 
 
 def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> None:
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     with workspace.reading() as session:
-        cause = session.scalars(select(gap_schema.GapCause)).one()
-        run = session.scalars(select(gap_schema.GapCauseRun)).one()
-        weighed = session.scalars(select(gap_schema.GapCauseCompetitor)).all()
+        cause = session.scalars(select(CLASSES["gap_cause"])).one()
+        run = session.scalars(select(CLASSES["gap_cause_run"])).one()
+        weighed = session.scalars(select(CLASSES["gap_cause_competitor"])).all()
     assert (cause.acts_from_s, cause.acts_until_s, run.run_id) == (1.5, 2.5, f"{ROBOT}.swing_3")
     assert cause.cause_id == run.cause_id == "coulomb_friction@all"
     assert (cause.gain, cause.log_odds) == (4.0, 7.0)
@@ -148,9 +149,9 @@ def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> Non
 def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> None:
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     with workspace.reading() as session:
-        finding = session.scalars(select(gap_schema.GapFinding)).one()
-        joints = set(session.scalars(select(gap_schema.GapFindingJoint.joint)))
-        members = session.scalars(select(gap_schema.GapFindingMember)).all()
+        finding = session.scalars(select(CLASSES["gap_finding"])).one()
+        joints = set(session.scalars(select(CLASSES["gap_finding_joint"].joint)))
+        members = session.scalars(select(CLASSES["gap_finding_member"])).all()
     assert (finding.finding_id, finding.family, finding.rank, finding.matters) == ("friction@all", "friction", 1, True)
     assert (finding.share, finding.share_lower, finding.share_upper, finding.confidence) == (0.9, 0.8, 1.0, 0.98)
     assert joints == {"joint_1", "joint_2"}
@@ -173,7 +174,7 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
         )
         assert f"gap_diagnosis/{found.diagnosis_id}" in set(used)
     assert count(workspace, schema.RunEnergy) == 0
-    assert count(workspace, gap_schema.GapDiagnosis) == 1
+    assert count(workspace, GapDiagnosis) == 1
     keep(workspace, ROBOT, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
     assert count(workspace, schema.RunEnergy) == 1
     assert adopt(workspace, ROBOT) == twin_id
@@ -218,7 +219,7 @@ def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
     size = {"rmse": 1.0, "noise_floor": None, "excess": None}
     with pytest.raises(InputError, match="no joint joint_9"):
         record(workspace, ROBOT, diagnosis(gap={"energy_error_percent": None, "torque": {"joint_9": size}}), NOTHING)
-    assert count(workspace, gap_schema.GapDiagnosis) == 0
+    assert count(workspace, GapDiagnosis) == 0
 
 
 def test_a_changed_document_is_told(workspace: Workspace) -> None:

@@ -1,8 +1,8 @@
 """The tables of a diagnosis: where the gap of twin and robot lies, why, how far it shrinks, what to do next.
 
-All but what concerns the record itself is as the fields of the document tell it (`document.tables`): the class of the
-table gap_cause is `GapCause`, and so on. Joints, runs, effects and causes are named as in the document; ranks and
-numbers count from 1, the first being the foremost.
+All but what concerns the record itself is as the fields of the document tell it (`document.tables`), a class a table:
+`CLASSES`. Joints, runs, effects and causes are named as in the document; ranks and numbers count from 1, the first
+being the foremost.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _class(table: Table) -> type[OfDiagnosis]:
     columns |= {column.name: _column(column) for column in table.columns}
     if table.of_robot:
         columns["robot_id"] = mapped_column(String, nullable=False)
-    return type(_name(table), (OfDiagnosis,), {"__tablename__": table.name, **columns})
+    return type(table.name, (OfDiagnosis,), {"__tablename__": table.name, **columns})
 
 
 def _column(column: Column) -> MappedColumn[Any]:
@@ -59,18 +59,6 @@ def _column(column: Column) -> MappedColumn[Any]:
     return mapped_column(_TYPES[column.kind], *to, primary_key=column.key, nullable=column.nullable)
 
 
-def _name(table: Table) -> str:
-    return "".join(word.capitalize() for word in table.name.split("_"))
-
-
 for _told in DOCUMENT.columns:
     setattr(GapDiagnosis, _told.name, _column(_told))
 CLASSES = {table.name: _class(table) for table in TABLES if table is not DOCUMENT}
-
-
-def __getattr__(name: str) -> Any:
-    """Return the class of a table by its name."""
-    kind = next((one for one in CLASSES.values() if one.__name__ == name), None)
-    if kind is None:
-        raise AttributeError(f"no table of a diagnosis has the class {name}")
-    return kind
