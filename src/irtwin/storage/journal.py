@@ -10,12 +10,13 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from irtwin.document.form import from_json
+from irtwin.errors import InputError
 from irtwin.json_text import parse_json
 from irtwin.storage.files import InsidePath, inside, is_locked
 from irtwin.storage.schema import LIVE_RUN, WATCHED_RUNS
@@ -71,8 +72,8 @@ def read_journal(path: Path) -> tuple[Header, np.ndarray]:
     if not separator:
         raise ValueError(f"{path}: ends within its header")
     try:
-        header = _header(parse_json(line))
-    except (ValueError, TypeError, KeyError, AttributeError):
+        header = _header(line)
+    except (ValueError, InputError):
         raise DamagedJournal(f"{path}: its header is damaged") from None
     if path.name != f"{header.run_id}{_ENDING}":
         raise DamagedJournal(f"{path}: its header is that of run {header.run_id!r}")
@@ -82,17 +83,12 @@ def read_journal(path: Path) -> tuple[Header, np.ndarray]:
     return header, rows[: len(rows) if rising.all() else int(np.argmin(rising)) + 1]
 
 
-def _header(values: Any) -> Header:
-    header = Header(**{**values, "columns": tuple(values["columns"])})
-    com = tuple(map(float, header.payload_com))
-    if not header.run_id.startswith(f"{header.robot_id}."):
+def _header(line: bytes) -> Header:
+    header = from_json(Header, parse_json(line), "header")
+    is_sound = header.kind in WATCHED_RUNS and header.columns[:1] == ("time",)
+    if not is_sound or not header.run_id.startswith(f"{header.robot_id}."):
         raise ValueError
-    if header.kind not in WATCHED_RUNS:
-        raise ValueError
-    texts = (header.run_id, header.robot_id, "" if header.performs is None else header.performs, *header.columns)
-    if not all(isinstance(text, str) for text in texts) or header.columns[:1] != ("time",) or len(com) != 3:
-        raise TypeError
-    return replace(header, payload_kg=float(header.payload_kg), payload_com=com)
+    return header
 
 
 def of_robot(folder: Path, robot_id: str) -> list[InsidePath]:
