@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -54,7 +53,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
             *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
                 JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
-                for joint, energy in _per_joint(shares).items()
+                for joint, energy in live_energy.per_joint((one.joint, one.energy) for one in shares).items()
             ),
         ],
         series={run_id: modelled_series(twin, motion, held_out(role, motion))},
@@ -216,11 +215,3 @@ def _run_energy(
         standby_share=standby / whole.modelled_energy if twin.at_rest and whole.modelled_energy > 0 else None,
         returned_energy_j=twin.returned_energy(motion),
     )
-
-
-def _per_joint(shares: Sequence[Share]) -> dict[str, float]:
-    energies: dict[str, float] = defaultdict(float)
-    for share in shares:
-        if share.joint is not None:
-            energies[share.joint] += share.energy
-    return dict(energies)

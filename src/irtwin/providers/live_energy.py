@@ -6,7 +6,7 @@ Energies are those that other runs have, in the same tables; the gap beside the 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,10 +107,7 @@ class LiveEnergy:
             {**by_twin, "effect": effect, "place": joint or ROBOT, "joint": joint, "energy_j": value}
             for (effect, joint), value in so_far.ledger.items()
         ]
-        joints: defaultdict[str, float] = defaultdict(float)
-        for (_, joint), value in so_far.ledger.items():
-            if joint is not None:
-                joints[joint] += value
+        joints = per_joint((joint, value) for (_, joint), value in so_far.ledger.items())
         return {
             "run_energy": [made | energy],
             "energy_share": shares,
@@ -173,6 +170,15 @@ class LiveEnergy:
             return {"place": place, "channel": "power", "joint": None, "unit": _QUDT[CHANNELS["power"].unit]}
         kind = next(joint.kind for joint in self.known.twin.robot.joints if joint.name == place)
         return {"place": place, "channel": "torque", "joint": place, "unit": _QUDT[CHANNELS["torque"].unit_of(kind)]}
+
+
+def per_joint(ledger: Iterable[tuple[str | None, float]]) -> dict[str, float]:
+    """Return what each joint took, J, of shares that have a joint or none."""
+    energies: defaultdict[str, float] = defaultdict(float)
+    for joint, energy in ledger:
+        if joint is not None:
+            energies[joint] += energy
+    return energies
 
 
 def watching(run_id: str) -> str:

@@ -334,6 +334,7 @@ def _within(folder: Path, file: Path) -> str:
 def _robot_row(robot_id: str, data_set: log.DataSet) -> RobotRow:
     robot, notes = data_set.robot, data_set.notes
     rated, arm = notes.get("rated_payload"), notes.get("arm_movement_type")
+    chain = "".join("P" if joint.kind == "prismatic" else "R" for joint in robot.joints)  # in the usual letters
     return RobotRow(
         robot_id=robot_id,
         name=robot.name,
@@ -341,7 +342,7 @@ def _robot_row(robot_id: str, data_set: log.DataSet) -> RobotRow:
         manufacturer=robot.manufacturer,
         weight_kg=robot.weight,
         controlled_axes=len(robot.joints),
-        arm_movement_type=arm if isinstance(arm, str) else _movement(robot),
+        arm_movement_type=arm if isinstance(arm, str) else chain,
         rated_payload_kg=float(rated) if isinstance(rated, int | float) else None,
         ambient_temperature_degc=data_set.ambient_temperature,
         power_measured_at=data_set.power_at,
@@ -352,11 +353,6 @@ def _robot_row(robot_id: str, data_set: log.DataSet) -> RobotRow:
         cutoff_hz=data_set.cutoff,
         notes=json.dumps(dict(data_set.notes), default=str, sort_keys=True),
     )
-
-
-def _movement(robot: description.Robot) -> str:
-    """The kinematic chain in the usual letters: "RRRRRR" for six revolute joints."""
-    return "".join("P" if joint.kind == "prismatic" else "R" for joint in robot.joints)
 
 
 def _joint_row(robot_id: str, place: int, joint: description.Joint) -> JointRow:

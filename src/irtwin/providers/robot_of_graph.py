@@ -9,6 +9,7 @@ import numpy as np
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
+from irtwin.providers.structure_rows import SIZES
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.structure import Body, Connection, Origin, Solid, Structure, Three
 from irtwin.robot.urdf_text import robot_of
@@ -49,12 +50,6 @@ _SHAPES = f"""SELECT * {{
     irt:Mesh_Scale_X ?scale_x ; irt:Mesh_Scale_Y ?scale_y ; irt:Mesh_Scale_Z ?scale_z }}
   OPTIONAL {{ ?shape irt:Colour ?colour }}
 }} ORDER BY ?link_number DESC(?purpose) ?number"""
-_SIZES = {
-    "box": ("size_x", "size_y", "size_z"),
-    "cylinder": ("radius", "length"),
-    "sphere": ("radius",),
-    "mesh": ("scale_x", "scale_y", "scale_z"),
-}
 
 
 def robot_of_graph(graph: KnowledgeGraph, robot_iri: str) -> Robot:
@@ -100,7 +95,7 @@ def _joint(row: Row) -> Joint:
 
 
 def _solid(row: Row) -> Solid:
-    size = tuple(row[name] for name in _SIZES[row["kind"]])
+    size = tuple(row[name.removesuffix("_m")] for name in SIZES[row["kind"]])
     colour = None if row["colour"] is None else tuple(map(float, row["colour"].split()))
     return Solid(row["link"], row["purpose"], row["kind"], size, _origin(row), colour, row["mesh"])
 

@@ -20,6 +20,12 @@ from irtwin.storage.schema import Base
 from irtwin.storage.structure_schema import Device, DeviceChannel, DHRow, DHTable, LinkJoint, LinkRow, LinkShape
 
 _MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+SIZES = {  # of shapes, by kind: the columns that hold them
+    "box": ("size_x_m", "size_y_m", "size_z_m"),
+    "cylinder": ("radius_m", "length_m"),
+    "sphere": ("radius_m",),
+    "mesh": ("scale_x", "scale_y", "scale_z"),
+}
 
 
 def structure_rows(robot_id: str, robot: Robot, meshes: Mapping[str, MeshCopy] | None = None) -> Iterator[Base]:
@@ -105,12 +111,6 @@ def _joint(robot_id: str, connection: Connection) -> LinkJoint:
 
 
 def _shape(robot_id: str, number: int, solid: Solid, mesh: MeshCopy | None) -> LinkShape:
-    names = {
-        "box": ("size_x_m", "size_y_m", "size_z_m"),
-        "cylinder": ("radius_m", "length_m"),
-        "sphere": ("radius_m",),
-        "mesh": ("scale_x", "scale_y", "scale_z"),
-    }[solid.kind]
     return LinkShape(
         robot_id=robot_id,
         link=solid.link,
@@ -121,7 +121,7 @@ def _shape(robot_id: str, number: int, solid: Solid, mesh: MeshCopy | None) -> L
         mesh_file=None if mesh is None else mesh.path,
         mesh_sha256=None if mesh is None else mesh.sha256,
         colour=None if solid.colour is None else " ".join(map(repr, solid.colour)),
-        **dict(zip(names, solid.size, strict=True)),
+        **dict(zip(SIZES[solid.kind], solid.size, strict=True)),
         **_place("origin", solid.origin),
     )
 
