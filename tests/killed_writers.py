@@ -18,7 +18,8 @@ from irtwin.knowledge.mapping.remembered import RememberedRows
 from irtwin.knowledge.store import union_store as store
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.rewriting import conclude, map_rows, rewriting
-from irtwin.storage import database, files, staging
+from irtwin.storage import files, staging
+from irtwin.storage import rows as robot_rows
 from irtwin.storage.database import Workspace
 from tests import rows
 from tests.turn_takers import data_set
@@ -85,7 +86,7 @@ def killed_while_ingesting(point: str, folder: Path, url: str | None) -> None:
     elif point == "second file":
         files.put_in_place = lambda *arguments: kill() if next(calls) == 2 else put(*arguments)
     elif point == "rows dropped":
-        database.insert_rows = kill
+        robot_rows.insert_rows = kill
     elif point == "rows written":
         event.listen(workspace.engine, "commit", kill)
     elif point == "committed":
@@ -105,7 +106,8 @@ def killed_apart(folder: Path, point: str) -> None:
         populate(apart)
         if point == "apart":
             os.kill(os.getpid(), signal.SIGKILL)
-        setattr(staging, point, lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+        module = staging if hasattr(staging, point) else robot_rows
+        setattr(module, point, lambda *_: os.kill(os.getpid(), signal.SIGKILL))
 
 
 def ingest_five_times(digit: int, folder: Path, url: str | None) -> None:

@@ -16,28 +16,13 @@ from irtwin.location import Location
 from irtwin.resources import Resources, resources_of
 from irtwin.storage import asserted, base_iri, engine, files, tariff
 from irtwin.storage import gap_schema as _gap_schema  # noqa: F401  its tables are made with the others
+from irtwin.storage import rows as robot_rows
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.files import InsidePath, inside
 from irtwin.storage.migration import VERSION_TABLE, migrate, stamp
 from irtwin.storage.package_tables import package_tables
 from irtwin.storage.row_rules import check_rows
-from irtwin.storage.rows import (
-    Tables,
-    base_of,
-    drop_activities,
-    drop_data_set,
-    drop_robot,
-    drop_run,
-    facts,
-    insert_rows,
-    insert_values,
-    keep_base,
-    named_files,
-    part_tables,
-    release_plans,
-    values,
-    with_dependents,
-)
+from irtwin.storage.rows import Tables
 from irtwin.storage.schema import (
     LIVE,
     MEASURED,
@@ -205,13 +190,15 @@ class Workspace:
                         session.merge(row)  # the data set may lie in another folder now
                 return "unchanged"
             if known:
-                drop_data_set(session, robot.robot_id)
-                session.execute(update(RobotRow).where(RobotRow.robot_id == robot.robot_id).values(values(robot)))
+                robot_rows.drop_data_set(session, robot.robot_id)
+                session.execute(
+                    update(RobotRow).where(RobotRow.robot_id == robot.robot_id).values(robot_rows.values(robot))
+                )
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
             stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
-            insert_rows(session, [*rows[1 if known else 0 :], *stored])
-            release_plans(session, robot.robot_id)
+            robot_rows.insert_rows(session, [*rows[1 if known else 0 :], *stored])
+            robot_rows.release_plans(session, robot.robot_id)
         self.remove_orphans()
         return "replaced" if known else "new"
 
@@ -247,11 +234,11 @@ class Workspace:
                 Activity.provider.in_((*(one.provider for one, _ in made), instead_of)),
                 Activity.subject == activity.subject,
             )
-            drop_activities(session, with_dependents(session, set(session.scalars(same))))
+            robot_rows.drop_activities(session, robot_rows.with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
             modelled = self._store(series or {}, MODELLED, activity.activity_id)
-            insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
+            robot_rows.insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
     def keep_run(self, run: RunRow, series: pa.Table, rows: Tables | None = None) -> None:
@@ -259,8 +246,8 @@ class Workspace:
         with self._writing() as session:
             (stored,) = self._store({run.run_id: series}, _told(run), None)
             run.file, run.sha256 = stored.path, stored.series_id
-            insert_rows(session, [run, stored])
-            insert_values(session, rows or {})
+            robot_rows.insert_rows(session, [run, stored])
+            robot_rows.insert_values(session, rows or {})
 
     def facts_about(self, robot_id: str) -> list[AssertedFact]:
         """Return the facts that rows of a robot follow, the earliest first."""
@@ -275,13 +262,13 @@ class Workspace:
     def drop_robot(self, robot_id: str) -> None:
         """Forget a robot and everything derived from it."""
         with self._writing() as session:
-            drop_robot(session, robot_id)
+            robot_rows.drop_robot(session, robot_id)
         self.remove_orphans()
 
     def drop_run(self, run_id: str, subject: str) -> None:
         """Forget a run that no twin knows, and what providers made of it, their `subject` by its IRI."""
         with self._writing() as session:
-            drop_run(session, run_id, subject)
+            robot_rows.drop_run(session, run_id, subject)
         self.remove_orphans()
 
     def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
@@ -305,9 +292,9 @@ class Workspace:
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
         with self._writing() as session:
-            named = {file.path for file in named_files(session.connection())}
-            for file in (file for folder in _FOLDERS for file in self._files(folder)):
-                if file.relative_to(self.folder).as_posix() not in named:
+            named = {file.path for file in robot_rows.named_files(session.connection())}
+            for file in [file for name in _FOLDERS for file in (self.folder / name).glob("*")]:
+                if file.is_file() and file.relative_to(self.folder).as_posix() not in named:
                     file.unlink()
 
     def close(self) -> None:
@@ -322,10 +309,6 @@ class Workspace:
 
     def _writing(self) -> AbstractContextManager[Session]:
         return engine.writing(self.engine)
-
-    def _files(self, name: str) -> list[Path]:
-        folder = self.folder / name
-        return [file for file in folder.iterdir() if file.is_file()] if folder.is_dir() else []
 
     def _store(self, series: Mapping[str, pa.Table], kind: str, activity_id: str | None) -> list[Series]:
         rows = []
@@ -347,8 +330,8 @@ class Workspace:
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series and meshes undamaged."""
         runs = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_not(None)))
-        stored = {facts(session.get_one(RobotRow, robot_id)), *map(facts, runs)}
-        for table in part_tables():
+        stored = {robot_rows.facts(session.get_one(RobotRow, robot_id)), *map(robot_rows.facts, runs)}
+        for table in robot_rows.part_tables():
             rows_kept = session.execute(select(table).where(table.columns["robot_id"] == robot_id)).mappings()
             stored |= {
                 (table.name, *({**row} | ({"folder": ""} if "folder" in row else {})).values()) for row in rows_kept
@@ -359,7 +342,7 @@ class Workspace:
         shapes = select(LinkShape.mesh_file, LinkShape.mesh_sha256).where(LinkShape.robot_id == robot_id)
         named += [(row.mesh_file, row.mesh_sha256) for row in session.execute(shapes) if row.mesh_file is not None]
         whole = all(is_whole(self.folder, path, checksum) for path, checksum in named)
-        return whole and stored == {facts(row) for row in rows}
+        return whole and stored == {robot_rows.facts(row) for row in rows}
 
     def _base(self, given: str | None) -> str:
         """Return what the IRIs of individuals begin with; keep what is said of it anew."""
@@ -371,12 +354,12 @@ class Workspace:
                 f"{file}: says {base_iri.KEY} = {in_file!r}, and --base {base}; say the same or leave one out"
             )
         with self.engine.connect() as connection:
-            kept = base_of(connection)
+            kept = robot_rows.base_of(connection)
         if base is None or base == kept:
             return kept
         with self._writing() as session:
             try:
-                keep_base(session.connection(), base)
+                robot_rows.keep_base(session.connection(), base)
             except InputError as error:
                 raise InputError(f"{self.folder}: {error}") from None
         return base
@@ -423,7 +406,7 @@ def in_memory(rows: Iterable[Base]) -> Iterator[Engine]:
     try:
         with engine.writing(opened) as session:
             Base.metadata.create_all(session.connection())
-            insert_rows(session, rows)
+            robot_rows.insert_rows(session, rows)
         yield opened
     finally:
         opened.dispose()

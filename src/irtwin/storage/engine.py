@@ -183,14 +183,11 @@ def use_write_ahead_log(engine: Engine) -> None:
             try:
                 driver.execute("PRAGMA journal_mode = WAL")
                 return
-            except sqlite3.OperationalError as error:
+            except sqlite3.DatabaseError as error:
                 _tell(engine.url, error)
                 # SQLite does not wait here by itself while another process makes the same change.
                 if "locked" not in str(error) or time.monotonic() > deadline:
                     raise
-            except sqlite3.DatabaseError as error:
-                _tell(engine.url, error)
-                raise
         time.sleep(0.05)
 
 

@@ -113,9 +113,7 @@ def recorded_rows(session: Session, robot_id: str) -> Tables:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
     there = filled(session.connection())
     return {
-        table.name: [dict(row) for row in session.execute(query).mappings()]
-        if query is not None and table in there
-        else []
+        table.name: [dict(row) for row in session.execute(query).mappings()] if table in there else []
         for table, query in _recorded(session, robot_id)
     }
 
@@ -249,8 +247,8 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
     return whole
 
 
-def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[Any] | None]]:
-    """Yield each table with the query of a robot's rows in it, without its live runs'; None where there are none."""
+def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
+    """Yield each table with the query of a robot's rows in it, without its live runs'."""
     runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, RunRow.kind.not_in(WATCHED_RUNS))
     activities = select(Activity.activity_id).where(
         Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
@@ -261,7 +259,7 @@ def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[A
         if table.name == RunRow.__tablename__ or table.name == Series.__tablename__:
             yield table, rows.where(table.columns["run_id"].in_(runs))
         elif "activity_id" in table.columns:
-            yield table, _made_by(table, made) if made else None
+            yield table, _made_by(table, made)
         elif "robot_id" in table.columns:
             yield table, rows.where(table.columns["robot_id"] == robot_id)
 

@@ -21,6 +21,7 @@ from irtwin.storage.files import inside, is_locked
 
 _KEY = 0x6972746772  # "irtgr": the advisory lock on PostgreSQL, beside that of writers of rows
 _FILE = ".graph.turn"
+_OPEN = os.O_WRONLY | os.O_CREAT | os.O_NONBLOCK  # a pipe in its place would be waited for without end
 _AGAIN = 0.05  # s between two tries
 
 
@@ -55,20 +56,16 @@ def _on_server(engine: Engine, held: ExitStack) -> Callable[[], bool]:
     return lambda: bool(connection.scalar(text("SELECT pg_try_advisory_lock(:key)"), {"key": _KEY}))
 
 
-def _at_once(path: str, flags: int) -> int:
-    """Open a file; a pipe in its place, which would be waited for without end, is an error."""
-    return os.open(path, flags | os.O_NONBLOCK, 0o666)
-
-
 def _in_folder(folder: Path, held: ExitStack) -> Callable[[], bool]:
     try:
-        file = held.enter_context(open(inside(folder, _FILE), "ab", opener=_at_once))  # noqa: SIM115
+        handle = os.open(inside(folder, _FILE), _OPEN, 0o666)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); {engines.TO_WRITE}") from None
+    held.callback(os.close, handle)
 
     def taken() -> bool:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             return False
         return True
