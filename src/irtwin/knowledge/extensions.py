@@ -98,22 +98,20 @@ def _check_rule(file: Resource, rule: Rule) -> None:
     if rule.language == SHACL and not rule.name.startswith(("http:", "https:", "urn:")):
         raise InputError(f"{file.path}: a rule has no IRI; give its shape one, for conclusions to name it")
     line = _line_of(file, _end(rule.name))
-    fault = sparql_fault(rule.construct)
-    if fault is not None:
-        raise InputError(
-            f"{file.path}, line {line}: the rule {rule.label!r} is no SPARQL: {fault[1].partition(': ')[2]}"
-        )
+
+    def fault(what: str) -> InputError:
+        return InputError(f"{file.path}, line {line}: the rule {rule.label!r} {what}")
+
+    said = sparql_fault(rule.construct)
+    if said is not None:
+        raise fault(f"is no SPARQL: {said[1].partition(': ')[2]}")
     query = algebra(rule.construct)
     made = {term for pattern in query.template for term in pattern}
     if any(isinstance(term, rdflib.BNode) for term in made):
-        raise InputError(
-            f"{file.path}, line {line}: the rule {rule.label!r} concludes blank nodes, anew each time: use IRIs"
-        )
+        raise fault("concludes blank nodes, anew each time: use IRIs")
     free = sorted(str(term) for term in made if isinstance(term, rdflib.Variable) and term not in query.p["_vars"])
     if free:
-        raise InputError(
-            f"{file.path}, line {line}: the rule {rule.label!r} concludes ?{free[0]}, which its WHERE does not bind"
-        )
+        raise fault(f"concludes ?{free[0]}, which its WHERE does not bind")
 
 
 def _check_names(files: Files) -> None:
@@ -193,8 +191,7 @@ def _check_mapping(file: Resource, engine: Engine) -> None:
 
 def _check_graphs(file: Resource, triples_map: TriplesMap) -> None:
     """Only graphs of sources and of activities are the mapping's: others would be written over."""
-    inside = [own.graphs for own in triples_map.properties if own.graphs]
-    for graph in (*triples_map.graphs, *(graph for graphs in inside for graph in graphs)):
+    for graph in (*triples_map.graphs, *(graph for own in triples_map.properties for graph in own.graphs)):
         if not _start(graph).startswith((GRAPH_SOURCE, GRAPH_ACTIVITY)):
             raise InputError(
                 f"{triples_map.where}: its graph is none of a mapping; begin its IRI with {GRAPH_SOURCE} "

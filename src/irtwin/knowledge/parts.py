@@ -79,11 +79,9 @@ class Ontology:
         return frozenset(self.triples), self.resources
 
     def __eq__(self, other: object) -> bool:
-        """Whether another says the same."""
         return isinstance(other, Ontology) and self._content == other._content
 
     def __hash__(self) -> int:
-        """Return the same number for those that are equal."""
         return hash(self._content)
 
     @cached_property

@@ -27,7 +27,6 @@ class Verdict:
         return self.state in (CHANGED, MISSING)
 
     def __str__(self) -> str:
-        """Return one line."""
         return f"{self.state}: {self.file}{f' ({self.why})' if self.why else ''}"
 
 

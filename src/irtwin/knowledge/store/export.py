@@ -26,6 +26,7 @@ from irtwin.knowledge.vocabulary import (
     RDFS,
     TYPE,
 )
+from irtwin.storage import files
 
 _ONTOLOGY = NamedNode(ONTOLOGY)
 _LABEL = NamedNode(RDFS + "label")
@@ -44,10 +45,9 @@ def export_owl(graph: KnowledgeGraph, path: Path) -> None:
     Times are cut to milliseconds. What was edited in it can be taken back: see `asserted.edited`.
     """
     kept = exported(graph)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    serialize(sorted(kept, key=str), str(part), RdfFormat.RDF_XML, prefixes=graph.prefixes)
-    part.replace(path)
+    with files.temporary_beside(path.parent) as temporary:
+        serialize(sorted(kept, key=str), str(temporary), RdfFormat.RDF_XML, prefixes=graph.prefixes)
+        files.put_in_place(temporary, path)
 
 
 def exported(graph: KnowledgeGraph) -> set[Triple]:

@@ -80,7 +80,6 @@ class KnowledgeGraph:
         return cls(path, workspace, read_only=True)
 
     def __enter__(self) -> Self:
-        """Return the graph; leaving the block closes it."""
         return self
 
     def __exit__(self, *exception: object) -> None:

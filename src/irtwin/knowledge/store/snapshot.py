@@ -81,7 +81,6 @@ class Snapshot:
         self._open()
 
     def __enter__(self) -> Self:
-        """Return the snapshot; leaving the block closes it."""
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -38,11 +38,9 @@ class AnswerTable(Sequence[Row]):
     def __getitem__(self, index: slice) -> tuple[Row, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
-        """Return a row, or some."""
         return self.rows[index]
 
     def __len__(self) -> int:
-        """Return the number of rows."""
         return len(self.rows)
 
     def _repr_html_(self) -> str:
