@@ -92,13 +92,9 @@ def task_of(start: str | None = None, goal: str | None = None, seconds: float | 
 
 def unpack(workspace: Path) -> Path:
     """Write the data set that the twin is identified from, without the measurement; return its folder."""
-    demo, data_set = resources.folder("demo") / "kuka_kr6_r700", workspace / "kuka_kr6_r700"
-    (data_set / "runs").mkdir(parents=True)
-    shutil.copyfile(resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf", data_set / "robot.urdf")
-    head, *entries = (demo / "dataset.toml").read_text(encoding="utf-8").split("[[run]]\n")
+    data_set = workflow.unpack_demo(workspace)
+    head, *entries = (data_set / "dataset.toml").read_text(encoding="utf-8").split("[[run]]\n")
     kept = [entry for entry in entries if Path(tomllib.loads(entry)["file"]).stem in _RUNS]
-    for name in _RUNS:
-        shutil.copyfile(demo / "runs" / f"{name}.parquet", data_set / "runs" / f"{name}.parquet")
     (data_set / "dataset.toml").write_text("[[run]]\n".join([head, *kept]), encoding="utf-8")
     return data_set
 

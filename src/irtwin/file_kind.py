@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +21,11 @@ _GRAPHS = (".ttl", ".owl", ".rdf", ".nt", ".nq", ".trig", ".jsonld")
 _HEAD = 4096  # bytes that tell a URDF from a model of MuJoCo
 
 
-@dataclass(frozen=True)
 class FileKind:
     """What something is, and the commands that take it, each with what it does."""
 
-    what: str
-    commands: tuple[tuple[str, str], ...]
-
-
-def _kind(what: str, *commands: tuple[str, str]) -> FileKind:
-    return FileKind(what, commands)
+    def __init__(self, what: str, *commands: tuple[str, str]) -> None:
+        self.what, self.commands = what, commands
 
 
 def file_kind(path: Path) -> FileKind:
@@ -41,14 +35,14 @@ def file_kind(path: Path) -> FileKind:
         return _folder(path, shown)
     if suffix in _TEXTS and is_metered(names_of(path)):
         made = "makes a data set of it, for `irtwin run FOLDER`: load, standby, cycles and cost, without a twin"
-        return _kind("a meter's log: power or energy, and no joint", (f"irtwin import {shown} --out FOLDER", made))
+        return FileKind("a meter's log: power or energy, and no joint", (f"irtwin import {shown} --out FOLDER", made))
     if suffix in _LOGS:
         made = "makes a data set of it, and says what each column is"
-        return _kind("a log", (f"irtwin import {shown} --robot ROBOT.urdf --out FOLDER", made))
+        return FileKind("a log", (f"irtwin import {shown} --robot ROBOT.urdf --out FOLDER", made))
     if suffix in (".urdf", ".xml"):
         return _model(path, shown)
     if suffix == ".json":
-        return _kind(
+        return FileKind(
             "a twin, if `--save-twin` wrote it",
             (f"irtwin predict {shown} RUN --out FILE", "torque, power and energy that it expects of a motion"),
             (f"irtwin plan {shown} --from POSE --to POSE --out FILE", "a motion, and what it costs"),
@@ -56,10 +50,10 @@ def file_kind(path: Path) -> FileKind:
         )
     if suffix == ".zip":
         command = f"irtwin workspace restore {shown} --workspace NEW"
-        return _kind("an archive, if `irtwin workspace backup` wrote it", (command, "makes a workspace of it"))
+        return FileKind("an archive, if `irtwin workspace backup` wrote it", (command, "makes a workspace of it"))
     if suffix in _GRAPHS:
         command = f"irtwin workspace reason {shown} --out FILE"
-        return _kind("a graph", (command, "draws all conclusions from it, by OWL 2 RL"))
+        return FileKind("a graph", (command, "draws all conclusions from it, by OWL 2 RL"))
     raise InputError(
         f"{path}: neither a data set, a workspace, a log ({', '.join(_LOGS)}), a robot (.urdf), a model of MuJoCo "
         "(.xml), a twin (.json) nor an archive (.zip); `irtwin --help` lists what can be done"
@@ -76,21 +70,21 @@ def names_of(path: Path) -> list[str]:
 
 def _folder(path: Path, shown: str) -> FileKind:
     if (path / "dataset.toml").is_file():
-        return _kind(
+        return FileKind(
             _data_set(read_toml(path / "dataset.toml")),
             (f"irtwin check {shown}", "looks for faults of its logs: signs, swapped columns, units, dead channels"),
             (f"irtwin run {shown}", "builds twin, graph and energy report"),
             (f"irtwin diagnose {shown} --report gap.html", "says where twin and robot differ, and why"),
         )
     if Workspace.is_there(path):
-        return _kind(
+        return FileKind(
             "a workspace",
             (f"irtwin workspace status --workspace {shown}", "what is in it"),
             (f"irtwin serve --workspace {shown}", "its pages, in the browser, and its SPARQL endpoint"),
             (f"irtwin query --workspace {shown}", "the questions that it answers"),
         )
     if sets := len(list(path.glob("*/dataset.toml"))):
-        return _kind(
+        return FileKind(
             f"a folder with {sets} data set{'s' if sets > 1 else ''}",
             (f"irtwin run {shown} --out RESULTS", "builds twin, graph and energy report of each"),
             (f"irtwin diagnose {shown} --out RESULTS", "says of each where twin and robot differ, and why"),
@@ -103,7 +97,7 @@ def _folder(path: Path, shown: str) -> FileKind:
         )
     command = f"irtwin import {shown}/*{logs[0].suffix} --robot ROBOT.urdf --out FOLDER"
     words = f"a folder with {len(logs)} log{'s' if len(logs) > 1 else ''}"
-    return _kind(words, (command, "makes a data set of them, a run a file"))
+    return FileKind(words, (command, "makes a data set of them, a run a file"))
 
 
 def _data_set(document: dict[str, Any]) -> str:
@@ -122,8 +116,8 @@ def _model(path: Path, shown: str) -> FileKind:
         head = file.read(_HEAD)
     if b"<mujoco" in head:
         command = f"irtwin diagnose DATASET --simulator {shown} --save-simulator NEW.xml"
-        return _kind("a model of MuJoCo", (command, "says what it has otherwise than the robot, and mends it"))
-    return _kind(
+        return FileKind("a model of MuJoCo", (command, "says what it has otherwise than the robot, and mends it"))
+    return FileKind(
         "a robot's description",
         (f"irtwin import LOG --robot {shown} --out FOLDER", "makes a data set of a log of this robot"),
         (f"irtwin robot excite {shown} --seconds 20 --out motion.csv", "a motion that shows all that a twin needs"),

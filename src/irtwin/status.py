@@ -17,7 +17,6 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_INFERRED
 from irtwin.location import Location
 from irtwin.report.extensions import check
-from irtwin.resources import Resource
 from irtwin.storage.database import Workspace
 from irtwin.storage.engine import shown
 from irtwin.storage.journal import left_behind
@@ -63,7 +62,8 @@ def status(location: Location) -> Status:
         with status_now.noting():
             _look_at_graph(status_now, place)
         extensions = place.resources.extensions
-        status_now.parts["extensions"] = list(map(_extension, extensions)) or ["none"]
+        told = [f"{file}{', in place of what ships' if file.replaces else ''}" for file in extensions]
+        status_now.parts["extensions"] = told or ["none"]
         with status_now.noting():
             may = trusted(place.folder)
             aside = [name for name in asked(place.folder) if name not in may]
@@ -129,7 +129,3 @@ def _size(graph: KnowledgeGraph) -> str:
     concluded = len(graph.triples(GRAPH_INFERRED))
     count = graph.query("SELECT (COUNT(*) AS ?count) { ?s ?p ?o }").rows[0]["count"]
     return f"{count:,} triples in {len(graph.graphs())} named graphs; rules and reasoning conclude {concluded:,}"
-
-
-def _extension(file: Resource) -> str:
-    return f"{file}{', in place of what ships' if file.replaces else ''}"

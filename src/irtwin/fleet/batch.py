@@ -78,7 +78,7 @@ class Batch:
     @cached_property
     def sets(self) -> Sets:
         """What it was made of. Raises InputError where that cannot be read."""
-        file = self._inside(_SETS)
+        file = inside(self.folder, _SETS)
         try:
             sets = Sets(**parse_json(read_input(file, _MOST_BYTES)))
             if not isinstance(sets.data_sets, list) or sets.kind not in (RUN, DIAGNOSE):
@@ -103,12 +103,8 @@ class Batch:
         """Yield the record of each data set."""
         yield from map(self.record, self.sets.data_sets)
 
-    def _inside(self, path: str) -> InsidePath:
-        """Return a file of the batch. Raises InputError where a link leads out of it."""
-        return inside(self.folder, path)
-
     def _record_file(self, place: str) -> InsidePath:
-        return self._inside(f"records/{key(place)}.json")
+        return inside(self.folder, f"records/{key(place)}.json")
 
     def _write(self, record: Record) -> None:
         write(self._record_file(record.data_set), json.dumps(asdict(record), indent=1).encode())
@@ -143,17 +139,17 @@ class Batch:
 
     def _done(self, place: str) -> tuple[str, str]:
         """Return the state that a data set has come to, and what is to be said of it."""
-        trace = self._inside(f"records/{key(place)}.traceback.txt")
+        trace = inside(self.folder, f"records/{key(place)}.traceback.txt")
         trace.unlink(missing_ok=True)
         try:
             if self.sets.kind == RUN:
                 from irtwin import workflow  # two seconds of imports, which a batch that is done can do without
 
-                workflow.run(Path(place), self._inside("workspace"), base=self.sets.base)
+                workflow.run(Path(place), inside(self.folder, "workspace"), base=self.sets.base)
             else:
                 from irtwin import diagnosing
 
-                results = self._inside(f"diagnoses/{key(place)}")
+                results = inside(self.folder, f"diagnoses/{key(place)}")
                 diagnosing.diagnose(Path(place), json_file=results / "gap.json", twin_file=results / "twin.json")
         except WorkspaceFault as error:  # no fault of the data set: the next call tries again
             return FAILED, str(error)

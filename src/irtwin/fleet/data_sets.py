@@ -10,7 +10,6 @@ from irtwin.input_file import read_text
 
 _FILE = "dataset.toml"
 _LONGEST = 100_000_000  # bytes of a list: a million places
-_BLOCK = 1 << 20  # bytes read at once
 
 
 def find_data_sets(source: Path) -> list[str]:
@@ -43,6 +42,5 @@ def checksum(data_set: Path) -> str:
     for file in sorted(path for path in data_set.rglob("*") if path.is_file()):
         whole.update(str(file.relative_to(data_set)).encode() + b"\0")
         with file.open("rb") as content:
-            while block := content.read(_BLOCK):
-                whole.update(block)
+            hashlib.file_digest(content, lambda: whole)
     return whole.hexdigest()
