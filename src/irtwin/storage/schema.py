@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, datetime
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from sqlalchemy import DateTime, Dialect, ForeignKey
 from sqlalchemy.orm import DeclarativeBase, Mapped, declared_attr, mapped_column
@@ -139,6 +139,10 @@ class JointRow(Base):
     winding_resistance_ohm: Mapped[float | None]
 
 
+# Deferred: a run may stand before the one that it names.
+OtherRun = Annotated[str | None, mapped_column(ForeignKey("run.run_id", deferrable=True, initially="DEFERRED"))]
+
+
 class RunRow(Base):
     """One motion, recorded or planned (Yan 2018, eq. 11); `run_id` is `robot_id.name`."""
 
@@ -151,16 +155,9 @@ class RunRow(Base):
     payload_com_x_m: Mapped[float]
     payload_com_y_m: Mapped[float]
     payload_com_z_m: Mapped[float]
-    repeat_of: Mapped[str | None] = mapped_column(
-        # Deferred: a run may stand before the one that it repeats.
-        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
-    )
-    performs: Mapped[str | None] = mapped_column(  # the planned run that it carried out
-        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
-    )
-    time_scaling_of: Mapped[str | None] = mapped_column(  # the measured run that a plan is, made slower
-        ForeignKey("run.run_id", deferrable=True, initially="DEFERRED")
-    )
+    repeat_of: Mapped[OtherRun]
+    performs: Mapped[OtherRun]  # the planned run that it carried out
+    time_scaling_of: Mapped[OtherRun]  # the measured run that a plan is, made slower
     time_scale: Mapped[float | None]  # how many times longer the plan takes
     product: Mapped[str | None]  # what it made, as the data set says
     pieces: Mapped[int | None]  # how many of them
