@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from irtwin.announce import Announce
-from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.location import Location
 from irtwin.modelling import sound
 from irtwin.next_experiment import NextExperiment, next_experiment
@@ -65,7 +64,8 @@ def improve(
         runs = sound(logged, announce).runs
         with rewriting(place, announce) as graph:
             graph.load_ontology()
-            limit = _limit(graph)
+            (row,) = graph.query("SELECT ?limit { limit:energy_error irt:Limit_Value ?limit }")
+            limit = float(row["limit"])
             with staged(place, robot_id) as apart:
                 for run in runs:
                     keep_run(apart, robot_id, known.joint_names, run)
@@ -75,8 +75,3 @@ def improve(
             following = next_experiment(place, graph, robot_id)
         report = write_report(place, robot_id)
         return Improvement(improved.rounds, improved.within, limit, following, report)
-
-
-def _limit(graph: KnowledgeGraph) -> float:
-    (row,) = graph.query("SELECT ?limit { limit:energy_error irt:Limit_Value ?limit }")
-    return float(row["limit"])
