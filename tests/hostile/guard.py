@@ -16,9 +16,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from irtwin.errors import InputError
+from irtwin.knowledge.engines import close_file
 from irtwin.knowledge.mapping import map_to_file
 from irtwin.knowledge.owl_rl.closure import Contradiction
-from irtwin.knowledge.owl_rl.file import close_file
 from irtwin.robot.urdf import read_urdf
 
 SECONDS = 20  # of processor time

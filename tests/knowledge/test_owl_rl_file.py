@@ -6,7 +6,7 @@ from pyoxigraph import RdfFormat, Triple, parse
 
 from irtwin.cli import cli
 from irtwin.errors import InputError
-from irtwin.knowledge.owl_rl.file import close_file
+from irtwin.knowledge.engines import close_file
 
 GIVEN = """
 @prefix ex: <https://example.org/> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .

@@ -143,7 +143,7 @@ def reason(source: Path | None, out: Path | None, engine: str, location: Locatio
         raise click.UsageError("SOURCE and --out go together." if source is None else "Missing option '--out'.")
     try:
         if source is not None and out is not None:
-            from irtwin.knowledge.owl_rl.file import close_file
+            from irtwin.knowledge.engines import close_file
 
             click.echo(f"{out}: {close_file(source, out, engine)} triples inferred by {engine}")
         else:

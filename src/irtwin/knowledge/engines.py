@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Collection
+from pathlib import Path
 
-from pyoxigraph import NamedNode, Triple
+from pyoxigraph import NamedNode, RdfFormat, Triple, serialize
 
 from irtwin.knowledge.java import NoJava, java
 from irtwin.knowledge.owl_rl.closure import Closure, says_something
-from irtwin.knowledge.vocabulary import REASONER
+from irtwin.knowledge.store.rdf_input import format_of, read_triples
+from irtwin.knowledge.vocabulary import PREFIXES, REASONER
+from irtwin.storage.files import check_place, write
 
 NATIVE, OWLRL, HERMIT = "native", "owlrl", "hermit"
 ENGINES = (NATIVE, OWLRL, HERMIT)
@@ -47,6 +51,25 @@ def worth_keeping(engine: str, triples: Collection[Triple]) -> set[Triple]:
         return by_owlrl.worth_keeping(triples)
     found, closure = _closed(engine, triples)
     return closure.worth_keeping().union(filter(says_something, found)).difference(triples)
+
+
+def close_file(source: Path, out: Path, engine: str = NATIVE) -> int:
+    """Write what a file says and all that an engine infers from it; return how many triples were inferred.
+
+    The suffixes tell the formats. `owl:imports` are not followed. The file is there whole or not at all. Raises
+    InputError on a file that cannot be read or is too much for the engine, Contradiction on one that contradicts
+    itself.
+    """
+    form = format_of(out)
+    check_place(out)
+    given = dict.fromkeys(read_triples(source))
+    check(engine, len(given))
+    found = sorted(inferred(engine, given), key=str)
+    prefixes = PREFIXES if form in (RdfFormat.TURTLE, RdfFormat.TRIG, RdfFormat.RDF_XML) else None
+    content = io.BytesIO()
+    serialize([*given, *found], content, form, prefixes=prefixes)
+    write(out, content.getvalue())
+    return len(found)
 
 
 def _closed(engine: str, triples: Collection[Triple]) -> tuple[set[Triple], Closure]:

@@ -80,7 +80,8 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
                 return
         remembered.forget()
         run = _Run(connection, statements, remembered)
-        graph.replace(chain(run.added(), [_version(version)], _uri_space(graph.base)), *_MAPPED)
+        base = [] if graph.base == ID else [_said(URI_SPACE, graph.base)]  # readers would take another
+        graph.replace(chain(run.added(), [_version(version)], base), *_MAPPED)
         remembered.version = version
 
 
@@ -163,11 +164,6 @@ def _hashes(texts: Iterable[str]) -> npt.NDArray[np.uint64]:
 
 def _version(name: str) -> Quad:
     return _said(f"{OWL}versionInfo", name)
-
-
-def _uri_space(base: str) -> list[Quad]:
-    """Return what tells readers of the graph the base of its individuals, where they would take another."""
-    return [] if base == ID else [_said(URI_SPACE, base)]
 
 
 def _said(property: str, value: str) -> Quad:

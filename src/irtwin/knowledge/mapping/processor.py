@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from pyoxigraph import Quad, RdfFormat, serialize
 from sqlalchemy import Connection, Engine
@@ -65,6 +66,34 @@ def _statements(connection: Connection, documents: Sequence[Path], base_iri: str
         _KEPT.clear()  # a process maps the same documents again and again
         _KEPT[known_by] = made
     return made
+
+
+class RowMapper:
+    """Mapping documents, ready for rows of the tables that they name by rr:tableName, for who watches these change.
+
+    What a document reads by rr:sqlQuery or a join needs the database, and is left to `map_database`.
+    """
+
+    def __init__(self, engine: Engine, documents: Sequence[Path], base_iri: str | None = None) -> None:
+        """Read the documents against a database. Raises InputError for a fault in one of them."""
+        with planned(engine, documents, base_iri) as (_, statements):
+            self._statements = [statement for statement in statements if statement.table]
+        self._of_table: dict[str, list[Statement]] = {}  # as found
+
+    def quads(self, table: str, rows: Iterable[Mapping[str, Any]]) -> Iterator[Quad]:
+        """Yield what rows of a table become, values by column as the database's driver gives them.
+
+        A column that a row lacks is NULL: it makes no quad. ValueError where no document names the table.
+        """
+        if table not in self._of_table:
+            reads = (one for one in self._statements if one.table[-1].find([table], folded=True) is not None)
+            self._of_table[table] = list(reads)
+        statements = self._of_table[table]
+        if not statements:
+            raise ValueError(f"no mapping document reads table {table!r} by its name")
+        for row in rows:
+            for statement in statements:
+                yield from statement.quads([row.get(column) for column in statement.columns])
 
 
 def map_to_file(
