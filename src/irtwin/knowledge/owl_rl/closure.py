@@ -256,14 +256,12 @@ class Closure:
 
     def _refuse_contradictions(self) -> None:
         for rule, join in self._program.contradictions:
-            self._refuse(rule, list(dict.fromkeys(join(self.facts, self.facts))))
+            bindings = list(dict.fromkeys(join(self.facts, self.facts)))
+            if bindings:
+                clashes = chain(*(self._program.clashes(rule, culprits, self.facts) for culprits in bindings))
+                given = self._grounds(chain(*clashes))
+                raise contradiction(rule.name, ", ".join(map(self._name, bindings[0])), given)
         self._refuse_other_datatypes(self.facts)
-
-    def _refuse(self, rule: DatalogRule, bindings: list[tuple[Number, ...]]) -> None:
-        if bindings:
-            clashes = chain(*(self._program.clashes(rule, culprits, self.facts) for culprits in bindings))
-            given = self._grounds(chain(*clashes))
-            raise contradiction(rule.name, ", ".join(map(self._name, bindings[0])), given)
 
     def _refuse_other_datatypes(self, facts: Facts) -> None:
         """Refuse values that are said to be of a datatype, and are not (dt-not-type)."""

@@ -47,26 +47,19 @@ def read_rules(file: Path) -> tuple[DatalogRule, ...]:
 
 def _rule(match: re.Match[str]) -> DatalogRule:
     name, _, head, culprits, body, condition = match.groups()
+    pairs = (part.split(" != ") for part in (condition or "").split(" && ") if part)
     return DatalogRule(
         name=name,
         head=_patterns(head or ""),
         culprits=tuple((culprits or "").split()),
         body=_patterns(body),
-        unequal=tuple(_unequal(part) for part in (condition or "").split(" && ") if part),
+        unequal=tuple((one, other) for one, other in pairs),
     )
 
 
 def _patterns(text: str) -> tuple[Pattern, ...]:
-    return tuple(_pattern(*part.split()) for part in text.split(" . ") if part)
-
-
-def _pattern(subject: Term, predicate: Term, object: Term) -> Pattern:
-    return (subject, "rdf:type" if predicate == "a" else predicate, object)
-
-
-def _unequal(text: str) -> tuple[Term, Term]:
-    left, right = text.split(" != ")
-    return (left, right)
+    parts = (part.split() for part in text.split(" . ") if part)
+    return tuple((subject, "rdf:type" if verb == "a" else verb, object) for subject, verb, object in parts)
 
 
 class Facts:

@@ -152,7 +152,8 @@ class _Imp:
         """Return the atom of what a rule concludes: a class or link of individuals that it knows."""
         subject, predicate, object = pattern
         variables = {str(it) for it in (subject, object) if isinstance(it, rdflib.Variable)}
-        if not variables <= self._variables or not (predicate == RDF.type or self._is_object_property(predicate)):
+        is_link = predicate == RDF.type or self._model.is_a(predicate, OWL.ObjectProperty)
+        if not (is_link and variables <= self._variables):
             raise NoConjunction("it concludes values, or what has no name before")
         return self._atom(pattern, {})
 
@@ -165,7 +166,7 @@ class _Imp:
         subject, predicate, object = pattern
         if _is_type(predicate) and isinstance(object, rdflib.URIRef):
             return class_atom(self._term(subject), object.n3())
-        if self._is_object_property(predicate):
+        if self._model.is_a(predicate, OWL.ObjectProperty):
             return link_atom(self._term(subject), predicate.n3(), self._term(object))
         if not self._model.is_a(predicate, OWL.DatatypeProperty):
             name = shorten(str(predicate)) if isinstance(predicate, rdflib.URIRef) else "a path"
@@ -185,9 +186,6 @@ class _Imp:
             datatype, value = _comparable(datatype, limit)
             facets += f"[ xsd:{_FACET_OF[sign]} {value.n3()} ] "
         return f"[ a rdfs:Datatype ; owl:onDatatype {datatype.n3()} ; owl:withRestrictions ( {facets}) ]"
-
-    def _is_object_property(self, predicate: Any) -> bool:
-        return self._model.is_a(predicate, OWL.ObjectProperty)
 
     def _term(self, term: Any) -> str:
         if isinstance(term, rdflib.Variable):

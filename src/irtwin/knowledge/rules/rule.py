@@ -12,7 +12,7 @@ from irtwin.knowledge.vocabulary import GRAPH_INFERRED
 
 SHACL, SWRL = "SHACL", "SWRL"
 
-_BODY = re.compile(r"\bCONSTRUCT\s*\{[^}]*\}\s*(?:WHERE\s*)?\{", re.IGNORECASE)
+_HEAD = re.compile(r"\bCONSTRUCT\s*\{[^}]*\}\s*(?:WHERE\s*)?\{", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,13 @@ class Rule:
         return f"{GRAPH_INFERRED}{self.language.lower()}/{quote(re.split('[/#]', self.name)[-1], safe='')}"
 
 
-def start_of_body(construct: str) -> int | None:
-    """Return where that begins which stands within a CONSTRUCT's WHERE { }; None where it is no CONSTRUCT."""
-    match = _BODY.search(masked(construct))
-    return None if match is None else match.end()
+def head_of(construct: str) -> re.Match[str] | None:
+    """Return the match of a CONSTRUCT up to what stands within its WHERE { }; None where it is no CONSTRUCT."""
+    return _HEAD.search(masked(construct))
 
 
 def group_of(rule: Rule) -> tuple[str, str]:
     """Return the prologue of a rule's CONSTRUCT, and what stands within its WHERE { }."""
-    body = _BODY.search(masked(rule.construct))
+    body = head_of(rule.construct)
     assert body is not None
     return rule.construct[: body.start()], rule.construct[body.end() : masked(rule.construct).rindex("}")]

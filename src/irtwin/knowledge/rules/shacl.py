@@ -6,7 +6,7 @@ from decimal import Decimal, InvalidOperation
 
 from pyoxigraph import BlankNode, Literal, NamedNode
 
-from irtwin.knowledge.rules.rule import SHACL, Rule, start_of_body
+from irtwin.knowledge.rules.rule import SHACL, Rule, head_of
 from irtwin.knowledge.shacl.shapes import TARGETS, Shapes
 from irtwin.knowledge.store.by_subject import Node
 from irtwin.knowledge.vocabulary import RDFS, SH, shorten
@@ -53,11 +53,11 @@ def _targets(shapes: Shapes, shape: Node) -> list[str]:
 
 
 def _set_wise(shapes: Shapes, rule: Node, construct: str, focus: str) -> str:
-    body = start_of_body(construct)
-    if body is None:
+    head = head_of(construct)
+    if head is None:
         raise shapes.fault(rule, "its sh:construct is no CONSTRUCT { ... } WHERE { ... }")
     prefixes = "".join(f"PREFIX {name}: <{space}>\n" for name, space in shapes.prefixes(rule).items())
-    return f"{prefixes}{construct[:body]} {focus} {construct[body:]}"
+    return f"{prefixes}{construct[: head.end()]} {focus} {construct[head.end() :]}"
 
 
 def _number(shapes: Shapes, node: Node) -> Decimal:
