@@ -10,7 +10,7 @@ import pytest
 
 from irtwin.alarms.follow import ToldAlarms
 from irtwin.errors import InputError
-from irtwin.fleet.data_sets import find_data_sets
+from irtwin.fleet.fleet import find_data_sets
 from irtwin.input_file import read_text
 from irtwin.knowledge.questions.queries import read_question
 from irtwin.knowledge.store.rdf_input import read_turtle

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from irtwin import __version__
 from irtwin.errors import InputError, WorkspaceFault
-from irtwin.fleet.data_sets import checksum
 from irtwin.input_file import read_input
 from irtwin.json_text import parse_json
 from irtwin.storage.files import InsidePath, inside, locked, write
@@ -165,3 +164,13 @@ def key(place: str) -> str:
     """Return the name of a data set's files: its folder's, and what tells it from others of that name."""
     name = "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in Path(place).name)[:80]
     return f"{name}-{hashlib.sha256(place.encode()).hexdigest()[:8]}"
+
+
+def checksum(data_set: Path) -> str:
+    """Return the SHA-256 of a data set: of its files' names and bytes."""
+    whole = hashlib.sha256()
+    for file in sorted(path for path in data_set.rglob("*") if path.is_file()):
+        whole.update(str(file.relative_to(data_set)).encode() + b"\0")
+        with file.open("rb") as content:
+            hashlib.file_digest(content, lambda: whole)
+    return whole.hexdigest()

@@ -17,11 +17,13 @@ from pathlib import Path
 from irtwin.announce import Announce
 from irtwin.errors import InputError
 from irtwin.fleet.batch import DONE, FAILED, REFUSED, STOPPED, Batch, Record
-from irtwin.fleet.data_sets import find_data_sets
+from irtwin.input_file import read_text
 from irtwin.storage import base_iri
 from irtwin.storage.files import inside
 
 _NAME = "batch_{:04d}"
+_FILE = "dataset.toml"
+_LONGEST = 100_000_000  # bytes of a list: a million places
 _WORKER = (sys.executable, "-m", "irtwin.fleet")
 _EVERY = 5.0  # s between two lines of how far a fleet is
 
@@ -61,6 +63,30 @@ def work(
     with told_meanwhile(lambda: announce(f"  {_line(status_of(batches).counts)}")):
         work_through(batches, workers, tell)
     return status_of(batches)
+
+
+def find_data_sets(source: Path) -> list[str]:
+    """Return the folders of data sets, sorted.
+
+    `source` is a folder (every folder below that has a dataset.toml), or a text file with one folder a line. Raises
+    InputError where there is none.
+    """
+    places = [file.parent for file in source.rglob(_FILE)] if source.is_dir() else _listed(source)
+    if not places:
+        raise InputError(f"{source}: holds no data set; a data set is a folder with {_FILE}")
+    return sorted({str(place.resolve()) for place in places})
+
+
+def _listed(source: Path) -> list[Path]:
+    places = []
+    for number, line in enumerate(read_text(source, _LONGEST).splitlines(), start=1):
+        place = line.strip()
+        if not place or place.startswith("#"):
+            continue
+        if not (source.parent / place / _FILE).is_file():
+            raise InputError(f"{source}, line {number}: {place} holds no {_FILE}")
+        places.append(source.parent / place)
+    return places
 
 
 def work_through(
