@@ -12,7 +12,7 @@ from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests.data_sets import irtwin
 from tests.small_robots import data_set
 
-from irtwin.knowledge.contained import contain
+from irtwin.knowledge.conclusions import contain
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph

@@ -15,8 +15,7 @@ from itertools import chain
 from pyoxigraph import Literal, Quad, Triple
 
 from irtwin.knowledge import parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, graph_of, infer
-from irtwin.knowledge.contained import CONTRADICTION, contain
+from irtwin.knowledge.conclusions import CONTRADICTION, Conclusions, by_rules, contain, graph_of, infer
 from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Contradiction, say
 from irtwin.knowledge.parts import EQUALITIES, Joined, Name, Ontology, Region

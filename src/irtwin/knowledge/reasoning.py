@@ -16,8 +16,7 @@ from functools import partial
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge import by_parts, engines, parts
-from irtwin.knowledge.conclusions import Conclusions, by_rules, content_name, graph_of, infer
-from irtwin.knowledge.contained import CONTRADICTION, contain
+from irtwin.knowledge.conclusions import CONTRADICTION, Conclusions, by_rules, contain, content_name, graph_of, infer
 from irtwin.knowledge.engines import NATIVE
 from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.owl_rl.closure import Contradiction
