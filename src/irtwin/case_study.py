@@ -96,6 +96,9 @@ def unpack(workspace: Path) -> Path:
     head, *entries = (data_set / "dataset.toml").read_text(encoding="utf-8").split("[[run]]\n")
     kept = [entry for entry in entries if Path(tomllib.loads(entry)["file"]).stem in _RUNS]
     (data_set / "dataset.toml").write_text("[[run]]\n".join([head, *kept]), encoding="utf-8")
+    for run in (data_set / "runs").iterdir():
+        if run.stem not in _RUNS:
+            run.unlink()
     return data_set
 
 

@@ -36,7 +36,7 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     robot_id = run.robot_id
     twin_id, twin = load_twin(workspace, robot_id)
     if run.kind == PLANNED_RUN:
-        return _planned(workspace, robot_id, run_id, twin_id, twin)
+        return _planned(workspace, run, twin_id, twin)
     with workspace.reading() as session:
         role = session.get_one(TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
@@ -103,11 +103,10 @@ def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterat
         )
 
 
-def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twin: Twin) -> Made:
+def _planned(workspace: Workspace, run: RunRow, twin_id: str, twin: Twin) -> Made:
+    run_id, scaled = run.run_id, run.time_scaling_of
     motion = condition(load_run(workspace, twin.robot, run_id), twin.robot, twin.cutoff)
     taken = cost(twin, [motion])
-    with workspace.reading() as session:
-        scaled = session.get_one(RunRow, run_id).time_scaling_of
     saved = None if scaled is None else _saving(workspace, scaled, twin, motion)
     row = RunPrice(
         run_id=run_id,
@@ -120,8 +119,8 @@ def _planned(workspace: Workspace, robot_id: str, run_id: str, twin_id: str, twi
     )
     nothing = np.zeros(len(motion.time), dtype=bool)
     return Made(
-        robot_id=robot_id,
-        used=[*inputs(workspace, robot_id, [run_id, *([] if scaled is None else [scaled])]), twin_iri(twin_id)],
+        robot_id=run.robot_id,
+        used=[*inputs(workspace, run.robot_id, [run_id, *([] if scaled is None else [scaled])]), twin_iri(twin_id)],
         rows=[row],
         series={run_id: modelled_series(twin, motion, nothing)},
     )
