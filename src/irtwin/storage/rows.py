@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    RowMapping,
     Select,
     Table,
     delete,
@@ -138,23 +137,20 @@ def modelled_of_live_runs(session: Session, robot_id: str) -> Tables:
 
 def named_files(connection: Connection) -> list[NamedFile]:
     """Return the files of the workspace that the database names."""
-    files = []
-    for table, columns in FILES.items():
-        for file, checksum in columns:
-            rows = connection.execute(select(Base.metadata.tables[table])).mappings()
-            files += [NamedFile(row[file], row[checksum], _owner(row)) for row in rows if row[file] is not None]
-    return files
+    tables = (Base.metadata.tables[name] for name in FILES)
+    rows = {table.name: connection.execute(select(table)).mappings().all() for table in tables}
+    return files_of(rows)
 
 
-def files_of(rows: Tables) -> dict[str, str]:
-    """Return the files of the workspace that rows name: path -> SHA-256."""
-    return {
-        row[file]: row[checksum]
+def files_of(rows: Mapping[str, Sequence[Mapping[Any, Any]]]) -> list[NamedFile]:
+    """Return the files of the workspace that rows name, which are given by table."""
+    return [
+        NamedFile(row[file], row[checksum], row.get("robot_id") or row["run_id"].partition(".")[0])
         for table, columns in FILES.items()
         for file, checksum in columns
-        for row in rows.get(table, [])
+        for row in rows.get(table, ())
         if row[file] is not None
-    }
+    ]
 
 
 def drop_data_set(session: Session, robot_id: str) -> None:
@@ -274,10 +270,6 @@ def _of_live(robot_id: str) -> Select[Any]:
 
 def _made_by(table: Table, activities: AbstractSet[str]) -> Select[Any]:
     return select(table).where(table.columns["activity_id"].in_(activities))
-
-
-def _owner(row: RowMapping) -> str:
-    return str(row["robot_id"] if "robot_id" in row else row["run_id"].partition(".")[0])
 
 
 def _made_tables() -> list[Table]:

@@ -10,16 +10,9 @@ from sqlalchemy import update
 
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
+from irtwin.storage import rows as robot_rows
 from irtwin.storage.database import Workspace
-from irtwin.storage.rows import (
-    Tables,
-    drop_recorded,
-    files_of,
-    insert_values,
-    modelled_of_live_runs,
-    recorded_rows,
-    release_plans,
-)
+from irtwin.storage.rows import Tables
 from irtwin.storage.schema import RobotRow
 from irtwin.storage.series import is_whole
 
@@ -45,14 +38,14 @@ def staged(place: Workspace, robot_id: str) -> Iterator[Workspace]:
             error.args = (str(error).replace(str(folder), str(place.folder)),)
             raise
         after = _rows(apart, robot_id)
-        if after != before or whole != set(files_of(before)):
+        if after != before or whole != {file.path for file in robot_rows.files_of(before)}:
             _put(apart, after, place, robot_id)
             place.remove_orphans()
 
 
 def _rows(place: Workspace, robot_id: str) -> Tables:
     with place.reading() as session:
-        return recorded_rows(session, robot_id)
+        return robot_rows.recorded_rows(session, robot_id)
 
 
 def _put(source: Workspace, rows: Tables, target: Workspace, robot_id: str) -> set[str]:
@@ -61,19 +54,20 @@ def _put(source: Workspace, rows: Tables, target: Workspace, robot_id: str) -> s
     Returns the files that were whole; whoever needs another says so.
     """
     with engine.writing(target.engine) as session:
-        whole = {path for path, sha256 in files_of(rows).items() if is_whole(source.folder, path, sha256)}
+        named = robot_rows.files_of(rows)
+        whole = {file.path for file in named if is_whole(source.folder, file.path, file.sha256)}
         for path in whole:
             _link(source, target, path)
-        of_live = modelled_of_live_runs(session, robot_id)
-        drop_recorded(session, robot_id)
+        of_live = robot_rows.modelled_of_live_runs(session, robot_id)
+        robot_rows.drop_recorded(session, robot_id)
         if session.get(RobotRow, robot_id) is None:
-            insert_values(session, rows)
+            robot_rows.insert_values(session, rows)
         else:
             session.execute(update(RobotRow).where(RobotRow.robot_id == robot_id).values(**rows["robot"][0]))
-            insert_values(session, {**rows, "robot": []})
+            robot_rows.insert_values(session, {**rows, "robot": []})
         if {row["twin_id"] for row in of_live["run_energy"]} <= {row["twin_id"] for row in rows["twin"]}:
-            insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
-        release_plans(session, robot_id)
+            robot_rows.insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
+        robot_rows.release_plans(session, robot_id)
     return whole
 
 
