@@ -15,7 +15,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 @pytest.fixture(scope="module")
 def graph(plant_place: Path) -> KnowledgeGraph:
     graph = KnowledgeGraph(workspace=plant_place)
-    graph.replace(KnowledgeGraph.as_it_stands(plant_place / "graph").quads(), "")
+    graph.replace(KnowledgeGraph(plant_place / "graph", read_only=True).quads(), "")
     before = set(map(str, validate(graph)))
     graph.update(
         "INSERT DATA { id:saving_action\\/Arm_C\\/check_gear_oil\\/j1 a irt:Saving_Action ; irt:Done_On '2026-03-02' ; "

@@ -22,7 +22,7 @@ KWH = 3.6e6
 
 @pytest.fixture(scope="module")
 def graph(plant_place: Path) -> KnowledgeGraph:
-    return KnowledgeGraph.as_it_stands(plant_place / "graph")
+    return KnowledgeGraph(plant_place / "graph", read_only=True)
 
 
 def of(graph: KnowledgeGraph, subject: str, name: str) -> object:

@@ -33,4 +33,4 @@ def page_of(graph: KnowledgeGraph, tmp_path: Path) -> PageOf:
 @pytest.fixture(scope="session")
 def plant(plant_place: Path) -> KnowledgeGraph:
     """A graph of four robots, for the pages of a plant."""
-    return KnowledgeGraph.as_it_stands(plant_place / "graph")
+    return KnowledgeGraph(plant_place / "graph", read_only=True)

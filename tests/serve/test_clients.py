@@ -48,7 +48,7 @@ def test_sparqlwrapper_takes_a_refusal_for_one(server) -> None:
 
 def test_rdflib_walks_the_graph(server) -> None:
     remote = rdflib.Graph(SPARQLStore(server.sparql, context_aware=False, method="POST"))
-    with KnowledgeGraph.as_it_stands(server.graph) as graph:
+    with KnowledgeGraph(server.graph, read_only=True) as graph:
         assert len(remote) == len(graph.triples())
         (count,) = graph.query("SELECT (COUNT(*) AS ?n) { ?joint a irt:Robot_Joint }")
     joints = list(remote.subjects(rdflib.RDF.type, rdflib.URIRef(f"{IRT}Robot_Joint")))
@@ -57,7 +57,7 @@ def test_rdflib_walks_the_graph(server) -> None:
 
 def test_every_named_question_is_answered_as_in_this_process_with_prefixes_or_without(server) -> None:
     prologue = "".join(f"PREFIX {prefix}: <{space}>\n" for prefix, space in PREFIXES.items())
-    with KnowledgeGraph.as_it_stands(server.graph) as graph:
+    with KnowledgeGraph(server.graph, read_only=True) as graph:
         for number, (name, question) in enumerate(named_questions().items()):
             expected = graph.query(question.text)
             answer = server.ask(prologue + question.text if number % 2 else question.text).json()

@@ -94,7 +94,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert "800 samples stored" in said or "801 samples stored" in said, said
     wait_for(lambda: page.inner_text("#stream") == "run ended")
     assert page.evaluate("irtwinLive.states") > 400
-    with KnowledgeGraph.as_it_stands(folder / "workspace" / "graph") as graph:
+    with KnowledgeGraph(folder / "workspace" / "graph", read_only=True) as graph:
         (row,) = graph.query(
             "SELECT (COALESCE(?measured, ?modelled) AS ?energy) { ?run a irt:Replayed_Run "
             "OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }"

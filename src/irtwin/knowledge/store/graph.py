@@ -55,6 +55,11 @@ class KnowledgeGraph:
         *,
         read_only: bool = False,
     ):
+        """Open a graph; with `read_only` what is on disk now, without a lock.
+
+        Where another process may write meanwhile: see `snapshot`; if it changed the files just now, OSError or
+        RuntimeError is raised.
+        """
         self.store = UnionStore(place, read_only=read_only)
         self.folder = self.store.folder
         self._workspace = place.parent if workspace is None and isinstance(place, Path) else workspace
@@ -70,14 +75,6 @@ class KnowledgeGraph:
         if place.location.graph_url is None:
             place.check_graph()
         return cls(place.location.graph_url or place.graph_folder, place.folder, place.resources, place.base)
-
-    @classmethod
-    def as_it_stands(cls, path: Path, workspace: Path | None = None) -> Self:
-        """Open what is on disk now, to read; takes no lock. Where another process may write meanwhile: see `snapshot`.
-
-        Raises OSError or RuntimeError where that process changed the files just now.
-        """
-        return cls(path, workspace, read_only=True)
 
     def __enter__(self) -> Self:
         return self

@@ -107,7 +107,7 @@ class Snapshot:
         def opened(source: Path, view: ExitStack) -> KnowledgeGraph:
             self._checked, self._seen = time.monotonic(), self._state()
             files = _links(source, view) or source
-            return view.enter_context(KnowledgeGraph.as_it_stands(files, self._folder.parent))
+            return view.enter_context(KnowledgeGraph(files, self._folder.parent, read_only=True))
 
         view, graph = _whole(self._source, opened)
         self._view.close()
