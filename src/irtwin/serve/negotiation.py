@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 from irtwin.serve.protocol import Refusal
 
@@ -17,32 +16,16 @@ TRIPLES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Range:
-    kind: str
-    subtype: str
-    quality: float
-
-    def precision(self, media_type: str) -> int:
-        """Return how closely the range names the media type: 0 not at all, 3 exactly."""
-        kind, _, subtype = media_type.partition("/")
-        if (self.kind, self.subtype) == (kind, subtype):
-            return 3
-        if (self.kind, self.subtype) == (kind, "*"):
-            return 2
-        return 1 if (self.kind, self.subtype) == ("*", "*") else 0
-
-
 def best(accept: str, offered: Sequence[str]) -> str | None:
     """Return the media type on offer that an Accept header prefers, the first of equals; None where none will do.
 
     An empty header takes anything. The quality of a type is that of the range that names it most closely.
     """
-    ranges = [accepted for part in accept.split(",") if (accepted := _range(part)) is not None]
     if not accept.strip():
-        return next(iter(offered))
-    choice = max(offered, key=lambda media_type: _quality(media_type, ranges), default=None)
-    return choice if choice is not None and _quality(choice, ranges) > 0 else None
+        return offered[0]
+    ranges = _ranges(accept)
+    choice = max(offered, key=lambda media_type: _quality(media_type, ranges))
+    return choice if _quality(choice, ranges) > 0 else None
 
 
 def chosen(accept: str, offered: Sequence[str], what: str) -> str:
@@ -58,22 +41,22 @@ def wants_page(accept: str) -> bool:
     return bool(accept) and best(accept, [*TRIPLES, "text/html"]) == "text/html"
 
 
-def _quality(media_type: str, ranges: Sequence[_Range]) -> float:
-    closest = max(ranges, key=lambda one: one.precision(media_type), default=None)
-    return closest.quality if closest is not None and closest.precision(media_type) else 0.0
+def _quality(media_type: str, ranges: Mapping[str, float]) -> float:
+    """Return the quality of the range that names a media type most closely, 0 where none does."""
+    kind = media_type.partition("/")[0]
+    return next((ranges[one] for one in (media_type, f"{kind}/*", "*/*") if one in ranges), 0.0)
 
 
-def _range(part: str) -> _Range | None:
-    """Read one media range; None where it is broken, as if it had not been said."""
-    name, *parameters = (piece.strip().lower() for piece in part.split(";"))
-    kind, slash, subtype = name.partition("/")
-    if not (kind and slash and subtype):
-        return None
-    for parameter in parameters:
-        key, _, value = parameter.partition("=")
-        if key.strip() == "q":
-            return _Range(kind, subtype, quality) if (quality := _number(value)) is not None else None
-    return _Range(kind, subtype, 1.0)
+def _ranges(accept: str) -> dict[str, float]:
+    """Read media ranges with their qualities; one that is broken counts as not said, of equal ones the first counts."""
+    ranges: dict[str, float] = {}
+    for part in accept.split(","):
+        name, *parameters = (piece.strip().lower() for piece in part.split(";"))
+        said = [value for key, _, value in (one.partition("=") for one in parameters) if key.strip() == "q"]
+        quality = _number(said[0]) if said else 1.0
+        if quality is not None and "" not in name.partition("/"):
+            ranges.setdefault(name, quality)
+    return ranges
 
 
 def _number(text: str) -> float | None:
