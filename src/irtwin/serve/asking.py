@@ -10,12 +10,12 @@ from pyoxigraph import Literal, QueryBoolean, QueryResultsFormat, parse_query_re
 from starlette.requests import Request
 
 from irtwin.knowledge.store.sparql_text import bound
-from irtwin.knowledge.store.table import to_python
+from irtwin.knowledge.store.table import table_of
 from irtwin.report.questions import Answer, Answers, PageQuestion, Row
+from irtwin.serve.guard import note
 from irtwin.serve.pool import AnswerHead, Limits, Pool, Worker, begun
 from irtwin.serve.protocol import Operation, Refusal
 from irtwin.serve.shares import client
-from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
 Bindings = Mapping[str, str | Literal]
@@ -93,7 +93,4 @@ class Asking:
 
 
 def _rows(body: bytes) -> tuple[Row, ...]:
-    solutions = parse_query_results(body, QueryResultsFormat.JSON)
-    assert not isinstance(solutions, QueryBoolean)
-    names = [variable.value for variable in solutions.variables]
-    return tuple({name: to_python(value) for name, value in zip(names, row, strict=True)} for row in solutions)
+    return table_of(parse_query_results(body, QueryResultsFormat.JSON)).rows

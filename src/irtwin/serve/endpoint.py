@@ -5,25 +5,35 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 
+from pyoxigraph import NamedNode, RdfFormat, parse, serialize
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from irtwin.serve import description, graph_store, negotiation, page
+from irtwin.serve import graph_store, negotiation, page
 from irtwin.serve.answer import Replies, Reply
 from irtwin.serve.asking import Asking
-from irtwin.serve.body import read_body
+from irtwin.serve.guard import note
 from irtwin.serve.pool import AnswerHead, Limits, Pool, Worker, begun
-from irtwin.serve.protocol import Operation, Refusal, read_get, read_parameters, read_post
+from irtwin.serve.protocol import Operation, Refusal, read_body, read_get, read_parameters, read_post
 from irtwin.serve.shares import client
-from irtwin.serve.standing import note
 from irtwin.serve.updates import Updates
 
 _METHODS = "GET, HEAD, POST, OPTIONS"
 _METHODS_OF_GRAPH = "GET, HEAD, PUT, POST, DELETE, OPTIONS"
 _ROOM = 4  # largest answers that may wait for their clients
+_NAMED_GRAPHS = "SELECT ?graph WHERE { GRAPH ?graph { } } ORDER BY ?graph"
+_PREFIXES = {"sd": "http://www.w3.org/ns/sparql-service-description#", "formats": "http://www.w3.org/ns/formats/"}
+_SERVICE = """
+[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature sd:UnionDefaultGraph ;
+  sd:resultFormat formats:SPARQL_Results_JSON, formats:SPARQL_Results_XML, formats:SPARQL_Results_CSV,
+    formats:SPARQL_Results_TSV, formats:Turtle, formats:N-Triples, formats:RDF_XML, formats:JSON-LD ;
+  sd:defaultDataset [ a sd:Dataset ; sd:defaultGraph [ a sd:Graph ] %s ] .
+"""
+
 _log = logging.getLogger(__name__)
 
 
@@ -101,9 +111,9 @@ class Endpoint:
         accept = request.headers.get("accept", "")
         if negotiation.wants_page(accept):
             return page.response()
-        _, graphs = await self._asking.written(request, description.NAMED_GRAPHS, "text/csv")
+        _, graphs = await self._asking.written(request, _NAMED_GRAPHS, "text/csv")
         named = graphs.decode().splitlines()[1:]
-        return description.response(accept, _address(request), named, self._updates.allowed)
+        return _description(accept, _address(request), named, self._updates.allowed)
 
     async def _update(self, operation: Operation, request: Request) -> Response:
         headers = request.headers
@@ -143,6 +153,18 @@ class Endpoint:
             raise Refusal(503, f"the query was cancelled after {seconds:g} s: ask for less, or add a LIMIT") from None
         note(request, head.standing)
         return head
+
+
+def _description(accept: str, address: str, graphs: Sequence[str], updates: bool) -> Response:
+    """Return the SPARQL 1.1 Service Description of the service at `address`, in the form that the client prefers."""
+    media_type = negotiation.chosen(accept, negotiation.TRIPLES, "the description")
+    languages = "sd:SPARQL11Query, sd:SPARQL11Update" if updates else "sd:SPARQL11Query"
+    named = "".join(f"; sd:namedGraph [ a sd:NamedGraph ; sd:name {NamedNode(graph)} ]" for graph in graphs)
+    prefixes = "".join(f"@prefix {name}: <{iri}> . " for name, iri in _PREFIXES.items())
+    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, named), RdfFormat.TURTLE)
+    form = RdfFormat.from_media_type(media_type)
+    body = serialize((quad.triple for quad in quads), format=form, prefixes=_PREFIXES)
+    return Response(body, media_type=media_type, headers={"Vary": "Accept"})
 
 
 def refused(refusal: Refusal) -> Response:

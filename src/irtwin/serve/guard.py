@@ -1,4 +1,4 @@
-"""What every response says in its headers, and which names the server answers to."""
+"""What every response says in its headers, how the graph stands among it, and which names the server answers to."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from irtwin.serve.standing import HEADER, noted
+from irtwin.asking import BEHIND
 
+STANDING = "Irtwin-Graph"  # a header: "behind" or "updating"; absent where the graph is whole
 _LOCAL = {"localhost", "127.0.0.1", "[::1]"}
 _HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -49,7 +50,7 @@ class Guard:
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
                 if (standing := noted(request)) is not None:
-                    headers[HEADER] = standing
+                    headers[STANDING] = standing
                 if is_welcome:
                     headers["Access-Control-Allow-Origin"] = origin
                     headers["Access-Control-Allow-Headers"] = "Accept, Content-Type"  # no token: pages only ask
@@ -64,6 +65,17 @@ class Guard:
             refusal = PlainTextResponse("this server does not answer to other sites' pages\n", status_code=403)
             return await refusal(scope, receive, send_guarded)
         await self._app(scope, receive, send_guarded)
+
+
+def note(request: Request, standing: str | None) -> None:
+    """Note how the graph stands by which a request is answered; what is worst of several is said."""
+    if standing is not None and noted(request) != BEHIND:
+        request.state.standing = standing
+
+
+def noted(request: Request) -> str | None:
+    """Return what was noted: "behind", "updating", or None where the graph was whole."""
+    return getattr(request.state, "standing", None)
 
 
 def _from_another_site(request: Request) -> bool:

@@ -18,9 +18,9 @@ from irtwin.report.questions import Answers
 from irtwin.resources import Resources
 from irtwin.serve import negotiation, ontology
 from irtwin.serve.asking import Asking
+from irtwin.serve.guard import noted
 from irtwin.serve.plant_pages import html
 from irtwin.serve.protocol import Refusal
-from irtwin.serve.standing import noted
 
 _FORMS = {
     "ttl": "text/turtle", "jsonld": "application/ld+json", "nt": "application/n-triples", "rdf": "application/rdf+xml",

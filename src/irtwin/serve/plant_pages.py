@@ -18,12 +18,11 @@ from irtwin.report.plant.page import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion
 from irtwin.serve.asking import Asking, Bindings
-from irtwin.serve.body import read_body
+from irtwin.serve.guard import noted
 from irtwin.serve.pool import Limits
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import Refusal, read_body
 from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.saving_form import KNOWN, read_form
-from irtwin.serve.standing import noted
 from irtwin.serve.updates import Updates
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 

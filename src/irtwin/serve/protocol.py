@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qs
+
+if TYPE_CHECKING:  # a worker has no need of it
+    from starlette.requests import Request
 
 SERVER_FAILS = "the server that keeps the graph does not answer this: try again later, or ask for less"
 FORM = "application/x-www-form-urlencoded"
@@ -33,6 +38,20 @@ class Operation:
     text: str
     default_graphs: tuple[str, ...] = ()
     named_graphs: tuple[str, ...] = ()
+
+
+async def read_body(request: Request, most: int, seconds: float) -> bytes:
+    """Read a request's body of at most so many bytes, within so many seconds. Raises Refusal."""
+    body = bytearray()
+    try:
+        async with asyncio.timeout(seconds):
+            async for piece in request.stream():
+                body += piece
+                if len(body) > most:
+                    raise Refusal(413, f"a request has at most {most:,} bytes")
+    except TimeoutError:
+        raise Refusal(408, "the request did not come in time") from None
+    return bytes(body)
 
 
 def read_get(query_string: str) -> Operation | None:

@@ -12,7 +12,7 @@ from typing import Any
 from markupsafe import Markup
 from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
-from irtwin.knowledge.store.table import to_python
+from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, shorten
 from irtwin.report.energy.page import content_policy
 from irtwin.report.templates import environment, style
@@ -191,8 +191,6 @@ def _link(iri: Any, known: Mapping[str, DocumentedTerm]) -> Markup:
     return Markup('<a href="#{}">{}</a>').format(term.anchor, term.label if term.own else short(term.iri))
 
 
-def _ask(store: Store, name: str) -> list[dict[str, Any]]:
+def _ask(store: Store, name: str) -> AnswerTable:
     text = (folder("reports") / "ontology" / f"{name}.rq").read_text(encoding="utf-8")
-    solutions: Any = store.query(text, use_default_graph_as_union=True)
-    columns = [variable.value for variable in solutions.variables]
-    return [{name: to_python(value) for name, value in zip(columns, row, strict=True)} for row in solutions]
+    return table_of(store.query(text, use_default_graph_as_union=True))
