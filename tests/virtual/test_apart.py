@@ -11,7 +11,7 @@ from tests.screens import complaints_of
 from tests.virtual.scene_data import HOSTILE, bare
 
 from irtwin.report.energy.page import content_policy
-from irtwin.virtual.apart import apart_html
+from irtwin.virtual.scene import apart_html
 
 POSES = {"as it is": np.array([0.3, -0.2]), "with the robot's numbers": np.array([0.11, 0.19])}
 PAGE = '<!DOCTYPE html><html><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{}">'

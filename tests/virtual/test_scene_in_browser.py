@@ -53,12 +53,11 @@ def open_page(
     folder: Path,
     robot: Robot,
     *more: Performance,
-    title: str = "",
     meshes: Mapping[str, Mesh] | None = None,
 ) -> tuple[Any, list[str]]:
     """Open the scene of runs as a file; return the page and whatever it complains of or asks for."""
     path = folder / "scene.html"
-    fragment = scene_html(robot, [run(robot), *more], title=title, meshes=meshes)
+    fragment = scene_html(robot, [run(robot), *more], meshes=meshes)
     path.write_text(PAGE.format(content_policy(fragment.scripts)) + fragment.html, encoding="utf-8")
     # A window of its own for each takes as long as the scene, and an earlier one would draw on.
     pages = [page for context in browser.contexts for page in context.pages]
@@ -233,8 +232,7 @@ def test_a_print_shows_a_picture(browser: Any, tmp_path: Path) -> None:
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
-    page, complaints = open_page(browser, tmp_path, bare(HOSTILE), run(bare(), name=HOSTILE), title=HOSTILE)
-    assert page.inner_text(".is-title") == HOSTILE
+    page, complaints = open_page(browser, tmp_path, bare(HOSTILE), run(bare(), name=HOSTILE))
     assert page.inner_text(".is-joints tr:first-child th span") == HOSTILE
     assert page.locator(".is-run option").all_inner_texts() == ["sweep", HOSTILE]
     assert page.evaluate("window.hacked === undefined")

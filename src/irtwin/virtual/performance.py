@@ -20,15 +20,15 @@ _FEWEST = 50  # frames
 class Performance:
     """What a robot of n joints did, or is to do.
 
-    time: (N,) s, rising; q: (N, n) rad or m; energy: (N,) J used so far; power: (N,) W, None where it is the slope of
-    the energy; torque: (N, n) N m or N, NaN where none was modelled, None where none was at all.
+    time: (N,) s, rising; q: (N, n) rad or m; energy: (N,) J used so far; power: (N,) W; torque: (N, n) N m or N,
+    NaN where none was modelled, None where none was at all.
     """
 
     name: str
     time: np.ndarray
     q: np.ndarray
     energy: np.ndarray
-    power: np.ndarray | None = None
+    power: np.ndarray
     torque: np.ndarray | None = None
 
     def check(self, joints: int) -> None:
@@ -56,9 +56,8 @@ class Performance:
         count = int(np.clip(round(length * _FRAME_RATE) + 1, 2, most))
         frames = np.linspace(time[0], time[-1], count)
         step = length / (count - 1)
-        power = np.gradient(self.energy, time) if self.power is None else self.power
         edges = np.clip(np.concatenate([frames - step / 2, frames[-1:] + step / 2]), time[0], time[-1])
-        work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(time))])
+        work = np.concatenate([[0.0], np.cumsum((self.power[1:] + self.power[:-1]) / 2 * np.diff(time))])
         return {
             "name": self.name,
             "start": float(time[0]),

@@ -34,7 +34,7 @@ from irtwin.robot.meshes import Mesh
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import in_memory
 from irtwin.storage.files import write
-from irtwin.virtual.apart import apart_html
+from irtwin.virtual.scene import apart_html
 
 ReadDocument = Callable[[str, str], bytes]  # path in the workspace, checksum
 DescribeRobot = Callable[[], tuple[Robot, Mapping[str, Mesh]]]  # with its meshes
