@@ -13,7 +13,8 @@ from irtwin.knowledge.explain.explanation import Explanation
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
 from irtwin.packing import Fragment
-from irtwin.report.energy.page import content_policy, render
+from irtwin.report.energy.page import render
+from irtwin.report.page import content_policy
 
 pytestmark = pytest.mark.slow
 

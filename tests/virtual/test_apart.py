@@ -10,7 +10,7 @@ import pytest
 from tests.screens import complaints_of
 from tests.virtual.scene_data import HOSTILE, bare
 
-from irtwin.report.energy.page import content_policy
+from irtwin.report.page import content_policy
 from irtwin.virtual.scene import apart_html
 
 POSES = {"as it is": np.array([0.3, -0.2]), "with the robot's numbers": np.array([0.11, 0.19])}

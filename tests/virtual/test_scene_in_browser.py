@@ -16,7 +16,7 @@ from tests.screens import complaints_of
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
 from irtwin.providers.mesh_files import mesh_copies
-from irtwin.report.energy.page import content_policy
+from irtwin.report.page import content_policy
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.meshes import Mesh, read_mesh

@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import prefixes
-from irtwin.report.energy.page import plotly, script
+from irtwin.report.page import plotly, script
 from irtwin.report.plant.page import style as plant_style
 from irtwin.report.wording import UNITS, WORDS
 from irtwin.resources import Resources

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
 
-from markupsafe import Markup
-
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.packing import Fragment
 from irtwin.report.case_study.figures import figures
-from irtwin.report.energy.page import DrawScene, content_policy, figure_scripts, page_data
+from irtwin.report.energy.page import DrawScene
 from irtwin.report.explorer import Columns, ReadSeries
-from irtwin.report.questions import Answers, Row, ask, questions_of
-from irtwin.report.templates import style, written
+from irtwin.report.page import report_page
+from irtwin.report.questions import Row, ask, questions_of
 from irtwin.resources import shipped
 from irtwin.storage.files import InsidePath, write
 
@@ -43,27 +40,21 @@ def render(
     }
     scene = draw_scene([series["plan"], series["run"]], 0)
     columns = {name: columns for name, (_, columns) in series.items()}
-    write(out, _page(answers, bindings, columns, scene, graph.base).encode())
-
-
-def _page(answers: Answers, bindings: dict[str, str], series: dict[str, Columns], scene: Fragment, base: str) -> str:
-    drawn = figures(series, answers["configurations"].rows)
-    scripts = figure_scripts("case_study/configurations.js")
-    return written(
+    page = report_page(
         shipped(),
-        "case_study/page.html.jinja",
-        answers=answers,
-        bindings=bindings,
-        individuals=individuals(answers["individual"].rows, base),
+        "case_study",
+        answers,
+        bindings,
+        figures(columns, answers["configurations"].rows),
+        fragment=scene,
+        beside=("case_study/style.css", "case_study/configurations.js"),
+        individuals=individuals(answers["individual"].rows, graph.base),
         seed_modelled=SEED_MODELLED,
         seed_measured=SEED_MEASURED,
         seed_error=SEED_ERROR,
         scene=scene.html,
-        data=page_data(drawn),
-        style=Markup("\n").join([style(shipped()), style(shipped(), "case_study/style.css")]),
-        scripts=scripts.html,
-        policy=content_policy([*scripts.scripts, *scene.scripts]),
-    )  # fmt: skip
+    )
+    write(out, page.encode())
 
 
 def individuals(rows: Sequence[Row], base: str) -> list[tuple[str, str, list[Row]]]:

@@ -20,14 +20,13 @@ from irtwin.packing import Fragment
 from irtwin.providers.gap import unrecorded
 from irtwin.providers.names import identifier, robot_iri
 from irtwin.report import wording
-from irtwin.report.energy.page import content_policy, figure_scripts, page_data
 from irtwin.report.gap import figures as gap_figures
 from irtwin.report.gap import friction as gap_friction
 from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
-from irtwin.report.questions import Answers, Graph, added_to, ask, questions_of
-from irtwin.report.templates import style, written
+from irtwin.report.page import report_page
+from irtwin.report.questions import Answers, Graph, ask, questions_of
 from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot
 from irtwin.robot.meshes import Mesh
@@ -97,14 +96,13 @@ def _page(
     friction = gap_friction.figures(curves.friction or ())
     effect_names = gap_figures.effect_names(answers)
     verdict = gap_verdict.told(answers)
-    scripts = figure_scripts()
-    return written(
+    return report_page(
         resources,
-        "gap/page.html.jinja",
-        answers=answers,
-        added=added_to(resources, "gap"),
-        bindings=bindings,
-        rows={name: answer.rows for name, answer in answers.items()},
+        "gap",
+        answers,
+        bindings,
+        drawn | {f"friction_{k}": one for k, one in enumerate(friction.values())},
+        fragment=picture,
         verdict=gap_verdict.sentence(answers),
         findings=[one for one in verdict if one.matters],
         counted=counted([one for one in verdict if not one.matters]),
@@ -120,11 +118,6 @@ def _page(
         friction_numbers=gap_friction.table(curves.friction or (), effect_names),
         former_role=next((one.role for one in curves.friction or () if one.role != "observed"), None),
         experiment=experiment(answers),
-        drawn=drawn,
-        data=page_data(drawn | {f"friction_{k}": one for k, one in enumerate(friction.values())}),
-        style=style(resources),
-        scripts=scripts.html,
         moment=curves.apart,
         picture=None if picture is None else picture.html,
-        policy=content_policy([*scripts.scripts, *(picture.scripts if picture else ())]),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
 from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, shorten
-from irtwin.report.energy.page import content_policy
+from irtwin.report.page import content_policy
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resource, Resources, folder, shipped
 from irtwin.storage.files import check_place, write

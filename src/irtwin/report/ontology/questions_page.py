@@ -8,7 +8,7 @@ from pathlib import Path
 
 from irtwin.knowledge.questions.queries import THEMES, NamedQuery, columns_of, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.report.energy.page import content_policy
+from irtwin.report.page import content_policy
 from irtwin.report.questions import Row
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resources, shipped
