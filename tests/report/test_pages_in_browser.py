@@ -18,6 +18,8 @@ from irtwin.report.ontology.page import write_page
 from irtwin.report.plant import overview
 from irtwin.report.plant import page as plant_page
 from irtwin.report.questions import ask
+from irtwin.report.templates import style
+from irtwin.resources import shipped
 
 pytestmark = pytest.mark.system
 LARGEST = 3_000_000  # bytes of a report
@@ -72,7 +74,8 @@ def test_a_hundred_robots_fit_a_screen(
     found = overview.overview(answers)
     html = plant_page.render("page.html.jinja", answers, {}, found=found, **beside)
     page = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme).new_page()
-    page.set_content(html.replace("</head>", f"<style>{plant_page.style()}</style></head>"))
+    looks = style(shipped(), "layout/style.css", "plant/style.css")
+    page.set_content(html.replace("</head>", f"<style>{looks}</style></head>"))
     assert page.locator("#glance").bounding_box()["height"] < screens * 900
     assert page.evaluate("document.documentElement.scrollWidth") == width
     assert faults(page, "#glance") == []

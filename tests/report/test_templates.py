@@ -39,5 +39,5 @@ def test_pages_of_a_plant_are_compiled_before_anybody_asks(monkeypatch: pytest.M
 def test_no_page_asks_for_an_icon_that_is_not_there() -> None:
     pages = [*folder("reports").rglob("*.jinja"), *FOLDER.glob("*.html")]
     texts = {page.name: text for page in pages if "<head>" in (text := page.read_text(encoding="utf-8"))}
-    assert len(texts) >= 6
+    assert len(texts) >= 5
     assert [name for name, text in texts.items() if '<link rel="icon" href="data:,">' not in text] == []

@@ -9,8 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from markupsafe import Markup
-
 from irtwin.packing import Fragment, embedded_json, packed_scripts
 from irtwin.report.colours import of_lines
 from irtwin.report.questions import Answers, added_to
@@ -51,7 +49,7 @@ def report_page(
         drawn=drawn,
         curves=curves,
         data=embedded_json({"figures": figures, "explorer": curves, "colours": of_lines()}),
-        style=Markup("\n").join(style(resources, name) for name in styles),
+        style=style(resources, *styles),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *(fragment.scripts if fragment else ())]),
         **values,

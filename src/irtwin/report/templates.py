@@ -53,6 +53,6 @@ def environment(resources: Resources) -> jinja2.Environment:
     return environment
 
 
-def style(resources: Resources, name: str = "layout/style.css") -> Markup:
-    """Return a style sheet of the reports."""
-    return Markup(read_text(resources.path("reports", name), MOST_BYTES))
+def style(resources: Resources, *names: str) -> Markup:
+    """Return style sheets of the reports as one, by their paths there."""
+    return Markup("\n").join(Markup(read_text(resources.path("reports", name), MOST_BYTES)) for name in names)

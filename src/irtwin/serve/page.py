@@ -14,9 +14,9 @@ from starlette.responses import Response
 from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.vocabulary import prefixes
 from irtwin.report.page import plotly, script
-from irtwin.report.plant.page import style as plant_style
+from irtwin.report.templates import style
 from irtwin.report.wording import UNITS, WORDS
-from irtwin.resources import Resources
+from irtwin.resources import Resources, shipped
 from irtwin.serve.protocol import Refusal
 from irtwin.virtual.robot_data import asset as scene_asset
 from irtwin.virtual.robot_data import viewer_script
@@ -29,7 +29,7 @@ FOLDER = Path(__file__).parent / "assets"
 _TYPES = {".css": "text/css", ".js": "text/javascript"}
 _MADE: dict[str, Callable[[], str]] = {  # of what other rooms have
     "meshcat.js": viewer_script,
-    "plant.css": plant_style,
+    "plant.css": lambda: style(shipped(), "layout/style.css", "plant/style.css"),
     "plotly.js": plotly,
     "plotting.js": partial(script, "layout/plotting.js"),
     "robot.js": partial(scene_asset, "robot.js"),

@@ -114,8 +114,7 @@ def page(modules: list[Module]) -> str:
         forests=_forests(modules, known),
         count=sum(term.own for term in known.values()),
         policy=content_policy([]),
-        style=style(shipped()),
-        page_style=style(shipped(), "ontology/style.css"),
+        style=style(shipped(), "layout/style.css", "ontology/style.css"),
     )
 
 

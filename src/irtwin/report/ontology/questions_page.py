@@ -59,8 +59,7 @@ def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
             answered=graph is not None,
             most_rows=MOST_ROWS,
             policy=content_policy([]),
-            style=style(shipped()),
-            page_style=style(shipped(), "ontology/style.css"),
+            style=style(shipped(), "layout/style.css", "ontology/style.css"),
         )
     )
 

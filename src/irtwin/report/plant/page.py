@@ -28,14 +28,6 @@ def questions(page: str = "") -> Mapping[str, PageQuestion]:
     return read_questions((FOLDER / page).glob("*.rq"))
 
 
-@cache
-def style() -> str:
-    """Return the style of all these pages: that of reports, and what they have beside it."""
-    return "\n".join(
-        (FOLDER.parent / name).read_text(encoding="utf-8") for name in ("layout/style.css", "plant/style.css")
-    )
-
-
 def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: Any) -> str:
     """Return a page; `answers` and `bindings` are shown as the questions behind it, links are those of `base`."""
     template = _templates(values.get("base", ID)).get_template(f"plant/{name}")
