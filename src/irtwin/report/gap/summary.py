@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
 from irtwin.document.document import Cause, Document, Finding, pooled
@@ -92,18 +92,12 @@ def gap(diagnosis: Document) -> AnswerTable:
         ("tracking error (RMSE)", diagnosis.shrink.position_rmse, "rad"),  # of joints that slide, m
         ("energy (error)", diagnosis.shrink.energy_error_percent, "%"),
     )
-    rows: list[Row] = [
-        {
-            "gap": name,
-            "before": _short(change.before),
-            "after": _short(change.after),
-            "noise floor": None if change.noise_floor is None else _short(change.noise_floor),
-            "unit": unit,
-        }
+    rows = [
+        (name, _short(change.before), _short(change.after), _short(change.noise_floor), unit)
         for name, change, unit in changes
         if change is not None
     ]
-    return AnswerTable(("gap", "before", "after", "noise floor", "unit"), tuple(rows))
+    return _table(("gap", "before", "after", "noise floor", "unit"), rows)
 
 
 def runs(curves: Curves) -> AnswerTable:
@@ -114,17 +108,16 @@ def runs(curves: Curves) -> AnswerTable:
         if one.joint is None and one.of:
             of_run.setdefault(one.run, []).append(one)
     rows = [
-        (run, *(None if value is None else _short(value) for one in errors for value in (one.before, one.after)))
-        for run, errors in of_run.items()
+        (run, *(_short(value) for one in errors for value in (one.before, one.after))) for run, errors in of_run.items()
     ]
-    return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+    return _table(columns, rows)
 
 
 def horizons(diagnosis: Document) -> AnswerTable:
     """Return how tracking error grows after a run is begun anew as the robot was."""
     columns = ("s since it was begun anew", "tracking error, rad", "with the causes, rad")
     rows = [(horizon.seconds, _short(horizon.before), _short(horizon.after)) for horizon in diagnosis.horizons or ()]
-    return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+    return _table(columns, rows)
 
 
 def filtered(diagnosis: Document) -> list[str]:
@@ -171,11 +164,11 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
             lower, upper = one.interval95 or (None, None)
             yield first | {
                 "parameter": f"{one.name} of {one.joint}" if one.joint and len(cause.joints) > 1 else one.name,
-                "simulator": None if one.simulator is None else _short(one.simulator),
-                "robot": None if one.robot is None else _short(one.robot),
+                "simulator": _short(one.simulator),
+                "robot": _short(one.robot),
                 "value": _short(one.value),
-                "95 % from": None if lower is None else _short(lower),
-                "to": None if upper is None else _short(upper),
+                "95 % from": _short(lower),
+                "to": _short(upper),
                 "unit": "" if one.unit == "1" else one.unit,
             }
             first = dict.fromkeys(first)  # said once
@@ -228,5 +221,9 @@ def next_steps(diagnosis: Document) -> list[str]:
     return steps + ([f"{len(motions) - _STEPS} more to log are in the report (--report)"] if motions[_STEPS:] else [])
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _table(columns: tuple[str, ...], rows: Iterable[Sequence[object]]) -> AnswerTable:
+    return AnswerTable(columns, tuple(dict(zip(columns, row, strict=True)) for row in rows))
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.{_DIGITS}g}")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from operator import itemgetter
 
 from pyoxigraph import Literal
 
@@ -85,15 +85,16 @@ def side(asked: Mapping[str, str], which: str, base: str = ID) -> Side | None:
 
 def comparison(before: Answers, after: Answers) -> Comparison:
     """Hold the answers to the questions of both sides against each other."""
-    kinds = {name: (_of(before, name), _of(after, name)) for name in _kinds(before) | _kinds(after)}
+    sides = [{row["energy_from"]: row for row in answers["energy"].rows} for answers in (before, after)]
+    names = sorted(sides[0].keys() | sides[1].keys(), key=lambda name: (not kind(name).electrical, name))
+    joints = [{row["joint_name"]: row for row in answers["joints"].rows} for answers in (before, after)]
     return Comparison(
-        pairs=tuple(_common(before["standstill"].first, after["standstill"].first)),
-        kinds=tuple(
-            (kind(name), tuple(_energy(kind(name), *kinds[name])))
-            for name in sorted(kinds, key=lambda name: (not kind(name).electrical, name))
+        pairs=_pairs(_OF_ANY, before["standstill"].first, after["standstill"].first),
+        kinds=tuple((kind(name), _of_energy(kind(name), *(of.get(name) for of in sides))) for name in names),
+        joints=tuple(
+            ComparedPair(name, "W", *(_mean_power(of.get(name)) for of in joints)) for name in joints[0] | joints[1]
         ),
-        joints=tuple(_joints(before["joints"].rows, after["joints"].rows)),
-        apart=not _kinds(before) & _kinds(after),
+        apart=not sides[0].keys() & sides[1].keys(),
     )
 
 
@@ -108,48 +109,40 @@ def to_sheet(compared: Comparison) -> Sheet:
     )
 
 
-def _common(before: Row | None, after: Row | None) -> list[ComparedPair]:
-    def both(name: str) -> tuple[Any, Any]:
-        return tuple(row[name] if row else None for row in (before, after))  # type: ignore[return-value]
-
-    standing = [share(row["idle_s"], row["known_s"]) if row else None for row in (before, after)]
-    return [
-        ComparedPair("runs", "", *both("runs")),
-        ComparedPair("time", "s", *both("time_s")),
-        ComparedPair("stands still, of time", "%", *(_percent(value) for value in standing)),
-    ]
+def _of_energy(of: EnergyKind, before: Row | None, after: Row | None) -> tuple[ComparedPair, ...]:
+    return _pairs((*_OF_ENERGY, _STANDBY) if of.electrical else _OF_ENERGY, before, after)
 
 
-def _energy(of: EnergyKind, before: Row | None, after: Row | None) -> list[ComparedPair]:
-    def both(value: Any) -> tuple[Any, Any]:
-        return tuple(value(row) if row else None for row in (before, after))  # type: ignore[return-value]
-
-    pairs = [
-        ComparedPair("runs with it", "", *both(lambda row: row["runs"])),
-        ComparedPair("energy", "J", *both(lambda row: row["energy_j"])),
-        ComparedPair("mean power", "W", *both(lambda row: share(row["energy_j"], row["time_s"]))),
-        ComparedPair("peak power", "W", *both(lambda row: row["peak_w"])),
-        ComparedPair("given back by braking joints", "J", *both(lambda row: row["returned_j"])),
-    ]
-    if of.electrical:
-        standby = both(lambda row: _percent(share(row["standby_j"], row["modelled_j"])))
-        pairs.append(ComparedPair("standby, of what the twin models", "%", *standby))
-    return pairs
+def _pairs(quantities: Iterable[Quantity], before: Row | None, after: Row | None) -> tuple[ComparedPair, ...]:
+    """Return quantities on both sides, in their order."""
+    return tuple(
+        ComparedPair(name, unit, *(value(row) if row else None for row in (before, after)))
+        for name, unit, value in quantities
+    )
 
 
-def _joints(before: tuple[Row, ...], after: tuple[Row, ...]) -> list[ComparedPair]:
-    """Return the mean power of each joint, by the twin."""
-    sides = [{row["joint_name"]: share(row["energy_j"], row["time_s"]) for row in rows} for rows in (before, after)]
-    return [ComparedPair(name, "W", *(of.get(name) for of in sides)) for name in dict.fromkeys([*sides[0], *sides[1]])]
+def _mean_power(row: Row | None) -> float | None:
+    return share(row["energy_j"], row["time_s"]) if row else None
 
 
-def _kinds(answers: Answers) -> set[str]:
-    return {row["energy_from"] for row in answers["energy"].rows}
-
-
-def _of(answers: Answers, name: str) -> Row | None:
-    return next((row for row in answers["energy"].rows if row["energy_from"] == name), None)
-
-
-def _percent(value: float | None) -> float | None:
+def _percent(part: float | None, whole: float | None) -> float | None:
+    value = share(part, whole)
     return None if value is None else 100.0 * value
+
+
+Quantity = tuple[str, str, Callable[[Row], float | None]]  # name, unit, and its value of a row
+_OF_ANY: tuple[Quantity, ...] = (
+    ("runs", "", itemgetter("runs")),
+    ("time", "s", itemgetter("time_s")),
+    ("stands still, of time", "%", lambda row: _percent(row["idle_s"], row["known_s"])),
+)
+_OF_ENERGY: tuple[Quantity, ...] = (
+    ("runs with it", "", itemgetter("runs")),
+    ("energy", "J", itemgetter("energy_j")),
+    ("mean power", "W", _mean_power),
+    ("peak power", "W", itemgetter("peak_w")),
+    ("given back by braking joints", "J", itemgetter("returned_j")),
+)
+_STANDBY: Quantity = (
+    "standby, of what the twin models", "%", lambda row: _percent(row["standby_j"], row["modelled_j"]),
+)  # fmt: skip

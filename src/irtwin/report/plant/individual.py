@@ -74,48 +74,44 @@ def individual(iri: str, answers: Answers, base: str = ID) -> ShownIndividual:
 
 
 def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
-    properties: dict[str, ShownProperty] = {}
     graphs: dict[tuple[str, str, bool], set[str]] = defaultdict(set)
     kept: dict[tuple[str, str, bool], Row] = {}
     for row in rows:
         key = row["property"], str(row["value"]), bool(row["leads"])
         graphs[key].add(row["graph"])
         kept.setdefault(key, row)
-    for key, row in sorted(kept.items(), key=lambda pair: pair[0]):
-        of = properties.setdefault(
-            row["property"], ShownProperty(row["property"], row["property_label"] or shorten(row["property"]))
-        )
-        of.values.append(
-            Value(
-                _text(row, base),
-                row["value"] if row["leads"] else None,
-                tuple(_by(graph, base) for graph in sorted(graphs[key])),
-            )
-        )
-    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
+    return _by_property(
+        (row, Value(_text(row, base), key[1] if key[2] else None, tuple(_by(one, base) for one in sorted(graphs[key]))))
+        for key, row in sorted(kept.items(), key=lambda pair: pair[0])
+    )
 
 
 def _incoming(rows: Iterable[Row], base: str) -> list[ShownProperty]:
+    kept = {(row["property"], row["subject"]): row for row in rows}
+    return _by_property(
+        (row, Value(str(row["subject_label"] or shorten(subject, base)), subject, ()))
+        for (_, subject), row in sorted(kept.items())
+    )
+
+
+def _by_property(values: Iterable[tuple[Row, Value]]) -> list[ShownProperty]:
+    """Gather values, each with a row that says its property, by that."""
     properties: dict[str, ShownProperty] = {}
-    for subject, row in sorted({(row["property"], row["subject"]): row for row in rows}.items()):
-        of = properties.setdefault(subject[0], ShownProperty(subject[0], row["property_label"] or shorten(subject[0])))
-        of.values.append(Value(str(row["subject_label"] or shorten(subject[1], base)), subject[1], ()))
+    for row, value in values:
+        iri = row["property"]
+        properties.setdefault(iri, ShownProperty(iri, row["property_label"] or shorten(iri))).values.append(value)
     return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
 
 
 def _text(row: Row, base: str) -> str:
-    if row["leads"]:
-        return str(row["value_label"] or shorten(row["value"], base))
     value: Any = row["value"]
-    text = (
-        f"{value:.10g}"
-        if isinstance(value, float)
-        else ("yes" if value else "no")
-        if value in (True, False) and isinstance(value, bool)
-        else str(value)
-    )
-    unit = wording.unit_symbol(row["unit"])
-    return f"{text}\N{NO-BREAK SPACE}{unit}" if unit else text
+    if row["leads"]:
+        return str(row["value_label"] or shorten(value, base))
+    if isinstance(value, bool):
+        text = "yes" if value else "no"
+    else:
+        text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return "\N{NO-BREAK SPACE}".join(filter(None, (text, wording.unit_symbol(row["unit"]))))
 
 
 def _by(graph: str, base: str) -> tuple[str, str | None]:
