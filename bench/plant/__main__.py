@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from irtwin.demo.plant.logger import write_run
 from plant.campaign import CAMPAIGNS, carry_out, read_campaign
 from plant.dataset import describe
 from plant.drawings import read_drawings
@@ -19,7 +18,7 @@ def main() -> None:
     campaign = read_campaign(arguments.campaign)
     drawings = read_drawings(campaign.robot)
     for run, _, recording in carry_out(campaign):
-        write_run(arguments.folder / "runs" / f"{run.name}.parquet", recording, drawings.joints)
+        recording.write(arguments.folder / "runs" / f"{run.name}.parquet", drawings.joints)
         book = recording.book
         print(
             f"{run.name:20} {recording.time[-1]:6.1f} s  {book.grid:8.0f} J  "

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from irtwin.demo.plant.machine import Drawings
-from irtwin.demo.plant.sensors import Encoders, PowerMeter, TorqueSensors
+from irtwin.demo.plant.sensors import PowerMeter, TorqueSensors, encoder_steps, quantise
 
 
 def test_encoders_see_steps_of_the_motor_shaft(drawings: Drawings) -> None:
-    encoders = Encoders(drawings.sensors, drawings.drive.gear_ratio)
+    steps = encoder_steps(drawings.sensors, drawings.drive.gear_ratio)
     q = np.random.default_rng(0).uniform(-2, 2, 6)
-    assert (np.abs(encoders.read(q) - q) <= encoders.resolution / 2 + 1e-15).all()
-    assert (encoders.resolution < 2e-6).all()
+    assert (np.abs(quantise(q, steps) - q) <= steps / 2 + 1e-15).all()
+    assert (steps < 2e-6).all()
 
 
 def test_torque_is_noisy_and_offset(drawings: Drawings) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from irtwin.demo.plant.arm import PlantPayload
-from irtwin.demo.plant.logger import write_run
 from irtwin.demo.plant.machine import build, read_drawings
 from irtwin.demo.plant.motion import PlantMotion, check, programme
 from irtwin.demo.plant.simulate import Watch, simulate
@@ -52,4 +51,4 @@ class Cell:
         drawings = self.machine.drawings
         check(motion, drawings.limits)
         seed = int(self.rng.integers(1 << 30))
-        write_run(log, simulate(self.machine, motion, PlantPayload(), self.thermal, seed, watch), drawings.joints)
+        simulate(self.machine, motion, PlantPayload(), self.thermal, seed, watch).write(log, drawings.joints)

@@ -23,20 +23,14 @@ class SensorData:
     meter_resolution: float  # W
 
 
+def encoder_steps(data: SensorData, gear_ratio: np.ndarray) -> np.ndarray:
+    """Return the resolution of the motor encoders on the joint side, (n,) rad."""
+    return np.asarray(2 * np.pi / 2**data.encoder_bits / gear_ratio)
+
+
 def quantise(value: np.ndarray | float, resolution: np.ndarray | float) -> np.ndarray:
     """Return the value on the grid of a resolution."""
     return np.asarray(np.round(np.asarray(value) / resolution) * resolution)
-
-
-class Encoders:
-    """Motor encoders, read on the joint side."""
-
-    def __init__(self, data: SensorData, gear_ratio: np.ndarray) -> None:
-        self.resolution = 2 * np.pi / 2**data.encoder_bits / gear_ratio
-
-    def read(self, q: np.ndarray) -> np.ndarray:
-        """Return positions (n,) rad as encoders show them."""
-        return quantise(q, self.resolution)
 
 
 class TorqueSensors:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.controller import PlantController
@@ -13,7 +16,7 @@ from irtwin.demo.plant.drive import Drive, Losses
 from irtwin.demo.plant.friction import Friction
 from irtwin.demo.plant.machine import Machine, scatter
 from irtwin.demo.plant.motion import PlantMotion
-from irtwin.demo.plant.sensors import Encoders, PowerMeter, TorqueSensors, quantise
+from irtwin.demo.plant.sensors import PowerMeter, TorqueSensors, encoder_steps, quantise
 from irtwin.demo.plant.supply import Flow, Supply
 from irtwin.demo.plant.thermal import Thermal
 
@@ -55,6 +58,16 @@ class PlantRecording:
     mean_winding_loss: np.ndarray  # (n,) W
     mean_body_loss: np.ndarray  # (n,) W
 
+    def write(self, file: Path, joints: list[str]) -> None:
+        """Write the log; single precision holds every sensor's resolution but the clock's."""
+        columns = {"time": pa.array(np.round(self.time, 6))}
+        for prefix, values in (("q", self.q), ("tau", self.torque), ("temp", self.temperature)):
+            for joint, column in zip(joints, values.T, strict=True):
+                columns[f"{prefix}_{joint}"] = pa.array(column.astype(np.float32))
+        columns["power"] = pa.array(self.power.astype(np.float32))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(pa.table(columns), file, compression="zstd", compression_level=15, store_schema=False)
+
 
 class _Cell:
     """A machine at work: all parts and their states."""
@@ -76,7 +89,7 @@ class _Cell:
         self.drive = Drive(machine.drive)
         self.friction = Friction(friction, machine.drive.joint_inertia)
         self.supply = Supply(drawings.supply)
-        self.encoders = Encoders(drawings.sensors, machine.drive.gear_ratio)
+        self.encoder_steps = encoder_steps(drawings.sensors, machine.drive.gear_ratio)
         self.torque_sensors = TorqueSensors(drawings.sensors, machine.torque_offset, rng)
         self.meter = PowerMeter(drawings.sensors, machine.meter_gain, drawings.supply.standby, rng)
         self.nominal_constant = drawings.drive.joint_torque_constant
@@ -89,7 +102,7 @@ class _Cell:
         """Move on by one step; return electrical losses, friction loss (n,) W and where the power went."""
         data, thermal = self.arm.data, self.thermal
         q, before = data.qpos.copy(), data.qvel.copy()
-        wanted = self.controller.torque(sample, self.encoders.read(q))
+        wanted = self.controller.torque(sample, quantise(q, self.encoder_steps))
         self.torque = self.drive.torque(wanted, thermal.body, self.step)
         friction = self.friction.torque(q, before, self.load, thermal.body, self.step)
         acceleration = self.arm.advance(self.torque - friction)
@@ -108,7 +121,7 @@ class _Cell:
         temperature = thermal.body + self.winding_share * (thermal.winding - thermal.body)
         return np.concatenate(
             [
-                self.encoders.read(self.arm.data.qpos),
+                quantise(self.arm.data.qpos, self.encoder_steps),
                 self.torque_sensors.read(self.drive.current * self.nominal_constant),
                 quantise(temperature, self.temperature_resolution),
                 [self.meter.read()],
