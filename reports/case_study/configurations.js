@@ -6,20 +6,15 @@
     document.querySelectorAll(".pose").forEach((pose) => { pose.hidden = true; });
     return;
   }
-  const data = JSON.parse(scene.querySelector('script[type="application/json"]').textContent), run = data.runs[data.opens];
+  const data = JSON.parse(scene.querySelector('script[type="application/json"]').textContent);
+  const q = data.runs[data.opens].q.map(irtwinRobot.unpack);
 
-  function positions(last) {
-    return run.q.map(function ({ data, offset, scale }) {
-      const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0)), levels = new Int16Array(bytes.buffer);
-      return offset + scale * levels[last ? levels.length - 1 : 0];
-    });
-  }
+  const positions = (place) => q.map((values) => values.at(place));
 
   for (const pose of document.querySelectorAll(".pose")) {
     const pane = pose.querySelector("div"), viewer = irtwinRobot.makeViewer(pane, data.view);
-    irtwinRobot.build(viewer, data).pose(positions(pose.dataset.at === "last"));
+    irtwinRobot.build(viewer, data).pose(positions(pose.dataset.at === "last" ? -1 : 0));
     viewer.set_3d_pane_size();
-    const picture = pose.querySelector("img");
-    picture.src = viewer.capture_image(); // for paper
+    pose.querySelector("img").src = viewer.capture_image(); // for paper
   }
 })();

@@ -9,6 +9,7 @@
 //     .colour(shares)  colour what each joint moves by a share of -1 to 1; null gives it its own colours again
 //     .flange(q)       where the flange then is, m
 //   irtwinRobot.shade(share)          the colour of a share: blue, grey, orange
+//   irtwinRobot.bytes(text), .unpack(packed)  what packing.py put into base64: bytes, and samples, NaN where one is absent
 window.irtwinRobot = (function () {
   const { Viewer, THREE } = MeshCat;
   const LOW = new THREE.Color("#0072b2"), MIDDLE = new THREE.Color("#c9ced3"), HIGH = new THREE.Color("#d55e00");
@@ -36,8 +37,12 @@ window.irtwinRobot = (function () {
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
+  function unpack({ data, offset, scale }) {
+    return Float32Array.from(new Int16Array(bytes(data)), (level) => (level === -32768 ? NaN : offset + scale * level));
+  }
+
   function triangles({ points, faces }) {
-    const [x, y, z] = points.map(({ data, offset, scale }) => Float32Array.from(new Int16Array(bytes(data)), (level) => offset + scale * level));
+    const [x, y, z] = points.map(unpack);
     const made = new THREE.BufferGeometry(), places = new Float32Array(3 * x.length);
     x.forEach((_, i) => places.set([x[i], y[i], z[i]], 3 * i));
     made.setAttribute("position", new THREE.BufferAttribute(places, 3));
@@ -169,5 +174,5 @@ window.irtwinRobot = (function () {
     pane.addEventListener("pointerleave", () => { viewer.controls.enableZoom = false; });
     return viewer;
   }
-  return { supported, bySoftware, makeViewer, build, shade };
+  return { supported, bySoftware, makeViewer, build, shade, bytes, unpack };
 })();

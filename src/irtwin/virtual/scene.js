@@ -3,16 +3,8 @@
 // Needs robot.js and curves.js, fetches nothing. Other scripts take part through events on document:
 // `irtwin:time` {detail: {time: seconds, source: element}} and `irtwin:run` {detail: {run: its place, source: element}}.
 (function () {
-  const { THREE } = MeshCat, { supported, makeViewer, build, shade } = irtwinRobot, { panel, extent } = irtwinCurves;
+  const { THREE } = MeshCat, { supported, makeViewer, build, shade, bytes, unpack } = irtwinRobot, { panel, extent } = irtwinCurves;
   const TRAIL = 20; // seconds of the flange's path that stay in sight
-
-  function bytes(text) {
-    return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-  }
-
-  function unpack(packed) {
-    return Float32Array.from(new Int16Array(bytes(packed.data)), (level) => (level === -32768 ? NaN : packed.offset + packed.scale * level));
-  }
 
   // ---- a run: signals at even frames, straight lines between them
 
