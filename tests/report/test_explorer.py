@@ -5,12 +5,15 @@ from tests.report.robots import Factory, answers, power_only, six_axis
 from tests.virtual.scene_data import unpack
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.report.explorer import Columns, explorer, opening_run
+from irtwin.report.explorer import Columns, explorer
 
 
 def test_the_page_opens_on_a_held_out_run(graph: KnowledgeGraph):
-    run = opening_run(answers(graph, six_axis(graph)))
-    assert run and run["run_name"] in ("exciting_5", "cycle_6") and run["part"] == "held_out"
+    factory = six_axis(graph)
+    curves = explorer(answers(graph, factory), factory.read_series)
+    assert curves
+    run = curves["runs"][curves["opens"]]
+    assert run["name"] in ("exciting_5", "cycle_6") and run["part"] == "held_out"
 
 
 def test_curves_keep_the_extremes_of_the_samples(graph: KnowledgeGraph):

@@ -91,7 +91,7 @@ class AlarmTopic(BrokerConnection):
     def __init__(self, broker: Broker, announce: Announce) -> None:
         super().__init__(broker, announce)
         self._client.max_queued_messages_set(MOST_WAITING)
-        self._client.on_publish = self._acknowledged
+        self._client.on_publish = lambda *_: self._done()
         self._waiting = 0
         self._news = threading.Condition()
         self.begin()
@@ -113,9 +113,6 @@ class AlarmTopic(BrokerConnection):
         self.end()
         if left:
             self._announce(f"{self.broker.name}: {left} message{'s' * (left != 1)} not delivered: no time was left")
-
-    def _acknowledged(self, *_: Any) -> None:
-        self._done()
 
     def _done(self) -> None:
         with self._news:

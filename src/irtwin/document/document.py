@@ -356,16 +356,12 @@ class CauseChange:
     @property
     def changes(self) -> tuple[ChangeBy, ...]:
         """What it changes alone, and all others without it: pooled over joints."""
-        before, measure = pooled(self.rmse_before), f"{self.channel}_rmse"
-        left = {"alone": self.rmse_alone, "without": self.rmse_when_left_out}
-        changes = {
-            part: Change(before=before, after=pooled(after), noise_floor=None, interval95_after=None)
-            for part, after in left.items()
-        }
-        return tuple(
-            ChangeBy(measure=measure, part=part, cause=self.cause, place=self.cause, **vars(change))
-            for part, change in changes.items()
-        )
+
+        def change(part: str, after: Sequence[float]) -> ChangeBy:
+            one = Change(before=pooled(self.rmse_before), after=pooled(after), noise_floor=None, interval95_after=None)
+            return ChangeBy(measure=f"{self.channel}_rmse", part=part, cause=self.cause, place=self.cause, **vars(one))
+
+        return change("alone", self.rmse_alone), change("without", self.rmse_when_left_out)
 
 
 def pooled(values: Sequence[float]) -> float:

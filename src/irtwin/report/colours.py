@@ -10,6 +10,7 @@ from irtwin.effects.catalogue import catalogue
 # Okabe and Ito's palette, told apart with every kind of colour blindness; yellow last, it is weak on white.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#7F8C99", "#F0E442")
 MEASURED, MODELLED, RESIDUAL, HELD_OUT = "#7A8794", "#D55E00", "#009E73", "#0072B2"
+OF_LINES = {"measured": MEASURED, "modelled": MODELLED, "residual": RESIDUAL, "held_out": HELD_OUT}  # of scripts
 LIMIT = "#C2410C"  # of a line that something is held against
 _OTHER = "#7F8C99"  # of an effect that is in no catalogue
 _LIGHTEST, _DARKEST = 0.72, 0.32  # lightness of the shades of a family
@@ -19,11 +20,6 @@ _GOLDEN = 0.618  # neighbours of a family get shades far from each other
 def effect_colour(effect: str) -> str:
     """Return the colour of an effect by its id: the hue is its family's, the shade its own."""
     return _effects().get(effect, _OTHER)
-
-
-def of_lines() -> dict[str, str]:
-    """Return the colours that the pages' scripts draw with, by name."""
-    return {"measured": MEASURED, "modelled": MODELLED, "residual": RESIDUAL, "held_out": HELD_OUT}
 
 
 @cache

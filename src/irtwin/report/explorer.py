@@ -60,15 +60,12 @@ class Columns:
         )
 
 
-def opening_run(answers: Answers) -> Row | None:
-    """Return the row of the modelled series to show first: of the held-out runs, that which takes the most energy."""
+def _opening_run(answers: Answers) -> int:
+    """Return the place of the modelled series to show first: of held-out runs, that which takes the most energy."""
+    rows, rank = answers["modelled_series"].rows, {"held_out": 2, "both": 1}
     energies = {row["run"]: row["modelled_j"] for row in answers["energy_per_run"].rows}
-    rank = {"held_out": 2, "both": 1}
-    return max(
-        answers["modelled_series"].rows,
-        key=lambda row: (rank.get(row["part"], 0), energies.get(row["run"], 0.0)),
-        default=None,
-    )
+    keys = [(rank.get(row["part"], 0), energies.get(row["run"], 0.0)) for row in rows]
+    return keys.index(max(keys))
 
 
 def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None:
@@ -83,11 +80,10 @@ def explorer(answers: Answers, read_series: ReadSeries) -> dict[str, Any] | None
     runs = [(row, Columns.of(read_series(row["file"], row["checksum"]))) for row in rows]
     charts = sum(len(columns.joints) + 2 for _, columns in runs)
     points = int(np.clip(_BUDGET // charts, _FEWEST, _POINTS))
-    opens = opening_run(answers)
     kinds = {row["joint"]: row["kind"] for row in answers["joints"].rows}
     return {
         "runs": [_run(row, columns, points, kinds) for row, columns in runs],
-        "opens": next(index for index, row in enumerate(rows) if row is opens),
+        "opens": _opening_run(answers),
         "points": points,
     }
 

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from irtwin.packing import Fragment, embedded_json, packed_scripts
-from irtwin.report.colours import of_lines
+from irtwin.report.colours import OF_LINES
 from irtwin.report.questions import Answers, added_to
 from irtwin.report.templates import style, written
 from irtwin.report.traces import Figure
@@ -48,7 +48,7 @@ def report_page(
         rows={name: answer.rows for name, answer in answers.items()},
         drawn=drawn,
         curves=curves,
-        data=embedded_json({"figures": figures, "explorer": curves, "colours": of_lines()}),
+        data=embedded_json({"figures": figures, "explorer": curves, "colours": OF_LINES}),
         style=style(resources, *styles),
         scripts=scripts.html,
         policy=content_policy([*scripts.scripts, *(fragment.scripts if fragment else ())]),
