@@ -5,93 +5,71 @@ from __future__ import annotations
 from functools import cache
 from importlib.metadata import entry_points
 
-from irtwin.effects.compliance import Backlash, JointElasticity
-from irtwin.effects.disturbance import PeriodicDisturbance, SwitchingLoad
-from irtwin.effects.drive import CopperLoss, InverterLoss, IronLoss, RotorInertia, WindingTemperature
+from irtwin.effects import (
+    compliance,
+    disturbance,
+    drive,
+    friction,
+    load,
+    local,
+    rigid_body,
+    sensing,
+    supply,
+    transmission,
+)
 from irtwin.effects.effect import Effect
-from irtwin.effects.friction import (
-    AsymmetricFriction,
-    CoulombFriction,
-    LoadDependentFriction,
-    NonlinearViscousFriction,
-    PositionDependentFriction,
-    PreslidingHysteresis,
-    StribeckFriction,
-    TemperatureDependentFriction,
-    ViscousFriction,
-)
-from irtwin.effects.load import BaseTilt, CableDrag, ExternalContact, GravityCompensation, Payload
-from irtwin.effects.local import JointLimitSpring, LocalWear
-from irtwin.effects.rigid_body import RigidBody
-from irtwin.effects.sensing import (
-    EncoderOffset,
-    MeterGain,
-    MeterLag,
-    TimeDelay,
-    TorqueConstantError,
-    TorqueDrift,
-    TorqueOffset,
-)
-from irtwin.effects.supply import BusCapacitor, HoldingBrakes, MechanicalPower, NoRegeneration, StandbyPower
-from irtwin.effects.transmission import JointCoupling, TorqueRipple
 
 GROUP = "irtwin.effects"
 
+_BASELINE: tuple[type[Effect], ...] = (  # the seed paper's model, with rotor inertia and offset
+    rigid_body.RigidBody,
+    drive.RotorInertia,
+    friction.CoulombFriction,
+    friction.ViscousFriction,
+    sensing.TorqueOffset,
+    supply.MechanicalPower,
+    supply.StandbyPower,
+)
 _OWN: tuple[type[Effect], ...] = (
-    RigidBody,
-    RotorInertia,
-    CoulombFriction,
-    ViscousFriction,
-    TorqueOffset,
-    MechanicalPower,
-    StandbyPower,
-    StribeckFriction,
-    NonlinearViscousFriction,
-    AsymmetricFriction,
-    LoadDependentFriction,
-    TemperatureDependentFriction,
-    PreslidingHysteresis,
-    Backlash,
-    JointElasticity,
-    TorqueRipple,
-    PositionDependentFriction,
-    JointCoupling,
-    CableDrag,
-    GravityCompensation,
-    Payload,
-    BaseTilt,
-    ExternalContact,
-    TorqueConstantError,
-    TorqueDrift,
-    EncoderOffset,
-    TimeDelay,
-    CopperLoss,
-    WindingTemperature,
-    IronLoss,
-    InverterLoss,
-    NoRegeneration,
-    BusCapacitor,
-    HoldingBrakes,
-    MeterLag,
-    MeterGain,
-    PeriodicDisturbance,
-    SwitchingLoad,
-    LocalWear,
-    JointLimitSpring,
+    *_BASELINE,
+    friction.StribeckFriction,
+    friction.NonlinearViscousFriction,
+    friction.AsymmetricFriction,
+    friction.LoadDependentFriction,
+    friction.TemperatureDependentFriction,
+    friction.PreslidingHysteresis,
+    compliance.Backlash,
+    compliance.JointElasticity,
+    transmission.TorqueRipple,
+    friction.PositionDependentFriction,
+    transmission.JointCoupling,
+    load.CableDrag,
+    load.GravityCompensation,
+    load.Payload,
+    load.BaseTilt,
+    load.ExternalContact,
+    sensing.TorqueConstantError,
+    sensing.TorqueDrift,
+    sensing.EncoderOffset,
+    sensing.TimeDelay,
+    drive.CopperLoss,
+    drive.WindingTemperature,
+    drive.IronLoss,
+    drive.InverterLoss,
+    supply.NoRegeneration,
+    supply.BusCapacitor,
+    supply.HoldingBrakes,
+    sensing.MeterLag,
+    sensing.MeterGain,
+    disturbance.PeriodicDisturbance,
+    disturbance.SwitchingLoad,
+    local.LocalWear,
+    local.JointLimitSpring,
 )
 
-# The default twin: the seed paper's model, with rotor inertia and offset.
-BASELINE = (
-    RigidBody.id,
-    RotorInertia.id,
-    CoulombFriction.id,
-    ViscousFriction.id,
-    TorqueOffset.id,
-    MechanicalPower.id,
-    StandbyPower.id,
-)
+BASELINE = tuple(kind.id for kind in _BASELINE)  # the default twin
 # What an exciting motion has to show.
-EXCITED = (RigidBody.id, RotorInertia.id, ViscousFriction.id, CoulombFriction.id, TorqueOffset.id)
+EXCITED = (*BASELINE[:2], friction.ViscousFriction.id, friction.CoulombFriction.id, sensing.TorqueOffset.id)
 
 
 def catalogue() -> dict[str, Effect]:
