@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -65,16 +65,9 @@ class Predicted:
         """Return what is predicted for samples start..stop (exclusive)."""
         if start == 0 and stop >= len(self.torque):
             return self
-        cut = slice(start, stop)
-        return Predicted(
-            self.torque[cut],
-            None if self.power is None else self.power[cut],
-            None if self.axes is None else self.axes[cut],
-            self.bodies,
-            None if self.load is None else self.load[cut],
-            None if self.inertia is None else self.inertia[cut],
-            self.whole or self,
-        )
+        samples = {name: getattr(self, name) for name in ("torque", "power", "axes", "load", "inertia")}
+        cut: dict[str, Any] = {name: None if own is None else own[start:stop] for name, own in samples.items()}
+        return replace(self, **cut, whole=self.whole or self, kept={})
 
 
 @dataclass(frozen=True)
@@ -272,7 +265,7 @@ class Effect(ABC):
         names = [each.name for each in fields(self) if each.name not in ("joints", "runs")]
         return {name: getattr(self, name) for name in names}
 
-    def on(self, *joints: str) -> Effect:
+    def on(self, *joints: str) -> Self:
         """Return the effect in these joints alone."""
         return replace(self, joints=joints)
 
@@ -292,7 +285,7 @@ class Effect(ABC):
         """Return the joints on which a coefficient acts that is named by a joint."""
         return (joint,)
 
-    def variants(self, **shapes: tuple[Any, ...]) -> tuple[Effect, ...]:
+    def variants(self, **shapes: tuple[Any, ...]) -> tuple[Self, ...]:
         """Return the effect with each value of one field."""
         return tuple(replace(self, **{name: value}) for name, values in shapes.items() for value in values)
 

@@ -163,7 +163,7 @@ class StribeckFriction(JointEffect):
     vs: float = 0.05  # rad/s
     d: float = 1.0
 
-    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+    def candidates(self, robot: Robot | None = None) -> tuple[StribeckFriction, ...]:
         """Return a grid of speeds and two forms, where dry friction has turned by then: what is slower is that turn."""
         grid = [replace(self, vs=vs, d=d) for vs in (0.01, 0.025, 0.05, 0.1, 0.2) for d in (1.0, 2.0)]
         if robot is None:
@@ -195,7 +195,7 @@ class NonlinearViscousFriction(JointEffect):
 
     d: float = 2.0
 
-    def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
+    def candidates(self, robot: Robot | None = None) -> tuple[NonlinearViscousFriction, ...]:
         """Return exponents on either side of one."""
         return self.variants(d=(0.3, 0.5, 0.7, 1.5, 2.0, 3.0))
 
@@ -440,6 +440,5 @@ class PositionDependentFriction(JointEffect):
 
 def shapes_over_speed(turned: float) -> tuple[JointEffect, ...]:
     """Return the forms that friction may have over speed, in the shapes tried, that are not over by a speed, rad/s."""
-    fading = (shape for shape in StribeckFriction().candidates() if shape.shape["vs"] > turned)
-    every = (*fading, *NonlinearViscousFriction().candidates())
-    return tuple(shape for shape in every if isinstance(shape, JointEffect))
+    fading = (shape for shape in StribeckFriction().candidates() if shape.vs > turned)
+    return (*fading, *NonlinearViscousFriction().candidates())

@@ -54,10 +54,6 @@ class LocalEffect(JointEffect):
         In groups, of one shape at least, which the rest of the twin may make alike: the best of each is to be tried.
         """
 
-    def on(self, *joints: str) -> LocalEffect:
-        """Return the effect in these joints alone."""
-        return replace(self, joints=joints)
-
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return shapes over the range of the joints; the widest of them, or a turn."""
         limits = [(joint.lower, joint.upper) for joint in robot.joints] if robot else []
@@ -66,9 +62,9 @@ class LocalEffect(JointEffect):
         upper = max((pair[1] for pair in known), default=np.pi)
         return self._coarse(lower, upper)
 
-    @abstractmethod
     def _coarse(self, lower: float, upper: float) -> tuple[Effect, ...]:
         """Return few shapes from `lower` to `upper`."""
+        return tuple(shape for group in self.over(lower, upper) for shape in group)
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return the law along the motion."""
@@ -145,10 +141,6 @@ class JointLimitSpring(LocalEffect):
             tuple(replace(self, q0=lower + share * way, side=1.0) for share in _ENDS),
             tuple(replace(self, q0=upper - share * way, side=-1.0) for share in _ENDS),
         )
-
-    def _coarse(self, lower: float, upper: float) -> tuple[Effect, ...]:
-        above, below = self.over(lower, upper)
-        return (*above, *below)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return k."""

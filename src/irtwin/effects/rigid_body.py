@@ -156,34 +156,18 @@ def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
     return _regressor(robot, motion)[:, :, 10 * (carrier - 1) : 10 * carrier]
 
 
-class _Last:
-    """The regressor that was asked for last: bodies and payload ask for that of the same part of a run in turn."""
-
-    def __init__(self) -> None:
-        self._known: tuple[ReferenceType[Robot], ReferenceType[Motion], np.ndarray] | None = None
-
-    def of(self, robot: Robot, motion: Motion) -> np.ndarray | None:
-        known = self._known
-        return known[2] if known and known[0]() is robot and known[1]() is motion else None
-
-    def keep(self, robot: Robot, motion: Motion, regressor: np.ndarray) -> None:
-        self._known = ref(robot), ref(motion, self._forget), regressor
-
-    def _forget(self, motion: ReferenceType[Motion]) -> None:
-        if self._known and self._known[1] is motion:
-            self._known = None
-
-
-_last = _Last()
+# The last regressor, of a robot and a motion: bodies and payload ask for that of the same part of a run in turn.
+_last: list[tuple[ReferenceType[Robot], ReferenceType[Motion], np.ndarray]] = []
 
 
 def _regressor(robot: Robot, motion: Motion) -> np.ndarray:
     """Return the (N, n, 10 n) torque regressor of all bodies, not to be written to."""
-    if (last := _last.of(robot, motion)) is not None:
-        return last
+    for of_robot, of_motion, regressor in tuple(_last):
+        if of_robot() is robot and of_motion() is motion:
+            return regressor
     regressor = body_regressor(robot.model, motion.q, motion.dq, motion.ddq)
     regressor.flags.writeable = False
-    _last.keep(robot, motion, regressor)
+    _last[:] = [(ref(robot), ref(motion, lambda _: _last.clear()), regressor)]
     return regressor
 
 

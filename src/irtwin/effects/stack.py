@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -57,8 +58,8 @@ class Stack:
         self._torque = [effect for effect in self.effects if effect.signal == "torque"]
         self._power = [effect for effect in self.effects if effect.signal == "power"]
         self._last_torques: _Torques | None = None
-        self._last_columns: dict[int, tuple[Motion, Predicted | None, np.ndarray]] = {}
-        self._last_undecided: dict[int, tuple[Motion, np.ndarray | None]] = {}
+        self._last_powers: tuple[Motion, tuple[bool, bytes, bytes], dict[int, Predicted]] | None = None
+        self._last_of_whole: dict[tuple[str, int], tuple[Motion, Predicted | None, np.ndarray | None]] = {}
         self._check()
 
     def _check(self) -> None:
@@ -106,8 +107,8 @@ class Stack:
         return tuple((effect, self.prior.informed(effect, term)) for effect, term in pairs)
 
     @cached_property
-    def _torque_places(self) -> tuple[tuple[Effect, slice], ...]:
-        return tuple(_slices(self._torque, self.robot))
+    def _torque_places(self) -> dict[Effect, slice]:
+        return _places(self._torque, self.robot)
 
     @cached_property
     def real(self) -> np.ndarray:
@@ -157,7 +158,7 @@ class Stack:
 
         `values` (K,): coefficients with which effects predict what others are built on; None: as expected.
         """
-        below = self._torques(motion, values).below if self.coupled else {}
+        below = self._below(motion, values)
         parts = [self.columns(effect, motion, below.get(effect.stage)) for effect in self._torque]
         return np.concatenate([np.zeros((*motion.dq.shape, 0)), *parts], axis=2)
 
@@ -187,13 +188,11 @@ class Stack:
         columns: Callable[[Effect, Motion, Predicted | None], Sequence[AnyColumns]],
     ) -> list[list[np.ndarray | AnyColumns]]:
         """Return arrays of columns for each joint; `columns` gives those of an effect of more than one."""
-        below = self._torques(motion, values).below if self.coupled else {}
+        below = self._below(motion, values)
         by_joint: list[list[np.ndarray | AnyColumns]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
         for effect in self._torque:
             if isinstance(effect, JointEffect) and effect.acts_in(motion) and not effect.memory:
-                before = below.get(effect.stage)
-                stop = motion.start + len(motion.time)
-                samples = effect.samples(self.robot, motion, before and before.part(motion.start, stop))
+                samples = effect.samples(self.robot, motion, _part(below.get(effect.stage), motion))
                 for joint in effect.acting(self.robot):
                     place = self.robot.index(joint.name)
                     by_joint[place] += [sample[:, place : place + 1] for sample in samples]
@@ -203,8 +202,8 @@ class Stack:
         return by_joint
 
     def _dense(self, effect: Effect, motion: Motion, below: Predicted | None) -> list[np.ndarray]:
-        columns, own = self.columns(effect, motion, below), dict(self._torque_places)[effect]
-        return [columns[:, place, used] for place, used in enumerate(self.pattern[:, own])]
+        columns, pattern = self.columns(effect, motion, below), self.pattern[:, self._torque_places[effect]]
+        return [columns[:, place, used] for place, used in enumerate(pattern)]
 
     @cached_property
     def _spans(self) -> dict[Effect, list[Span]]:
@@ -216,28 +215,28 @@ class Stack:
                 _span(effect.columns(self.robot, probe)[:, joint], used)
                 for joint, used in enumerate(self.pattern[:, own])
             ]
-            for effect, own in self._torque_places
+            for effect, own in self._torque_places.items()
             if effect.smooth
         }
 
     def shift_torque(self, motion: Motion, *, sparse: bool = False) -> np.ndarray:
         """Return the torque (N, n), N m, of what is known to be added; `sparse` as in `torque_of`."""
         shift, torque = self.shift(motion), np.zeros(motion.dq.shape)
-        for effect, own in self._torque_places:
+        for effect, own in self._torque_places.items():
             if shift[own].any():
-                add = partial(self._shift_torque, effect, shift[own])
+                add = partial(self._added, effect, below=None, values=shift[own])
                 torque += at_all(add, motion) if sparse and effect.smooth else add(motion)
         return torque
 
-    def _shift_torque(self, effect: Effect, shift: np.ndarray, motion: Motion) -> np.ndarray:
-        return np.asarray(self.columns(effect, motion, None) @ shift)
+    def _added(self, effect: Effect, motion: Motion, below: Predicted | None, values: np.ndarray) -> np.ndarray:
+        return np.asarray(self.columns(effect, motion, below) @ values)
 
     def carried(self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """Return (N, R), for each coefficient of real torque, its column in each joint times `along` (N, n), summed.
 
         It is the power that the column carries, if along is a speed; `values` as in `torque_columns`.
         """
-        below = self._torques(motion, values).below if self.coupled else {}
+        below = self._below(motion, values)
         found = [self._carried(effect, motion, along, below.get(effect.stage)) for effect in self._real]
         return side_by_side([np.zeros((len(along), 0)), *found])
 
@@ -245,7 +244,7 @@ class Stack:
         self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None
     ) -> list[np.ndarray | Sparse]:
         """Return `carried` as arrays to stand side by side, those of smooth effects sparse."""
-        below = self._torques(motion, values).below if self.coupled else {}
+        below = self._below(motion, values)
         some, slower = at_some(motion), factor_at_some(along, motion)
         return [
             Sparse(effect.carried(self.robot, some, slower))
@@ -262,21 +261,11 @@ class Stack:
         """Return (N, n) where some effect cannot say the joint's torque."""
         undecided = np.zeros(motion.dq.shape, dtype=bool)
         for effect in self._torque:
-            part = self._undecided_by(effect, motion)
+            part = self._of_whole("undecided", effect, motion) if effect.memory else effect.undecided(motion)
             if part is not None:
                 acting = effect.places(self.robot)
                 undecided[:, acting] |= part[:, acting]
         return undecided
-
-    def _undecided_by(self, effect: Effect, motion: Motion) -> np.ndarray | None:
-        """Return what one effect cannot say; of one with memory the whole run is looked at once for all its parts."""
-        if not effect.memory:
-            return effect.undecided(motion)
-        whole = motion.whole or motion
-        last = self._last_undecided.get(id(effect))
-        if last is None or last[0] is not whole:
-            last = self._last_undecided[id(effect)] = whole, effect.undecided(whole)
-        return None if last[1] is None else last[1][motion.start : motion.start + len(motion.time)]
 
     def switching(self, motion: Motion) -> np.ndarray | None:
         """Return (N,) where brakes open or close, or are about to; None without brakes.
@@ -295,7 +284,7 @@ class Stack:
     def real_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
         """Return the real joint torque, (N, n) N m, of the (K,) torque coefficients; `sparse` as in `torque_of`."""
         if self.coupled:
-            return self._torques(motion, values).real[motion.start : motion.start + len(motion.time)]
+            return _cut(self._torques(motion, values).real, motion)
         return self.torque_of(self._real, motion, values, sparse=sparse)
 
     def logged_torque(self, motion: Motion, values: np.ndarray, *, sparse: bool = False) -> np.ndarray:
@@ -326,9 +315,9 @@ class Stack:
         That of smooth ones is worked out at some samples where it may be `sparse`.
         """
         total = values + self.shift(motion)
-        below = self._torques(motion, values).below if self.coupled else {}
+        below = self._below(motion, values)
         torque = np.zeros(motion.dq.shape)
-        for effect, own in self._torque_places:
+        for effect, own in self._torque_places.items():
             if effect in effects:
                 add = partial(self._contribution, effect, below=below.get(effect.stage), values=total[own])
                 torque += at_all(add, motion) if sparse and effect.smooth else add(motion)
@@ -378,11 +367,10 @@ class Stack:
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""
-        parts = [np.full(own.stop - own.start, effect.shift(self.robot, motion)) for effect, own in self._torque_places]
-        return np.concatenate([np.zeros(0), *parts])
-
-    def _expected(self, terms: Sequence[tuple[Effect, Term]]) -> np.ndarray:
-        return np.array([term.expected for _, term in terms], dtype=float)
+        shift = np.zeros(len(self.torque_terms))
+        for effect, own in self._torque_places.items():
+            shift[own] = effect.shift(self.robot, motion)
+        return shift
 
     def columns(self, effect: Effect, motion: Motion, below: Predicted | None) -> np.ndarray:
         """Return the columns of an effect (of the stack or not) for a motion that may be a part of a run.
@@ -392,16 +380,18 @@ class Stack:
         if not effect.acts_in(motion):
             shape = (len(motion.time), len(effect.terms(self.robot)))
             return np.zeros(shape if effect.signal == "power" else (shape[0], motion.dq.shape[1], shape[1]))
-        stop = motion.start + len(motion.time)
-        if not effect.memory:
-            own = effect.columns(self.robot, motion, None if below is None else below.part(motion.start, stop))
-            return self._while_on(effect, motion, own)
-        whole = motion.whole or motion
-        last = self._last_columns.get(id(effect))
+        if effect.memory:
+            return np.asarray(self._of_whole("columns", effect, motion, below))
+        return self._while_on(effect, motion, effect.columns(self.robot, motion, _part(below, motion)))
+
+    def _of_whole(self, what: str, effect: Effect, motion: Motion, below: Predicted | None = None) -> np.ndarray | None:
+        """Return "columns" of an effect with memory, or where it is "undecided": of a run at once for all its parts."""
+        whole, key = motion.whole or motion, (what, id(effect))
+        last = self._last_of_whole.get(key)
         if last is None or last[0] is not whole or last[1] is not below:
-            last = (whole, below, effect.columns(self.robot, whole, below))
-            self._last_columns[id(effect)] = last
-        return last[2][motion.start : stop]
+            found = effect.columns(self.robot, whole, below) if what == "columns" else effect.undecided(whole)
+            last = self._last_of_whole[key] = whole, below, found
+        return None if last[2] is None else _cut(last[2], motion)
 
     def drives_on(self, motion: Motion) -> np.ndarray | None:
         """Return (N,) 1 where the drives are on, 0 where closed brakes hold the joints; None: they are always on."""
@@ -418,29 +408,29 @@ class Stack:
     def _contribution(self, effect: Effect, motion: Motion, values: np.ndarray, below: Predicted | None) -> np.ndarray:
         """Return what (k,) coefficients of an effect of torque add, (N, n) N m; `below` as in `columns`."""
         if effect.memory or not effect.acts_in(motion):
-            return np.asarray(self.columns(effect, motion, below) @ values)
-        stop = motion.start + len(motion.time)
-        return effect.contribution(self.robot, motion, values, below and below.part(motion.start, stop))
+            return self._added(effect, motion, below, values)
+        return effect.contribution(self.robot, motion, values, _part(below, motion))
 
     def _carried(self, effect: Effect, motion: Motion, along: np.ndarray, below: Predicted | None) -> np.ndarray:
         """Return (N, k) what columns of an effect of torque carry `along` (N, n); `below` as in `columns`."""
         if effect.memory or not effect.acts_in(motion):
             return np.asarray(np.einsum("njk,nj->nk", self.columns(effect, motion, below), along))
-        stop = motion.start + len(motion.time)
-        return effect.carried(self.robot, motion, along, below and below.part(motion.start, stop))
+        return effect.carried(self.robot, motion, along, _part(below, motion))
 
     def bodies(self, motion: Motion, values: np.ndarray) -> np.ndarray | None:
         """Return the (10 n,) inertial parameters with payload by (K,) torque coefficients; None: those of the URDF."""
         total = values + self.shift(motion)
-        for effect, own in self._torque_places:
-            if effect.id == "rigid_body":
-                return np.asarray(total[own])
-        return None
+        own = next((own for effect, own in self._torque_places.items() if effect.bodies), None)
+        return None if own is None else np.asarray(total[own])
+
+    def _below(self, motion: Motion, values: np.ndarray | None) -> Mapping[int, Predicted]:
+        """Return what effects of torque are built on, by their stage: over the whole run."""
+        return self._torques(motion, values).below if self.coupled else {}
 
     def _torques(self, motion: Motion, values: np.ndarray | None) -> _Torques:
         """Predict stage by stage; the last run is remembered, as runs are read piece by piece."""
         whole = motion.whole or motion
-        values = self._expected(self.torque_terms) if values is None else values
+        values = expected(self.torque_terms) if values is None else values
         last = self._last_torques
         if last is None or last.motion is not whole or last.values != values.tobytes():
             last = self._last_torques = self._predict_torques(whole, values)
@@ -450,9 +440,8 @@ class Stack:
         total, bodies = values + self.shift(whole), self.bodies(whole, values)
         real, shown = np.zeros(whole.dq.shape), np.zeros(whole.dq.shape)
         below: dict[int, Predicted] = {}
-        owned = self._torque_places
         for stage in sorted({effect.stage for effect in self._torque}):
-            now = [(effect, own) for effect, own in owned if effect.stage == stage]
+            now = [(effect, own) for effect, own in self._torque_places.items() if effect.stage == stage]
             measured = any(effect.channel == "measurement" for effect, _ in now) and stage > 1
             below[stage] = Predicted(shown.copy() if measured else real.copy(), bodies=bodies)
             for piece in whole.pieces(_PIECE):
@@ -473,35 +462,41 @@ class Stack:
         whole = motion.whole or motion
         key = logged, torque_values.tobytes(), b"" if power_values is None else power_values.tobytes()
         if self._last_powers is None or self._last_powers[0] is not whole or self._last_powers[1] != key:
-            values = self._expected(self.power_terms) if power_values is None else power_values
+            values = expected(self.power_terms) if power_values is None else power_values
             pieces = [self._torque_by(piece, torque_values, logged) for piece in whole.pieces(_PIECE)]
             self._last_powers = whole, key, self._predict_powers(whole, np.concatenate(pieces), values)
         return self._last_powers[2]
 
-    _last_powers: tuple[Motion, tuple[bool, bytes, bytes], dict[int, Predicted]] | None = None
-
     def _predict_powers(self, whole: Motion, torque: np.ndarray, values: np.ndarray) -> dict[int, Predicted]:
         power, axes = np.zeros(len(torque)), np.zeros(len(torque))
         below: dict[int, Predicted] = {}
-        owned = list(_slices(self._power, self.robot))
-        for stage in sorted({effect.stage for effect in self._power}):
-            below[stage] = Predicted(torque, power.copy(), axes.copy())
-            for effect, own in owned:
-                if effect.stage != stage:
-                    continue
-                part = self.columns(effect, whole, below[stage]) @ values[own]
-                power += part
-                axes += part if self.on_the_bus[own].any() else 0.0
+        places = _places(self._power, self.robot)
+        for effect, own in sorted(places.items(), key=lambda pair: pair[0].stage):
+            if effect.stage not in below:
+                below[effect.stage] = Predicted(torque, power.copy(), axes.copy())
+            part = self.columns(effect, whole, below[effect.stage]) @ values[own]
+            power += part
+            axes += part if self.on_the_bus[own].any() else 0.0
         return below
 
 
-def _slices(effects: Sequence[Effect], robot: Robot) -> Iterator[tuple[Effect, slice]]:
-    """Yield each effect with the place of its coefficients among all."""
-    start = 0
-    for effect in effects:
-        stop = start + len(effect.terms(robot))
-        yield effect, slice(start, stop)
-        start = stop
+def expected(terms: Sequence[tuple[Effect, Term]]) -> np.ndarray:
+    """Return what coefficients are expected to be, (K,)."""
+    return np.array([term.expected for _, term in terms], dtype=float)
+
+
+def _places(effects: Sequence[Effect], robot: Robot) -> dict[Effect, slice]:
+    """Return the place of each effect's coefficients among all."""
+    ends = np.cumsum([0, *(len(effect.terms(robot)) for effect in effects)]).tolist()
+    return {effect: slice(*own) for effect, own in zip(effects, pairwise(ends), strict=True)}
+
+
+def _part(below: Predicted | None, motion: Motion) -> Predicted | None:
+    return below and below.part(motion.start, motion.start + len(motion.time))
+
+
+def _cut(of_whole: np.ndarray, motion: Motion) -> np.ndarray:
+    return of_whole[motion.start : motion.start + len(motion.time)]
 
 
 def _span(columns: np.ndarray, used: np.ndarray) -> Span:

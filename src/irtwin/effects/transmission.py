@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class JointCoupling(Effect):
         acting = self.acting(robot)
         return acting[-2:] if len(acting) > 1 else ()
 
-    def on(self, *joints: str) -> Effect:
+    def on(self, *joints: str) -> Self:
         """Return the effect in a pair of joints; one joint alone leaves the pair as it is."""
         return replace(self, joints=joints) if len(joints) > 1 else self
 

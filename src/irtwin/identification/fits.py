@@ -10,7 +10,7 @@ import numpy as np
 
 from irtwin.effects.drive import CopperLoss
 from irtwin.effects.effect import Effect, Term
-from irtwin.effects.stack import Stack
+from irtwin.effects.stack import Stack, expected
 from irtwin.identification.accumulate import Block, Columns, Equations, Rows, accumulate, accumulate_any, part_read
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rise_over_axes, rows_of_both
@@ -64,7 +64,7 @@ def fit_power(
         equations = _losses_equations(stack, torque_values, values, logged=True, switching=switching)
         return _of_one(motions, equations, free, stack.prior_rows(free), every)
 
-    values = _expected(stack.power_terms)
+    values = expected(stack.power_terms)
     blocks, found = fit(values)
     for _ in range(_REPEATS if stack.power_coupled else 0):
         step = np.abs(found.values - values[~stack.fixed]) / np.sqrt(np.diag(found.covariance))
@@ -80,7 +80,7 @@ def predicted_losses(
     stack: Stack, motions: Sequence[Motion], torque_values: np.ndarray, free_values: np.ndarray
 ) -> list[Block]:
     """Return the equations of power on the torque that is predicted, reduced, about free coefficients of power."""
-    values = _expected(stack.power_terms)
+    values = expected(stack.power_terms)
     values[~stack.fixed] = free_values
     equations = _losses_equations(stack, torque_values, values, logged=False)
     return accumulate(motions, equations, np.ones((1, len(free_values)), dtype=bool))
@@ -97,7 +97,7 @@ def _losses_equations(
         torque = torque_of(motion, torque_values, sparse=True)
         columns = stack.predicted_power_columns(motion, torque_values, values, torque, logged=logged)
         burnt = _burnt(stack, motion, torque, columns, values)
-        known = columns[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        known = columns[:, stack.fixed] @ expected(stack.power_terms)[stack.fixed]
         known -= burnt[:, ~stack.fixed] @ values[~stack.fixed]
         unsure = None if switching or (near := stack.switching(motion)) is None else near[:, None]
         return Rows((columns + burnt)[:, None, ~stack.fixed], known[:, None], motion.power[:, None], unsure)
@@ -202,7 +202,7 @@ def _unsure(stack: Stack, motion: Motion, work: np.ndarray) -> np.ndarray:
 def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine[Columns], np.ndarray]]:
     """Return what gives power's line about the coefficients, and the joints' work (N,), W."""
     torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
-    power_values = _expected(stack.power_terms)
+    power_values = expected(stack.power_terms)
     power_values[stack.fixed] *= 1 + scale
     power_values[~stack.fixed] = free
 
@@ -211,7 +211,7 @@ def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[Po
         now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
         carrying = partial(stack.sparse_carried, motion, values=torque_values)
         line = power_line(stack, motion, carrying, torque, now, power_values)
-        return line, now[:, stack.fixed] @ _expected(stack.power_terms)[stack.fixed]
+        return line, now[:, stack.fixed] @ expected(stack.power_terms)[stack.fixed]
 
     return line_of
 
@@ -253,7 +253,7 @@ def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarr
     in both: Gauss-Newton, from no torque, where the first step is that of a robot without such losses.
     """
     real, free = real_terms(stack), free_terms(stack)
-    torque_values, power_values = np.zeros(len(stack.torque_terms)), _expected(stack.power_terms)
+    torque_values, power_values = np.zeros(len(stack.torque_terms)), expected(stack.power_terms)
     before = np.full(len(real) + len(free), np.inf)
     for _ in range(_STEPS):
         equations = _power_equations(stack, torque_values.copy(), power_values.copy())
@@ -318,7 +318,3 @@ def _of_one(
 
 def _of(terms: Terms) -> list[Term]:
     return [term for _, term in terms]
-
-
-def _expected(terms: Terms) -> np.ndarray:
-    return np.array([term.expected for _, term in terms], dtype=float)

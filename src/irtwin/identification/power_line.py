@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect, Predicted
-from irtwin.effects.stack import Stack
+from irtwin.effects.stack import Stack, expected
 from irtwin.identification.accumulate import Columns, Given, Rows
 from irtwin.signals.motion import Motion
 
@@ -49,7 +49,7 @@ def power_line(
     """
     slope = np.where(told, 0.0, power_slope(stack, motion, torque, values))
     real = carrying(slope)
-    fixed = np.array([term.expected for _, term in stack.power_terms])[stack.fixed]
+    fixed = expected(stack.power_terms)[stack.fixed]
     shifted = stack.shift_torque(motion, sparse=True)
     known = power[:, stack.fixed] @ fixed + (slope * (shifted - torque)).sum(axis=1)
     return PowerLine(slope, real, power[:, ~stack.fixed], known)
