@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -37,7 +37,12 @@ def fit_torque(
     reduced = None if known is None else known.of(stack)
 
     def fit(values: np.ndarray | None) -> tuple[list[Block], Estimate]:
-        blocks = reduced or accumulate(motions, _torque_equations(stack, values), stack.pattern)
+        def equations(motion: Motion) -> Rows:
+            assert motion.torque is not None
+            shifted = stack.shift_torque(motion, sparse=True)
+            return Rows(stack.sparse_by_joint(motion, values), shifted, motion.torque, stack.undecided(motion))
+
+        blocks = reduced or accumulate(motions, equations, stack.pattern)
         return blocks, estimate(blocks, stack.pattern, terms, prior)
 
     blocks, found = fit(_alone(stack, motions, known) if stack.coupled else None)
@@ -156,7 +161,7 @@ def fit_both(
             blocks = accumulate(motions, _both_equations(stack, values), pattern, every=every)
             of_torque = blocks if every == 1 else of_torque
         else:  # that of power alone follows the values
-            line = _line_equations(stack, values)
+            line = _both_equations(stack, values, power_alone=True)
             blocks = _beside(of_torque, accumulate_any(motions, line, pattern[joints:], every=every), pattern)
         found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
         before, values, last = values, found.values, step
@@ -168,52 +173,38 @@ def fit_both(
     return found.of(range(count), found.noise[:joints])
 
 
-def _both_equations(stack: Stack, values: np.ndarray) -> Equations:
-    """Return the equations of torque and of power about the coefficients of torque, of power, and the scale."""
-    line_of = _line_about(stack, values)
+def _both_equations(stack: Stack, values: np.ndarray, *, power_alone: bool = False) -> Equations:
+    """Return the equations of torque and of power about the coefficients of torque, of power, and the scale.
 
-    def equations(motion: Motion) -> Rows:
-        own, (line, work) = stack.sparse_by_joint(motion, values[: len(stack.torque_terms)]), line_of(motion)
-        rows = [*own, [*line.carried, line.free, work[:, None]]]
-        known = stack.shift_torque(motion, sparse=True), line.known
-        return rows_of_both(stack, motion, rows, known, _unsure(stack, motion, work))
-
-    return equations
-
-
-def _line_equations(stack: Stack, values: np.ndarray) -> Equations:
-    """Return the last of these equations alone, that of power."""
-    line_of = _line_about(stack, values)
-
-    def equations(motion: Motion) -> Rows:
-        line, work = line_of(motion)
-        columns = [*line.carried, line.free, work[:, None]]
-        return power_rows(motion, columns, line.known, _unsure(stack, motion, work))
-
-    return equations
-
-
-def _unsure(stack: Stack, motion: Motion, work: np.ndarray) -> np.ndarray:
-    """Return (N,) where power does not hold: what joints give back may be burnt, and brakes are about to switch."""
-    near = stack.switching(motion)
-    return np.asarray(work < 0 if near is None else (work < 0) | near)
-
-
-def _line_about(stack: Stack, values: np.ndarray) -> Callable[[Motion], tuple[PowerLine[Columns], np.ndarray]]:
-    """Return what gives power's line about the coefficients, and the joints' work (N,), W."""
+    `power_alone`: the last of them alone. Power does not hold where what joints give back may be burnt, and where
+    brakes are about to switch.
+    """
     torque_values, free, scale = np.split(values, [len(stack.torque_terms), len(values) - 1])
-    power_values = expected(stack.power_terms)
-    power_values[stack.fixed] *= 1 + scale
-    power_values[~stack.fixed] = free
+    fixed_values = expected(stack.power_terms)[stack.fixed]
+    power_values = np.empty(len(stack.power_terms))
+    power_values[stack.fixed], power_values[~stack.fixed] = (1 + scale) * fixed_values, free
 
-    def line_of(motion: Motion) -> tuple[PowerLine[Columns], np.ndarray]:
-        torque = stack.real_torque(motion, torque_values, sparse=True)
-        now = stack.predicted_power_columns(motion, torque_values, power_values, torque)
-        carrying = partial(stack.sparse_carried, motion, values=torque_values)
-        line = power_line(stack, motion, carrying, torque, now, power_values)
-        return line, now[:, stack.fixed] @ expected(stack.power_terms)[stack.fixed]
+    def equations(motion: Motion) -> Rows:
+        line, drawn = _line(stack, motion, torque_values, power_values)
+        work, near = drawn[:, stack.fixed] @ fixed_values, stack.switching(motion)
+        unsure = work < 0 if near is None else (work < 0) | near
+        of_power = [*line.carried, line.free, work[:, None]]
+        if power_alone:
+            return power_rows(motion, of_power, line.known, unsure)
+        own, known = stack.sparse_by_joint(motion, torque_values), stack.shift_torque(motion, sparse=True)
+        return rows_of_both(stack, motion, [*own, of_power], (known, line.known), unsure)
 
-    return line_of
+    return equations
+
+
+def _line(
+    stack: Stack, motion: Motion, torque_values: np.ndarray, power_values: np.ndarray
+) -> tuple[PowerLine[Columns], np.ndarray]:
+    """Return power's line about the coefficients of torque and of power, and the columns of power (N, L) there."""
+    torque = stack.real_torque(motion, torque_values, sparse=True)
+    drawn = stack.predicted_power_columns(motion, torque_values, power_values, torque)
+    carrying = partial(stack.sparse_carried, motion, values=torque_values)
+    return power_line(stack, motion, carrying, torque, drawn, power_values), drawn
 
 
 def _beside(of_torque: Sequence[Block], of_power: Sequence[Block], pattern: np.ndarray) -> list[Block]:
@@ -255,8 +246,12 @@ def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarr
     real, free = real_terms(stack), free_terms(stack)
     torque_values, power_values = np.zeros(len(stack.torque_terms)), expected(stack.power_terms)
     before = np.full(len(real) + len(free), np.inf)
+
+    def equations(motion: Motion) -> Rows:  # about the values as they are then
+        line, _ = _line(stack, motion, torque_values, power_values)
+        return power_rows(motion, [*line.carried, line.free], line.known)
+
     for _ in range(_STEPS):
-        equations = _power_equations(stack, torque_values.copy(), power_values.copy())
         blocks, found = _of_one(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
         torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
         if _converged(found.values, before, _of([*real, *free])):
@@ -265,41 +260,12 @@ def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarr
     return torque_values, power_values, blocks, found
 
 
-def _power_equations(stack: Stack, torque_values: np.ndarray, power_values: np.ndarray) -> Equations:
-    """Return the equation of power alone, linear about coefficients.
-
-    Effects that need predicted power take it as it is with these.
-    """
-
-    def equations(motion: Motion) -> Rows:
-        assert motion.power is not None
-        torque = stack.real_torque(motion, torque_values, sparse=True)
-        power = stack.predicted_power_columns(motion, torque_values, power_values, torque)
-        carrying = partial(stack.sparse_carried, motion, values=torque_values)
-        line = power_line(stack, motion, carrying, torque, power, power_values)
-        return Rows([[*line.carried, line.free]], line.known[:, None], motion.power[:, None])
-
-    return equations
-
-
-def _torque_equations(stack: Stack, values: np.ndarray | None) -> Equations:
-    def equations(motion: Motion) -> Rows:
-        assert motion.torque is not None
-        shifted = stack.shift_torque(motion, sparse=True)
-        return Rows(stack.sparse_by_joint(motion, values), shifted, motion.torque, stack.undecided(motion))
-
-    return equations
-
-
 def _alone(stack: Stack, motions: Sequence[Motion], known: ReducedTorque | None) -> np.ndarray:
     """Return the coefficients of the effects that need no prediction, fitted without the others, which are none."""
     direct = Stack(stack.robot, [effect for effect in stack.effects if effect.signal == "torque" and not effect.needs])
     values = np.zeros(len(stack.torque_terms))
     if direct.torque_terms:
-        reduced = None if known is None else known.of(direct)
-        blocks = reduced or accumulate(motions, _torque_equations(direct, None), direct.pattern)
-        found = estimate(blocks, direct.pattern, _of(direct.torque_terms))
-        values[[not effect.needs for effect, _ in stack.torque_terms]] = found.values
+        values[[not effect.needs for effect, _ in stack.torque_terms]] = fit_torque(direct, motions, known)[1].values
     return values
 
 

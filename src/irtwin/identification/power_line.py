@@ -120,26 +120,18 @@ def rows_of_both(
     columns: those of each equation, as `Rows` takes them; known: (N, n) N m and (N,) W; unsure: (N,) where power does
     not hold.
     """
-    torque, power = motion.torque, motion.power
+    torque, power = motion.torque, power_rows(motion, columns[-1], known[1], unsure)
+    assert power.undecided is not None
+    unknown = np.ones(motion.dq.shape, dtype=bool)
     return Rows(
         columns,
         np.column_stack(known),
-        np.column_stack(
-            [
-                np.zeros_like(motion.dq) if torque is None else torque,
-                np.zeros_like(known[1]) if power is None else power,
-            ]
-        ),
-        np.column_stack(
-            [
-                np.ones(motion.dq.shape, dtype=bool) if torque is None else stack.undecided(motion),
-                np.full(len(motion.time), power is None) | unsure,
-            ]
-        ),
+        np.column_stack([np.zeros_like(motion.dq) if torque is None else torque, power.measured]),
+        np.column_stack([unknown if torque is None else stack.undecided(motion), power.undecided]),
     )
 
 
-def power_rows(motion: Motion, columns: Given, known: np.ndarray, unsure: np.ndarray | bool) -> Rows:
+def power_rows(motion: Motion, columns: Given, known: np.ndarray, unsure: np.ndarray | bool = False) -> Rows:
     """Return the last of these rows alone, those of power; arguments as above."""
     power = np.zeros_like(known) if motion.power is None else motion.power
     undecided = np.full(len(known), motion.power is None) | unsure
