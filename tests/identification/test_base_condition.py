@@ -44,7 +44,7 @@ def test_the_gradient_is_that_of_the_cost(robot, criterion) -> None:  # type: ig
     n = len(robot.joints)
     signals, slow = motion(n), np.full(n, 0.5)
     gradient = regressor.cost(*signals, slow)[1]
-    for number, slope in enumerate((gradient.q, gradient.dq, gradient.ddq)):
+    for number, slope in enumerate(gradient):
         towards = np.random.default_rng(number).normal(size=slope.shape)
         ahead, behind = (
             [s + (h * towards if k == number else 0) for k, s in enumerate(signals)] for h in (1e-5, -1e-5)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from irtwin.effects.catalogue import EXCITED
 from irtwin.effects.stack import Stack
-from irtwin.identification.base_parameters import base_parameters
+from irtwin.identification.base_parameters import base_parameters, condition_number
 from irtwin.robot.body_regressor import body_regressor, regressor_slope
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
@@ -21,13 +20,8 @@ _ALL = 0.05  # share of what all parameters count beside an energy: what it does
 _SHARPNESS = 4  # of the smooth maximum and minimum of the eigenvalues
 
 
-@dataclass(frozen=True)
-class MotionGradient:
-    """Derivatives of a number with respect to each sample of a motion, (N, n) each."""
-
-    q: np.ndarray
-    dq: np.ndarray
-    ddq: np.ndarray
+MotionGradient = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Derivatives of a number with respect to q, dq and ddq of each sample of a motion, (N, n) each."""
 
 
 class BaseRegressor:
@@ -40,7 +34,8 @@ class BaseRegressor:
     def __init__(self, robot: Robot, criterion: Criterion | None = None, tasks: Sequence[Motion] = ()) -> None:
         self._model = robot.model
         self._n = len(robot.joints)
-        self.columns = base_parameters(Stack(robot, EXCITED)).independent
+        self._base = base_parameters(Stack(robot, EXCITED))
+        self.columns = self._base.independent
         self._criterion = energy_variance([self.energy_slope(task) for task in tasks]) if tasks else criterion
 
     def matrix(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
@@ -49,9 +44,7 @@ class BaseRegressor:
 
     def condition_number(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> float:
         """Return the condition number of W with each column divided by its length; inf where a column is empty."""
-        matrix = self.matrix(q, dq, ddq)
-        length = np.linalg.norm(matrix, axis=0)
-        return float(np.linalg.cond(matrix / length)) if length.all() else np.inf
+        return condition_number(self._all(q, dq, ddq, np.sign(dq)), self._base)
 
     def energy_slope(self, motion: Motion) -> np.ndarray:
         """Return the slope of a motion's mechanical energy, J, over each base parameter, (p,)."""
@@ -81,7 +74,7 @@ class BaseRegressor:
         rigid, joint = weight[:, :, : 10 * n], np.arange(n)
         rotor, viscous, coulomb = (weight[:, joint, (10 + k) * n + joint] for k in range(3))
         by_q, by_dq, by_ddq = regressor_slope(self._model, q, dq, ddq, rigid)
-        return value, MotionGradient(by_q, by_dq + viscous + coulomb * (1 - sign**2) / slow, by_ddq + rotor)
+        return value, (by_q, by_dq + viscous + coulomb * (1 - sign**2) / slow, by_ddq + rotor)
 
     def _all(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, sign: np.ndarray) -> np.ndarray:
         each_joint = [_diagonals(ddq), _diagonals(dq), _diagonals(sign), _diagonals(np.ones_like(dq))]
@@ -116,10 +109,14 @@ def energy_variance(slopes: Sequence[np.ndarray]) -> Criterion:
 def _covariance(matrix: np.ndarray) -> np.ndarray:
     """Return the (p, p) covariance of base parameters by equations of unit noise; columns are scaled on the way."""
     length = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
-    scaled = matrix / length
-    eigenvalues, vectors = np.linalg.eigh(scaled.T @ scaled)
-    eigenvalues = np.maximum(eigenvalues, np.finfo(float).eps * eigenvalues[-1])
+    eigenvalues, vectors = _axes(matrix / length)
     return np.asarray((vectors / eigenvalues) @ vectors.T / np.outer(length, length))
+
+
+def _axes(scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the eigenvalues, (p,), none below rounding, and the eigenvectors of the products of columns."""
+    eigenvalues, vectors = np.linalg.eigh(scaled.T @ scaled)
+    return np.maximum(eigenvalues, np.finfo(float).eps * eigenvalues[-1]), vectors
 
 
 def _diagonals(values: np.ndarray) -> np.ndarray:
@@ -131,8 +128,7 @@ def _smooth_cost(matrix: np.ndarray) -> tuple[float, np.ndarray]:
     """Return log condition number of the scaled `matrix` less mean log column length, and its slope, same shape."""
     length = np.linalg.norm(matrix, axis=0)
     scaled = matrix / length
-    eigenvalues, vectors = np.linalg.eigh(scaled.T @ scaled)
-    eigenvalues = np.maximum(eigenvalues, np.finfo(float).eps * eigenvalues[-1])
+    eigenvalues, vectors = _axes(scaled)
     large, small = (eigenvalues / eigenvalues[-1]) ** _SHARPNESS, (eigenvalues[0] / eigenvalues) ** _SHARPNESS
     smooth = (np.log(large.sum()) + np.log(small.sum())) / (2 * _SHARPNESS)
     value = smooth + 0.5 * np.log(eigenvalues[-1] / eigenvalues[0]) - float(np.mean(np.log(length)))

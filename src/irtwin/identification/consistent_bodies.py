@@ -71,7 +71,7 @@ class _Problem:
         return step, float(np.linalg.norm(factor[:-1, -1]))
 
 
-def with_consistent_bodies(stack: Stack, terms: Terms, found: Estimate, pull: float = PULL) -> Estimate:
+def with_consistent_bodies(stack: Stack, terms: Terms, found: Estimate) -> Estimate:
     """Return the estimate of terms (K) that is best with consistent bodies; as it is where there are none."""
     places = _places(terms)
     if not len(places):
@@ -83,19 +83,19 @@ def with_consistent_bodies(stack: Stack, terms: Terms, found: Estimate, pull: fl
     x[places] = inertial_parameters(described)
     free = x > lowest
     while True:
-        solved = _solved(problem, x, free, pull)
+        solved = _solved(problem, x, free)
         below = free & (solved < lowest)
         if not below.any():
             return replace(found, values=solved)
         x, free = np.where(below, lowest, solved), free & ~below
 
 
-def spreads(stack: Stack, terms: Terms, pull: float = PULL) -> np.ndarray:
+def spreads(stack: Stack, terms: Terms) -> np.ndarray:
     """Return (K,) the standard deviation of each term that is known before any data: of bodies by the pull, too."""
     found, places = np.array([term.spread for _, term in terms]), _places(terms)
     if len(places):
         inverse = np.linalg.inv(described_bodies(stack))
-        known = pull * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS)
+        known = PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS)
         widths = np.sqrt(np.diagonal(np.linalg.inv(known), axis1=1, axis2=2))
         found[places] = np.minimum(found[places], widths)
     return found
@@ -126,17 +126,17 @@ def described_bodies(stack: Stack) -> np.ndarray:
     )
 
 
-def _solved(problem: _Problem, x: np.ndarray, free: np.ndarray, pull: float) -> np.ndarray:
-    """Return the x of least value, from one of consistent bodies, by a pull that shrinks to `pull`."""
+def _solved(problem: _Problem, x: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Return the x of least value, from one of consistent bodies, by a pull that shrinks to what it is."""
     misfit = float(np.sum((problem.left @ x - problem.right) ** 2))
-    now = max(pull, misfit / len(x))
+    now = max(PULL, misfit / len(x))
     for _ in range(_STEPS):
         step, decrement = problem.step(x, now, free)
         x = _moved(problem, x, step, decrement, now)
-        if now == pull and decrement < _DONE * np.sqrt(pull):
+        if now == PULL and decrement < _DONE * np.sqrt(PULL):
             break
         if decrement < _NEAR * np.sqrt(now):
-            now = max(pull, _FASTER * now)
+            now = max(PULL, _FASTER * now)
     return x
 
 

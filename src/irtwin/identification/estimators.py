@@ -60,8 +60,8 @@ def estimate(
     `spread`) is one more row: against thousands of samples it decides nothing that they show, and what they do not show
     stays as expected (Tikhonov's ridge with physical units). Where more is known of the terms together, `prior_rows`
     (K, K) say it instead: rows on their deviations, in units of their spread, of noise one. As samples depend on each
-    other, they count against it by their design effect only; where `signals` (g,) says which equations are of one, each
-    signal by its own. Bounds hold (`lowest`). The covariance is explained in `uncertainty`.
+    other, they count against it by their design effect only; where `signals` (g,) says which equations are of one, side
+    by side, each signal by its own. Bounds hold (`lowest`). The covariance is explained in `uncertainty`.
     """
     given, weights = blocks, np.ones((len(blocks), len(pattern)))
     factors = _of_all(blocks, pattern)
@@ -90,7 +90,7 @@ def estimate(
     alike = np.zeros(len(pattern), dtype=int) if signals is None else np.array(signals)
     for signal in np.unique(alike):
         own = np.flatnonzero(alike == signal)
-        mine = blocks if len(own) == len(pattern) else [_only(block, own) for block in blocks]
+        mine = [block.of(slice(own[0], own[-1] + 1)) for block in blocks]
         _, effect = covariance(mine, pattern[own], [factors[e] for e in own], values, noise[own], spread, prior)
         level[own] *= np.sqrt(effect)
     values, equations = _solve(factors, level, expected, spread, lowest, prior)
@@ -110,10 +110,6 @@ def _left(blocks: Sequence[Block], pattern: np.ndarray, values: np.ndarray) -> n
     return np.array(
         [[np.sum((own @ by) ** 2) for own, by in zip(block.factors, weights, strict=True)] for block in blocks]
     )
-
-
-def _only(block: Block, equations: np.ndarray) -> Block:
-    return replace(block, rows=block.rows[equations], factors=tuple(block.factors[e] for e in equations))
 
 
 def combine(factors: Sequence[np.ndarray], used: np.ndarray) -> np.ndarray:

@@ -264,7 +264,8 @@ class _Search:
         """Return cost plus logarithmic barriers at the limits, and its gradient; infinite where a limit is broken."""
         x = self._shaped(flat)
         motion = self._motion(x)
-        shares = self._shares(motion)
+        about = (self._limits.centre, 0.0, 0.0)  # shares of what the grid may show, -1..1
+        shares = [(v - c) / r for v, c, r in zip(motion, about, self._ranges, strict=True)]
         clearance, clearance_slope = self._workspace.clearance_slope(motion[0])
         room = (clearance - self._keep_off) / self._workspace.reach
         if max(float(np.abs(share).max()) for share in shares) >= 1 or room.min(initial=1.0) <= 0:
@@ -273,7 +274,7 @@ class _Search:
         if nearness == math.inf:
             return math.inf, flat
         weight /= len(motion[0])
-        value, slope = self._regressor.cost(*motion, slow=0.02 * self._limits.speed)
+        value, slopes = self._regressor.cost(*motion, slow=0.02 * self._limits.speed)
         value -= weight * (sum(float(np.log1p(-(share**2)).sum()) for share in shares) + float(np.log(room).sum()))
         barriers = [
             weight * 2 * share / (1 - share**2) / limit for share, limit in zip(shares, self._ranges, strict=True)
@@ -281,14 +282,8 @@ class _Search:
         barriers[0] -= weight * np.einsum("nw,nwj->nj", 1 / (room * self._workspace.reach), clearance_slope)
         value += weight * nearness
         barriers[0] += weight * nearness_slope
-        slopes = (slope.q, slope.dq, slope.ddq)
         gradient = sum(b.T @ (s + r) for b, s, r in zip(self._rest.bases, slopes, barriers, strict=True))
         return value, np.asarray(gradient).ravel()
-
-    def _shares(self, motion: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        """Return position, speed and acceleration as shares of what the grid may show, -1..1, (M, n) each."""
-        about = (self._limits.centre, 0.0, 0.0)
-        return tuple((v - c) / r for v, c, r in zip(motion, about, self._ranges, strict=True))
 
     def _postures(self) -> np.ndarray:
         """Return postures clear of the walls, (p, n), about which to start; raise InputError where there is none."""
@@ -331,16 +326,14 @@ class _Search:
         largest = [np.abs(v).max(axis=0) for v in self._motion(x)]
         x *= 0.9 * np.min([r / v for r, v in zip(room, largest, strict=True)], axis=0)
         x[0] = posture
-        while not self._clear(x):
+
+        def clear() -> bool:
+            at_grid = self._workspace.clearance(self._motion(x)[0]).min(initial=math.inf)
+            return at_grid > self._keep_off and self._keeps(self._rest.series(x))
+
+        while not clear():
             x[1:] *= 0.8
         return x
-
-    def _clear(self, x: np.ndarray) -> bool:
-        at_grid = self._workspace.clearance(self._motion(x)[0]).min(initial=math.inf)
-        series = self._rest.series(x)
-        if at_grid <= self._keep_off or self._workspace.least_clearance(series) <= 0:
-            return False
-        return self._body.allows(series)
 
 
 def descend(cost: Cost, start: np.ndarray, iterations: int, tolerance: float = 1e-4) -> Iterator[np.ndarray]:

@@ -41,10 +41,6 @@ class FourierSeries:
         count = GRID_PER_HARMONIC * self.harmonics
         return np.arange(count) * (self.period / count)
 
-    def centred(self, offset: np.ndarray) -> FourierSeries:
-        """Return the same oscillation about `centre - offset`."""
-        return FourierSeries(self.period, self.centre - offset, self.sine, self.cosine)
-
 
 def between_samples(harmonics: int, count: int) -> float:
     """Return f such that max |p(t)| <= f max |p(t_i)| for `count` even instants t_i of one period.
@@ -59,26 +55,19 @@ def between_samples(harmonics: int, count: int) -> float:
     return 1.0 / float(np.cos(np.pi * harmonics / count))
 
 
-def rest_basis(harmonics: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return orthonormal bases, each (K, K - 1), of the sine and the cosine coefficients that give rest at t = 0.
-
-    dq(0) = w sum_k k sine_k = 0 and ddq(0) = -w^2 sum_k k^2 cosine_k = 0 bind the two kinds apart. The series repeats
-    every period, so a motion of whole periods ends as it starts: at rest, in the same pose.
-    """
-    k = np.arange(1.0, harmonics + 1)
-    return scipy.linalg.null_space(k[None]), scipy.linalg.null_space(k[None] ** 2)
-
-
 class RestSeries:
     """The FourierSeries of n joints that start and end at rest, as linear functions of free numbers x.
 
     x: (2 K - 1, n): the centre, then K - 1 numbers for the sines and K - 1 for the cosines of each joint.
+    dq(0) = w sum_k k sine_k = 0 and ddq(0) = -w^2 sum_k k^2 cosine_k = 0 bind the two kinds apart. The series repeats
+    every period, so a motion of whole periods ends as it starts: at rest, in the same pose.
     """
 
     def __init__(self, period: float, harmonics: int) -> None:
         self.period = period
         self.harmonics = harmonics
-        self._sine, self._cosine = rest_basis(harmonics)
+        k = np.arange(1.0, harmonics + 1)[None]
+        self._sine, self._cosine = scipy.linalg.null_space(k), scipy.linalg.null_space(k**2)  # (K, K - 1), orthonormal
         count = 2 * harmonics - 1
         units = FourierSeries(period, *self._split(np.eye(count)))
         self.grid = units.grid()

@@ -62,8 +62,9 @@ class JointLimits:
         """Return the least distance to a limit at any time, as a share of the limit; negative where one is broken."""
         grid = series.grid()
         factor = between_samples(series.harmonics, len(grid))
-        values = series.centred(self.centre).motion(grid)
-        return 1 - factor * max(float((np.abs(v) / r).max()) for v, r in zip(values, self.ranges, strict=True))
+        q, dq, ddq = series.motion(grid)
+        off = zip((q - self.centre, dq, ddq), self.ranges, strict=True)
+        return 1 - factor * max(float((np.abs(values) / most).max()) for values, most in off)
 
 
 def _limits(robot: str, joint: Joint) -> tuple[float, float, float, float]:

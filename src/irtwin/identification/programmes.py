@@ -133,9 +133,9 @@ class _Yard:
         last = seen[-1]
         self.cutoff, self._last = last.cutoff, last
         self.rate = min(last.rate, _RATE * last.cutoff) if last.cutoff else min(last.rate, 100.0)
-        walls = Walls(robot, self.limits, None)
-        every = max(1, len(q) // _CHECKED)
-        self._walls = walls if walls.clearance(q[::every]).min(initial=1.0) > 0 else None  # else the floor is elsewhere
+        self._walls: Walls | None = Walls(robot, self.limits, None)
+        if not self._above_floor([q]):
+            self._walls = None  # the floor is elsewhere
         effort = np.array([joint.effort if joint.effort > 0 else np.inf for joint in robot.joints])
         self._most = np.maximum(effort, self._torque(seen))
 
@@ -148,8 +148,11 @@ class _Yard:
         whole = self.reach, self.acceleration
         try:
             for _ in range(_TRIES):
-                made = self._built(build)
-                if made is None or not self._above_floor(made):
+                try:
+                    made = build(self)
+                except _TooLong:
+                    made = None
+                if made is None or not self._above_floor([motion.q for motion in made.motions]):
                     self.reach = _SHRINK * self.reach
                 elif (self._torque(made.motions) > self._most).any():
                     self.acceleration = _SHRINK * self.acceleration
@@ -158,12 +161,6 @@ class _Yard:
             return None
         finally:
             self.reach, self.acceleration = whole
-
-    def _built(self, build: Callable[[_Yard], ExperimentProgramme]) -> ExperimentProgramme | None:
-        try:
-            return build(self)
-        except _TooLong:
-            return None
 
     def _torque(self, motions: Sequence[Motion]) -> np.ndarray:
         """Return the greatest torque of each joint, (n,), that the described bodies need at some samples."""
@@ -179,8 +176,8 @@ class _Yard:
         """Return whether a programme may last so long: neither too many samples nor too few to differentiate."""
         return seconds <= LONGEST and _FEWEST_SAMPLES <= seconds * self.rate <= _MOST_SAMPLES
 
-    def _above_floor(self, made: ExperimentProgramme) -> bool:
-        q = np.concatenate([motion.q for motion in made.motions])
+    def _above_floor(self, parts: Sequence[np.ndarray]) -> bool:
+        q = np.concatenate(parts)
         every = max(1, len(q) // _CHECKED)
         return self._walls is None or float(self._walls.clearance(q[::every]).min(initial=1.0)) > 0
 
