@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.identification.fourier_series import FourierSeries
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
+from irtwin.robot.model import inverse_dynamics
 
 _FINER = 4  # poses between two instants of a series' grid
 _NEAR = 0.05  # m: nearer pairs push one another off
@@ -22,7 +22,6 @@ class OwnBody:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._data = robot.model.createData()
         self._collisions = CollisionModel(robot)
         self._checked = self._collisions.checks_itself
         self._limits = np.array([joint.effort for joint in robot.joints])
@@ -78,6 +77,4 @@ class OwnBody:
         """Return the greatest share of a torque limit, (N,)."""
         if not np.isfinite(self._limits).any():
             return np.zeros(len(q))
-        states = zip(q, dq, ddq, strict=True)
-        torque = np.array([pin.rnea(self._robot.model, self._data, *state) for state in states])
-        return np.asarray((np.abs(torque) / self._limits).max(axis=1))
+        return np.asarray((np.abs(inverse_dynamics(self._robot.model, q, dq, ddq)) / self._limits).max(axis=1))

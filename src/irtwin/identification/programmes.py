@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.document import experiment
 from irtwin.document.experiment import Settings
@@ -17,6 +16,7 @@ from irtwin.identification.excitation import excite
 from irtwin.identification.motion_limits import JointLimits, Walls
 from irtwin.identification.progress import tell_step
 from irtwin.robot.description import Robot
+from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.motion import Motion
 
 _RESERVE = 0.9  # of the limits of speed and acceleration
@@ -164,13 +164,9 @@ class _Yard:
 
     def _torque(self, motions: Sequence[Motion]) -> np.ndarray:
         """Return the greatest torque of each joint, (n,), that the described bodies need at some samples."""
-        model, data = self.robot.model, self.robot.model.createData()
-        torque = [
-            pin.rnea(model, data, motion.q[row], motion.dq[row], motion.ddq[row])
-            for motion in motions
-            for row in range(0, len(motion.time), max(1, len(motion.time) // _CHECKED))
-        ]
-        return np.asarray(np.abs(torque).max(axis=0))
+        some = [motion.rows(slice(None, None, max(1, len(motion.time) // _CHECKED))) for motion in motions]
+        torque = [inverse_dynamics(self.robot.model, one.q, one.dq, one.ddq) for one in some]
+        return np.asarray(np.abs(np.concatenate(torque)).max(axis=0))
 
     def within(self, seconds: float) -> bool:
         """Return whether a programme may last so long: neither too many samples nor too few to differentiate."""
