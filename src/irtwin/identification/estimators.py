@@ -9,10 +9,11 @@ import numpy as np
 import scipy
 
 from irtwin.effects.effect import Term
-from irtwin.identification.accumulate import Block, triangle
+from irtwin.identification.accumulate import Block, Equations, accumulate, triangle
 from irtwin.identification.progress import tell_step, track
 from irtwin.identification.robust_weights import SETTLED, robust_weights
 from irtwin.identification.uncertainty import covariance
+from irtwin.signals.motion import Motion
 
 _REWEIGHTINGS = 20  # at most
 _LEAST_NOISE = 1e-6  # of the measurement's size: exact data still have finite weights,
@@ -97,6 +98,19 @@ def estimate(
     tell_step(f"  how sure {len(terms)} coefficients are")
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
     return Estimate(values, sureness, noise, len(blocks), equations, weights)
+
+
+def estimate_one(
+    motions: Sequence[Motion],
+    equations: Equations,
+    terms: Sequence[Term],
+    prior_rows: np.ndarray | None = None,
+    every: int = 1,
+) -> tuple[list[Block], Estimate]:
+    """Estimate the coefficients of one equation a sample; return them with the equations, reduced by `accumulate`."""
+    pattern = np.ones((1, len(terms)), dtype=bool)
+    blocks = accumulate(motions, equations, pattern, every=every)
+    return blocks, estimate(blocks, pattern, terms, prior_rows)
 
 
 def _of_all(blocks: Sequence[Block], pattern: np.ndarray) -> list[np.ndarray]:

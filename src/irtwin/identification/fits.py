@@ -12,7 +12,7 @@ from irtwin.effects.drive import CopperLoss
 from irtwin.effects.effect import Effect, Term
 from irtwin.effects.stack import Stack, expected
 from irtwin.identification.accumulate import Block, Columns, Equations, Rows, accumulate, accumulate_any, part_read
-from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.estimators import Estimate, estimate, estimate_one
 from irtwin.identification.power_line import PowerLine, power_line, power_rows, rise_over_axes, rows_of_both
 from irtwin.identification.reduced_torque import ReducedTorque
 from irtwin.signals.motion import Motion
@@ -67,7 +67,7 @@ def fit_power(
 
     def fit(values: np.ndarray) -> tuple[list[Block], Estimate]:
         equations = _losses_equations(stack, torque_values, values, logged=True, switching=switching)
-        return _of_one(motions, equations, free, stack.prior_rows(free), every)
+        return estimate_one(motions, equations, _of(free), stack.prior_rows(free), every)
 
     values = expected(stack.power_terms)
     blocks, found = fit(values)
@@ -245,16 +245,16 @@ def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarr
     """
     real, free = real_terms(stack), free_terms(stack)
     torque_values, power_values = np.zeros(len(stack.torque_terms)), expected(stack.power_terms)
-    before = np.full(len(real) + len(free), np.inf)
+    terms, before = _of([*real, *free]), np.full(len(real) + len(free), np.inf)
 
     def equations(motion: Motion) -> Rows:  # about the values as they are then
         line, _ = _line(stack, motion, torque_values, power_values)
         return power_rows(motion, [*line.carried, line.free], line.known)
 
     for _ in range(_STEPS):
-        blocks, found = _of_one(motions, equations, [*real, *free], stack.prior_rows([*real, *free]))
+        blocks, found = estimate_one(motions, equations, terms, stack.prior_rows([*real, *free]))
         torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
-        if _converged(found.values, before, _of([*real, *free])):
+        if _converged(found.values, before, terms):
             break
         before = found.values
     return torque_values, power_values, blocks, found
@@ -271,15 +271,6 @@ def _alone(stack: Stack, motions: Sequence[Motion], known: ReducedTorque | None)
 
 def _converged(values: np.ndarray, before: np.ndarray, terms: Sequence[Term]) -> bool:
     return bool(np.all(np.abs(values - before) < _CONVERGED * np.array([term.spread for term in terms])))
-
-
-def _of_one(
-    motions: Sequence[Motion], equations: Equations, terms: Terms, prior_rows: np.ndarray | None, every: int = 1
-) -> tuple[list[Block], Estimate]:
-    """Estimate the terms of one equation a sample; return them with the equations, reduced."""
-    pattern = np.ones((1, len(terms)), dtype=bool)
-    blocks = accumulate(motions, equations, pattern, every=every)
-    return blocks, estimate(blocks, pattern, _of(terms), prior_rows)
 
 
 def _of(terms: Terms) -> list[Term]:

@@ -10,8 +10,8 @@ import numpy as np
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Term, force_unit
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Rows, accumulate
-from irtwin.identification.estimators import Estimate, estimate
+from irtwin.identification.accumulate import Rows
+from irtwin.identification.estimators import Estimate, estimate_one
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
@@ -81,5 +81,4 @@ def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) 
         columns = np.column_stack([np.ones(len(motion.time)), *parts])
         return Rows(columns[:, None], np.zeros((len(columns), 1)), motion.power[:, None])
 
-    pattern = np.ones((1, len(terms)), dtype=bool)
-    return estimate(accumulate(motions, equations, pattern), pattern, terms)
+    return estimate_one(motions, equations, terms)[1]

@@ -14,8 +14,8 @@ import numpy as np
 
 from irtwin.effects.effect import Quantity, Term
 from irtwin.errors import InputError
-from irtwin.identification.accumulate import Rows, accumulate
-from irtwin.identification.estimators import estimate
+from irtwin.identification.accumulate import Rows
+from irtwin.identification.estimators import estimate_one
 from irtwin.identification.uncertainty import half_widths
 from irtwin.signals.log import DataSet
 from irtwin.signals.motion import Motion
@@ -139,11 +139,10 @@ def _told_by_power(motions: Sequence[Motion], torque: Torque) -> tuple[float, fl
     Losses of windings, inverters and iron are fitted beside it, joint by joint; where it depends on which, by so much
     it is unsure. Only while the robot takes power: what it gives back may be burnt.
     """
-    slopes = [_slope(motions, torque, losses) for losses in (_LOSSES, _LOSSES[:1])]
-    if any(slope is None for slope in slopes):
+    whole, windings = (_slope(motions, torque, losses) for losses in (_LOSSES, _LOSSES[:1]))
+    if whole is None or windings is None:
         return None
-    (slope, half), (other, _) = [one for one in slopes if one is not None]
-    return slope, float(np.hypot(half, slope - other))
+    return whole[0], float(np.hypot(whole[1], whole[0] - windings[0]))
 
 
 def _slope(
@@ -160,11 +159,9 @@ def _slope(
         columns = np.column_stack([work, np.ones_like(work), *(loss(real, motion.dq) for loss in losses)])
         return Rows(columns[:, None], np.zeros((len(work), 1)), motion.power[:, None], (work < 0)[:, None])
 
-    pattern = np.ones((1, len(terms)), dtype=bool)
     try:
-        blocks = accumulate(motions, equations, pattern)
+        fitted = estimate_one(motions, equations, terms)[1]
     except InputError:  # nothing is left of runs that only brake
         return None
-    fitted = estimate(blocks, pattern, terms)
     half = float(half_widths(fitted.covariance, np.array([term.spread for term in terms]), fitted.blocks)[0])
     return (float(fitted.values[0]), half) if np.isfinite(half) else None
