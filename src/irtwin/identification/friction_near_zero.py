@@ -237,10 +237,8 @@ def _weighted(factors: Sequence[np.ndarray], rows: np.ndarray, own: int) -> list
         counting = [np.sqrt(weight) * factor for weight, factor in zip(weights, known, strict=True)]
         left = _left(triangle(np.concatenate(counting)), known, own)[0][0]
         noise = np.sqrt((weights * left).sum() / rows.sum())
-        before, weights = (
-            weights,
-            robust_weights(left, rows, max(noise, np.finfo(float).tiny), size / np.sqrt(rows.sum())),
-        )
+        before = weights
+        weights = robust_weights(left, rows, max(noise, np.finfo(float).tiny), size / np.sqrt(rows.sum()))
         if np.allclose(weights, before, atol=SETTLED):
             break
     return [np.sqrt(weight) * factor for weight, factor in zip(weights, factors, strict=True)]

@@ -53,7 +53,7 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
         return tuple(Entry((share,), share.energy, None, None) for share in shares)
     whole = cost(twin, [motion]).energy.half_width
     assert whole is not None
-    covariance = ledger_covariance(twin, motion, ledger)
+    covariance = _covariance(twin, motion, ledger)
     energies = np.array([entry.energy for entry in ledger])
     one_way = _one_way(twin)
 
@@ -72,7 +72,7 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
     )
 
 
-def ledger_covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.ndarray:
+def _covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.ndarray:
     """Return the (E, E) covariance of the ledger's E energies, J^2, of a twin that has one of its parameters."""
     slopes = _slopes(twin, motion, ledger)
     covariance = np.asarray(slopes @ twin.covariance @ slopes.T)

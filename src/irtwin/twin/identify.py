@@ -15,7 +15,7 @@ from irtwin.effects.prior import Prior
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.identification.accumulate import Block
-from irtwin.identification.base_parameters import BaseParameters, base_parameters, condition_number
+from irtwin.identification.base_parameters import base_parameters, condition_number
 from irtwin.identification.consistent_bodies import spreads, with_consistent_bodies
 from irtwin.identification.estimators import Estimate, combine
 from irtwin.identification.fits import (
@@ -58,8 +58,7 @@ def identify(
     Effects are ids, for which the data choose among the candidates of shape (joint by joint), or effects of a shape.
     Those that nothing measured can show are listed as `unidentified`, and left out. Where columns depend on what other
     effects predict, fit and prediction are repeated until they agree. `prior` is what is known before the motions;
-    None: what the catalogue expects. Raises InputError where
-    there is nothing to fit.
+    None: what the catalogue expects. Raises InputError where there is nothing to fit.
     """
     if not motions:
         raise InputError("there is no run to fit a twin to; give at least one")
@@ -204,7 +203,13 @@ def _base(
     """Return the base parameters, and the condition number of the equations of torque; None where it is infinite."""
     base = base_parameters(stack)
     condition = condition_number(np.concatenate(factors)[:, :-1], base)
-    return _base_values(base, found), condition if np.isfinite(condition) else None
+    values, covariance = base.grouping @ found.values, base.grouping @ found.covariance @ base.grouping.T
+    widths = half_widths(covariance, np.full(len(values), np.inf), found.blocks)
+    told = tuple(
+        BaseParameter(name, float(value), base.terms[k].unit, float(value - width), float(value + width))
+        for name, k, value, width in zip(base.names(), base.independent, values, widths, strict=True)
+    )
+    return told, condition if np.isfinite(condition) else None
 
 
 def _change(factors: Sequence[np.ndarray], moved: np.ndarray) -> float:
@@ -212,14 +217,3 @@ def _change(factors: Sequence[np.ndarray], moved: np.ndarray) -> float:
     sizes = (float(np.linalg.norm(factor[:, -1])) for factor in factors)
     changes = (float(np.linalg.norm(factor[:, :-1] @ moved)) for factor in factors)
     return max((change / size for change, size in zip(changes, sizes, strict=True) if size), default=0.0)
-
-
-def _base_values(base: BaseParameters, found: Estimate) -> tuple[BaseParameter, ...]:
-    values = base.grouping @ found.values
-    covariance = base.grouping @ found.covariance @ base.grouping.T
-    widths = half_widths(covariance, np.full(len(values), np.inf), found.blocks)
-    units = [base.terms[k].unit for k in base.independent]
-    return tuple(
-        BaseParameter(name, float(value), unit, float(value - width), float(value + width))
-        for name, value, unit, width in zip(base.names(), values, units, widths, strict=True)
-    )

@@ -29,13 +29,8 @@ class _Side:
     """Motions with torque, of a robot whose friction near zero speed is theirs; `reduced`: equations of torque."""
 
     robot: Robot
-    motions: Sequence[Motion]
     reduced: ReducedTorque | None
-
-    @classmethod
-    def of(cls, robot: Robot, motions: Sequence[Motion], effects: Sequence[str | Effect]) -> _Side:
-        turned, reduced = with_friction_near_zero(robot, motions, effects)
-        return cls(turned, motions, reduced)
+    motions: Sequence[Motion]
 
     @property
     def powered(self) -> list[Motion]:
@@ -66,7 +61,7 @@ def shaped(
     tried = (of_torque if with_torque else set()) | (of_power if powered else set())
     if not tried:
         return tuple(effects)
-    parts = [_Side.of(robot, own, effects) for own in with_torque]
+    parts = [_Side(*with_friction_near_zero(robot, own, effects), own) for own in with_torque]
     stack = Stack(parts[0].robot, effects)
     stack = _shaped(stack, tried, "torque", lambda trial: _together(parts, [part.torque(trial) for part in parts]))
     if tried & of_power:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,19 +41,15 @@ def supply_states(twin: Twin, motion: Motion) -> tuple[SupplyState, ...]:
         off = motion.power < _OFF * _at_rest(twin)
     on = twin.stack.drives_on(motion)
     closed = still & (np.zeros_like(still) if on is None else on == 0)
+    weights, found = trapezoid(motion.time), []
     states = {"off": off, "moving": ~still, "brakes closed": closed, "drives on at rest": still}
-    return tuple(_states(twin, motion, states))
-
-
-def _states(twin: Twin, motion: Motion, states: dict[str, np.ndarray]) -> Iterator[SupplyState]:
-    """Yield each state where none before it holds."""
-    weights, left = trapezoid(motion.time), np.ones(len(motion.time), dtype=bool)
     for name, where in states.items():
-        own = np.where(where & left, weights, 0.0)
-        left &= ~where
+        own = np.where(where, weights, 0.0)
+        weights = weights - own  # each state is where none before it is
         if seconds := float(own.sum()):
             logged = None if motion.power is None else float(own @ motion.power) / seconds
-            yield SupplyState(name, seconds, logged, mean_power(twin, motion, own > 0))
+            found.append(SupplyState(name, seconds, logged, mean_power(twin, motion, own > 0)))
+    return tuple(found)
 
 
 def _at_rest(twin: Twin) -> float:
