@@ -37,8 +37,7 @@ class PeriodicDisturbance(JointEffect):
         """Return frequency and amplitude."""
         quantities = []
         for place, joint in enumerate(self.acting(robot)):
-            own = slice(2 * place, 2 * place + 2)
-            amplitude, deviation = given.size(own)
+            amplitude, deviation = given.size(slice(2 * place, 2 * place + 2))
             quantities.append(quantity("f", joint.name, self.f, "Hz"))
             quantities.append(quantity("A", joint.name, amplitude, force_unit(joint), deviation))
         return tuple(quantities)

@@ -240,10 +240,7 @@ class LoadDependentFriction(JointEffect):
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return mu when driving, mu when driven back."""
-        return (
-            Term("mu", "1", joint.name, spread=0.3, lowest=0.0),
-            Term("mu_back", "1", joint.name, spread=0.3, lowest=0.0),
-        )
+        return tuple(Term(name, "1", joint.name, spread=0.3, lowest=0.0) for name in ("mu", "mu_back"))
 
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return |tau| s while tau dq is positive, and while it is not."""
@@ -426,16 +423,11 @@ class PositionDependentFriction(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return a and b, relative to the joint's Fc; nothing where that is not known."""
-        deviations = given.deviations
-        quantities = []
-        for place, joint in enumerate(self.acting(robot)):
-            dry = given.known.get(("coulomb_friction", joint.name, "Fc"))
-            for number, name in enumerate(("a", "b")) if dry else ():
-                at = 2 * place + number
-                quantities.append(
-                    quantity(name, joint.name, ratio(given.values[at], dry), "1", ratio(deviations[at], dry))
-                )
-        return tuple(quantities)
+        return tuple(
+            quantity(term.name.removeprefix("Fc "), term.joint, ratio(value, dry), "1", ratio(deviation, dry))
+            for term, value, deviation in zip(self.terms(robot), given.values, given.deviations, strict=True)
+            if (dry := given.known.get(("coulomb_friction", term.joint, "Fc")))
+        )
 
 
 def shapes_over_speed(turned: float) -> tuple[JointEffect, ...]:

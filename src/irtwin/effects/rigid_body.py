@@ -186,7 +186,5 @@ def to_body(placement: pin.SE3) -> np.ndarray:
 
 def _body(model: pin.Model, joint: int) -> str | None:
     """Return the link that the joint moves: of those fixed together, the one next to the joint."""
-    for frame in model.frames:
-        if frame.type == pin.FrameType.BODY and frame.parentJoint == joint:
-            return str(frame.name)
-    return None
+    bodies = (frame for frame in model.frames if frame.type == pin.FrameType.BODY and frame.parentJoint == joint)
+    return next((str(frame.name) for frame in bodies), None)

@@ -59,8 +59,7 @@ class TorqueRipple(JointEffect):
         """Return A and N."""
         quantities = []
         for place, joint in enumerate(self.acting(robot)):
-            own = slice(2 * place, 2 * place + 2)
-            length, deviation = given.size(own)
+            length, deviation = given.size(slice(2 * place, 2 * place + 2))
             quantities.append(quantity("A", joint.name, length, force_unit(joint), deviation))
             quantities.append(Quantity("N", joint.name, self.N, "1/rev"))
         return tuple(quantities)

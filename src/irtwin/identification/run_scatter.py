@@ -35,8 +35,7 @@ def with_run_scatter(stack: Stack, blocks: Sequence[Block], found: Estimate) -> 
     known = (np.eye(len(names)) if prior is None else prior)[:, where]
 
     def variances(parts: Sequence[Block]) -> np.ndarray:
-        own = covariance(parts, pattern, factors, found.values[where], found.noise, spread[where], known)[0]
-        return np.diag(own)
+        return np.diag(covariance(parts, pattern, factors, found.values[where], found.noise, spread[where], known)[0])
 
     between, within = variances(by_run), variances(alone)
     scatter, own_names = np.zeros(int(where.sum())), [name for name in names if name is not None]

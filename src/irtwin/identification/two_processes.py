@@ -8,7 +8,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
@@ -45,7 +45,7 @@ def shared(work: Callable[[Sequence[Item]], Sequence[Made]], items: Sequence[Ite
     ended before its time.
     """
     middle = -(-len(items) // 2)
-    with _Copy(lambda: work(items[middle:])) as other:
+    with closing(_Copy(lambda: work(items[middle:]))) as other:
         return [*work(items[:middle]), *other.made()]
 
 
@@ -62,14 +62,13 @@ class Begun(Generic[Made]):
         """Return the result; `waiting` is called now and then as long as the copy is at work."""
         if self._other is None:
             return self._work()
-        with self._other as other:
+        with closing(self._other) as other:
             return other.made(waiting)[0]
 
     def drop(self) -> None:
         """End the work: nobody will ask."""
         if self._other is not None:
-            with self._other:
-                return
+            self._other.close()
 
 
 def begun(work: Callable[[], Made], *, worth: bool) -> Begun[Made]:
@@ -87,9 +86,6 @@ class _Copy(Generic[Made]):
         self._process.start()
         to.close()
 
-    def __enter__(self) -> _Copy[Made]:
-        return self
-
     def made(self, waiting: Callable[[], None] | None = None) -> list[Made]:
         """Wait for what the work makes; `waiting` is called meanwhile."""
         try:
@@ -105,7 +101,8 @@ class _Copy(Generic[Made]):
                 f"the process with a part of the work ended with {self._process.exitcode}"
             ) from gone
 
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """End the copy, whatever it does."""
         self._from.close()
         self._process.kill()  # it may have taken over what this process does when it is told to end
         self._process.join()
