@@ -140,25 +140,22 @@ def _slopes(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np.nda
 class _About:
     """What a twin predicts of a piece of a motion, whose samples have `weights` (N,) s.
 
-    values: (L,), coefficients of power; columns: (N, n, K) of torque; torque: (N, n) N m, the real one; flows: (N, L),
-    the columns of power.
+    columns: (N, n, K) of torque; torque: (N, n) N m, the real one; flows: (N, L), the columns of power.
     """
 
     twin: Twin
     piece: Motion
     weights: np.ndarray
-    values: np.ndarray
     columns: np.ndarray
     torque: np.ndarray
     flows: np.ndarray
 
     @classmethod
     def of(cls, twin: Twin, piece: Motion, weights: np.ndarray) -> _About:
-        stack = twin.stack
-        of_torque, of_power = twin.torque_values, twin.power_values
-        columns, torque = stack.torque_columns(piece, of_torque), stack.real_torque(piece, of_torque)
-        flows = stack.predicted_power_columns(piece, of_torque, of_power, torque)
-        return cls(twin, piece, weights, of_power, columns, torque, flows)
+        stack, values = twin.stack, twin.torque_values
+        columns, torque = stack.torque_columns(piece, values), stack.real_torque(piece, values)
+        flows = stack.predicted_power_columns(piece, values, twin.power_values, torque)
+        return cls(twin, piece, weights, columns, torque, flows)
 
 
 _Slope = tuple[int, np.ndarray, np.ndarray]  # an entry's row, and its slope over (K,) and (L,) coefficients
@@ -178,7 +175,7 @@ def _of_losses(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
     """Yield the slopes of what is drawn beside, by its own coefficients and by the torque of its joint."""
     stack, robot = about.twin.stack, about.twin.robot
     power = about.weights @ about.flows
-    rise = power_rise(stack, about.piece, about.torque, np.ones(len(robot.joints))) * about.values
+    rise = power_rise(stack, about.piece, about.torque, np.ones(len(robot.joints))) * about.twin.power_values
     for k, (effect, term) in enumerate(stack.power_terms):
         row = rows.get((effect.id, term.joint))
         if row is None or effect.carries_torque:
@@ -193,7 +190,7 @@ def _of_losses(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
 def _of_burnt(about: _About, rows: dict[Key, int]) -> Iterator[_Slope]:
     """Yield the slopes of what is made of the power that axes give back, by what that power depends on."""
     stack, piece = about.twin.stack, about.piece
-    on_bus = np.where(stack.on_the_bus, about.values, 0.0)
+    on_bus = np.where(stack.on_the_bus, about.twin.power_values, 0.0)
     axes = about.flows @ on_bus
     for effect in stack.effects:
         row = rows.get((effect.id, None))
