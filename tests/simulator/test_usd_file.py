@@ -185,5 +185,6 @@ def test_files_of_something_else_are_refused(tmp_path):
 
 def test_without_its_package_it_is_said_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.delitem(sys.modules, "irtwin.simulator.usd_file", raising=False)
     with pytest.raises(InputError, match=r"arm\.usda: reading USD needs its package; install irtwin\[usd\]"):
         read(tmp_path)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -17,12 +16,10 @@ import scipy
 from irtwin.identification.progress import track
 from irtwin.identification.two_processes import can_copy, shared
 from irtwin.signals.sampling import interval
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.payload import loaded
 from irtwin.simulator.play import PlayedStretch
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
-
-if TYPE_CHECKING:
-    import mujoco
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
@@ -180,8 +177,6 @@ def _bodies(
     servos: Servos, compiled: mujoco.MjModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return at a motion's samples the torque (N, n) but of the joint's own acceleration, and the inertia (N, n)."""
-    import mujoco
-
     dof, at = servos.model.speeds, servos.model.positions
     bare = copy.copy(compiled)
     bare.dof_armature[dof] = bare.dof_damping[dof] = bare.dof_frictionloss[dof] = 0.0

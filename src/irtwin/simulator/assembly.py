@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from irtwin.robot.structure import six_numbers
-
-if TYPE_CHECKING:
-    import mujoco
+from irtwin.simulator.engine import mujoco
 
 WORLD = "world"
 _SERVO = " by its servo"
@@ -59,8 +56,6 @@ def assembled(links: Iterable[ModelLink], connections: Sequence[ModelJoint], gra
 
     gravity: (3,) m/s^2. Raises ValueError, saying why, where joints make no tree, or a number is not finite.
     """
-    import mujoco
-
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -110,8 +105,6 @@ def _body(parent: mujoco.MjsBody, link: ModelLink, joint: ModelJoint | None) -> 
 
 
 def _joint(body: mujoco.MjsBody, one: ModelJoint) -> None:
-    import mujoco
-
     kind = mujoco.mjtJoint.mjJNT_SLIDE if one.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
     joint = body.add_joint(name=one.name, type=kind, pos=one.anchor, axis=one.axis)
     if np.isfinite(one.limits).all():
@@ -125,8 +118,6 @@ def _joint(body: mujoco.MjsBody, one: ModelJoint) -> None:
 
 def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bool:
     """Give a joint a position servo in place of its motors; return whether it has none of its own."""
-    import mujoco
-
     own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
     if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
         return False
@@ -141,8 +132,6 @@ def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bo
 
 
 def _quaternion(place: np.ndarray) -> np.ndarray:
-    import mujoco
-
     found = np.empty(4)
     mujoco.mju_mat2Quat(found, place[:3, :3].ravel())
     return found

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import joint_motions, ranges
-
-if TYPE_CHECKING:
-    import mujoco
+from irtwin.simulator.engine import mujoco
 
 _SLIDES, _TURNS = 2, 3  # MuJoCo's kinds of joints of one coordinate
 _POSES = 12
@@ -86,8 +83,6 @@ def robot_axes(robot: Robot, poses: np.ndarray) -> Axes:
 
 def model_axes(compiled: mujoco.MjModel, joints: Sequence[int], turns: np.ndarray, poses: np.ndarray) -> Axes:
     """Return those of a model's joints, by their places, in poses (P, n); its others stay where they begin."""
-    import mujoco
-
     data, directions, points = mujoco.MjData(compiled), [], []
     for pose in poses:
         data.qpos[compiled.jnt_qposadr[list(joints)]] = pose

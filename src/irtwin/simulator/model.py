@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +19,9 @@ from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.assembly import add_servo
 from irtwin.simulator.axes import alike, first_unlike
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.formats import read_model_file
 from irtwin.simulator.model_file import ModelFile
-
-if TYPE_CHECKING:
-    import mujoco
 
 _SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
 _POSES = 64  # over whose inertia a mean is taken
@@ -82,8 +79,6 @@ class Model:
     @cached_property
     def links(self) -> np.ndarray:
         """The inertia that joints move beyond their rotors (n,), kg m^2, the others held: the mean over poses."""
-        import mujoco
-
         compiled, dof, at = self.compiled, self.speeds, self.positions
         joints, data, full = compiled.dof_jntid[dof], mujoco.MjData(compiled), np.zeros((compiled.nv, compiled.nv))
         limited = compiled.jnt_limited[joints] == 1
@@ -105,8 +100,6 @@ class Model:
     @cached_property
     def flange(self) -> Flange:
         """The frame fixed to the last body that is farthest from its joint; its centre of mass where there is none."""
-        import mujoco
-
         compiled, data = self.compiled, mujoco.MjData(self.compiled)
         mujoco.mj_forward(compiled, data)
         joint = compiled.joint(self.joints[-1]).id
@@ -120,8 +113,6 @@ class Model:
 
     def flange_jacobian(self, q: np.ndarray) -> np.ndarray:
         """Return the Jacobian (N, 3, n) of the flange's place in the world at positions (N, n)."""
-        import mujoco
-
         data, found = mujoco.MjData(self.compiled), np.empty((len(q), 3, q.shape[1]))
         whole = np.empty((3, self.compiled.nv))
         for row, position in enumerate(q):
@@ -140,8 +131,6 @@ class Model:
         By MuJoCo's inverse dynamics without contacts, limits and other constraints; dry friction has the sign of the
         speed, where MuJoCo's own turns over a small one.
         """
-        import mujoco
-
         still = copy.copy(self.compiled)
         still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -263,8 +252,6 @@ def drop_pictures(spec: mujoco.MjSpec, is_urdf: bool) -> None:
 
     A URDF has all inertia in its <inertial>.
     """
-    import mujoco
-
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         return
     for body in spec.bodies if is_urdf else spec.bodies[1:]:

@@ -6,15 +6,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
 from irtwin.robot.xml_elements import Element, outermost
-
-if TYPE_CHECKING:
-    import mujoco
+from irtwin.simulator.engine import mujoco
 
 _MOST = 20_000_000  # bytes
 _IN_URDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
@@ -80,8 +77,6 @@ class ModelFile:
 
     def spec(self) -> mujoco.MjSpec:
         """Return MuJoCo's specification of it. Raises ValueError or mujoco.FatalError where MuJoCo refuses it."""
-        import mujoco
-
         return mujoco.MjSpec.from_file(str(self.path))
 
     def number(self, joint: str, number: str) -> tuple[Element, str]:

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from irtwin.robot.structure import six_numbers
 from irtwin.robot.xml_elements import Element
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Flange, Model
-
-if TYPE_CHECKING:
-    import mujoco
 
 _OTHER_FORMS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia")  # of what `fullinertia` says
 
 
 def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> None:
     """Put a mass, kg, `off` (3,) m from the flange, to its body; the model's constants are to be set after that."""
-    import mujoco
-
     body = flange.body
     whole, centre, inertia = together(compiled, flange, mass, off)
     moments, axes = np.linalg.eigh(inertia)
@@ -31,8 +26,6 @@ def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray)
 
 def loaded(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> mujoco.MjModel:
     """Return a copy of a compiled model with a mass, kg, `off` (3,) m from its flange."""
-    import mujoco
-
     one = copy.copy(compiled)
     load(one, flange, mass, off)
     mujoco.mj_setConst(one, mujoco.MjData(one))
@@ -54,8 +47,6 @@ def together(
     compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Return mass, centre (3,) and the inertia (3, 3) about it, in the body's frame, of body and mass."""
-    import mujoco
-
     body, axes = flange.body, np.empty(9)
     mujoco.mju_quat2Mat(axes, compiled.body_iquat[body])
     own = axes.reshape(3, 3) * compiled.body_inertia[body] @ axes.reshape(3, 3).T

@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Model
 from irtwin.simulator.servos import NAMES, Servos
 from irtwin.simulator.variant import PlayedModel
-
-if TYPE_CHECKING:
-    import mujoco
 
 _AROUND = 0.1  # s about a beginning, of which position and speed there are taken
 _IN_COMMANDS = [NAMES.index("delay"), NAMES.index("offset")]
@@ -160,7 +157,6 @@ def _played(
     servos: Servos, variant: PlayedModel, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]
 ) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
-    import mujoco
     from mujoco.rollout import rollout
 
     compiled = variant.compiled
@@ -214,8 +210,6 @@ def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _efforts(variant: PlayedModel) -> np.ndarray:
     """Return where among the sensors' values are the torques of the joints' actuators (n,)."""
-    import mujoco
-
     compiled = variant.compiled
     of = {
         int(joint): int(compiled.sensor_adr[sensor])
@@ -237,8 +231,6 @@ def _state(
 
     Links hang from soft joints as in rest.
     """
-    import mujoco
-
     state = np.zeros(size)
     position, speed = stretch.state()
     data = mujoco.MjData(compiled)

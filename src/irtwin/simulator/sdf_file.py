@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -23,10 +22,8 @@ from irtwin.robot.structure import inertia_of
 from irtwin.robot.xml_elements import Element as XmlElement
 from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model_file import Changes, ModelFile
-
-if TYPE_CHECKING:
-    import mujoco
 
 _IN_SDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
 _CONTROLLER = "JointPositionController"

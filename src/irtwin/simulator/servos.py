@@ -6,19 +6,16 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from irtwin.errors import InputError
 from irtwin.robot.xml_elements import Element
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Model
 from irtwin.simulator.payload import load, loaded_tag
 from irtwin.simulator.variant import PlayedModel, variant
-
-if TYPE_CHECKING:
-    import mujoco
 
 OF_JOINTS = (
     "stiffness", "damping", "friction", "holding", "armature", "offset", "delay", "torque_limit", "dead_band",
@@ -160,8 +157,6 @@ class Servos:
 
     def compiled(self, numbers: np.ndarray, of: PlayedModel) -> mujoco.MjModel:
         """Return a variant of the model with numbers (k, n) of its own; offset and delay are the commands' to have."""
-        import mujoco
-
         one = copy.copy(of.compiled)
         one.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)  # an arm is one: looking for more takes time
         at, dof = self.actuators, of.speeds
@@ -292,8 +287,6 @@ def has_servos(model: Model) -> bool:
 
 def servos(model: Model) -> Servos:
     """Return the servos of a model. Raises InputError where a joint is not driven by one position servo."""
-    import mujoco
-
     compiled = model.compiled
     at = np.array([drive_of(compiled, joint, str(model.file.path)) for joint in model.joints])
     dof = model.speeds
@@ -337,8 +330,6 @@ def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
 
 def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:
     """Return the actuator that alone drives a joint, if it is a position servo."""
-    import mujoco
-
     place = compiled.joint(joint).id
     own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
     (drives,) = np.nonzero(own)
@@ -347,8 +338,6 @@ def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:
     """Return whether an actuator pulls its joint to its command, as <position> of gear 1 does."""
-    import mujoco
-
     gain, bias = compiled.actuator_gainprm[actuator], compiled.actuator_biasprm[actuator]
     return bool(
         compiled.actuator_gaintype[actuator] == int(mujoco.mjtGain.mjGAIN_FIXED)

@@ -10,22 +10,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input, real_path
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model_file import Changes, ModelFile
 from irtwin.simulator.usd_package import PACKAGE, check_package, new_name, packed
 
-if TYPE_CHECKING:
-    import mujoco
-
-ENDINGS = (".usd", ".usda", ".usdc", PACKAGE)
 _MOST = 200_000_000  # bytes; meshes are within
 _KINDS = {"PhysicsRevoluteJoint": "revolute", "PhysicsPrismaticJoint": "prismatic", "PhysicsFixedJoint": "fixed"}
 _AXES = {"revolute": "angular", "prismatic": "linear"}
@@ -78,8 +76,6 @@ class UsdFile(ModelFile):
     @cached_property
     def stage(self) -> Any:
         """The stage."""
-        from pxr import Usd
-
         return Usd.Stage.Open(str(self.path))
 
     def holds(self, number: str) -> bool:
@@ -117,8 +113,6 @@ class UsdFile(ModelFile):
         return self.path.suffix.lower() == PACKAGE
 
     def _write_layer(self, place: Path, beneath: str, changes: Changes) -> None:
-        from pxr import Sdf
-
         layer = Sdf.Layer.CreateNew(str(place))
         root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
         for key in set(own.ListInfoKeys()) - _OF_LAYER:
@@ -141,13 +135,9 @@ class UsdFile(ModelFile):
     @cached_property
     def units(self) -> tuple[float, float]:
         """Return a unit of length, m, and of mass, kg."""
-        from pxr import UsdGeom, UsdPhysics
-
         return UsdGeom.GetStageMetersPerUnit(self.stage), UsdPhysics.GetStageKilogramsPerUnit(self.stage)
 
     def _put(self, layer: Any, path: str, number: str, value: float) -> None:
-        from pxr import Sdf
-
         prim, over = self.stage.GetPrimAtPath(path), Sdf.CreatePrimInLayer(layer, path)
         kind = _KINDS[prim.GetTypeName()]
         said = [one for one in _PLACES[number] if prim.GetAttribute(one.named(kind)[0]).HasAuthoredValue()]
@@ -172,13 +162,8 @@ class UsdFile(ModelFile):
 def read_usd(path: Path) -> UsdFile:
     """Read a USD file, and look at those that it names.
 
-    Raises InputError where one cannot be read, is larger than 200 MB, missing, or outside the folder; where `pxr` is
-    not installed.
+    Raises InputError where one cannot be read, is larger than 200 MB, missing, or outside the folder.
     """
-    try:
-        from pxr import Tf
-    except ModuleNotFoundError as error:
-        raise InputError(f"{path}: reading USD needs its package; install irtwin[usd]") from error
     content = read_input(path, _MOST)
     try:
         _check_inside(path, path.parent, set())
@@ -200,8 +185,6 @@ def _reason(error: Exception) -> str:
 
 
 def _check_inside(path: Path, folder: Path, seen: set[Path]) -> None:
-    from pxr import Sdf
-
     seen.add(path)
     if path.suffix.lower() == PACKAGE:
         check_package(path)
@@ -219,8 +202,6 @@ def _check_inside(path: Path, folder: Path, seen: set[Path]) -> None:
 
 
 def _joints(stage: Any) -> Iterator[Any]:
-    from pxr import UsdPhysics
-
     for prim in stage.Traverse():
         closes = prim.GetAttribute("physics:excludeFromArticulation").Get()
         if prim.IsA(UsdPhysics.Joint) and not closes and prim.GetAttribute("physics:jointEnabled").Get() is not False:
@@ -239,15 +220,11 @@ def _name(prim: Any) -> str:
 
 
 def _bodies(file: UsdFile) -> list[Any]:
-    from pxr import UsdPhysics
-
     return [prim for prim in file.stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
 
 
 def _world(file: UsdFile, prim: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return where a prim is in the world, (4, 4), m, and by what (3,) its own lengths are stretched to be m."""
-    from pxr import Usd, UsdGeom
-
     length, _ = file.units
     place = np.array(UsdGeom.XformCache(Usd.TimeCode.Default()).GetLocalToWorldTransform(prim)).T
     stretch = np.linalg.norm(place[:3, :3], axis=0)
@@ -266,8 +243,6 @@ def _frame(position: Any, turn: Any, stretch: np.ndarray) -> np.ndarray:
 
 def _end(file: UsdFile, prim: Any, end: int) -> tuple[str, np.ndarray]:
     """Return the body that an end of a joint is fixed to, and the joint's frame (4, 4) in it."""
-    from pxr import UsdPhysics
-
     targets = prim.GetRelationship(f"physics:body{end}").GetTargets()
     target = file.stage.GetPrimAtPath(targets[0]) if targets else file.stage.GetPseudoRoot()
     if not target:
@@ -341,8 +316,6 @@ def _servo(file: UsdFile, prim: Any, kind: str) -> tuple[tuple[float, float] | N
 
 
 def _link(file: UsdFile, prim: Any, moves: bool) -> ModelLink:
-    from pxr import UsdPhysics
-
     place, stretch = _world(file, prim)
     name, has_mass = str(prim.GetPath()), prim.HasAPI(UsdPhysics.MassAPI)
     own = UsdPhysics.MassAPI(prim)
@@ -363,8 +336,6 @@ def _link(file: UsdFile, prim: Any, moves: bool) -> ModelLink:
 
 
 def _has_shapes(body: Any) -> bool:
-    from pxr import Usd, UsdPhysics
-
     prims = iter(Usd.PrimRange(body))
     for prim in prims:
         if prim != body and prim.HasAPI(UsdPhysics.RigidBodyAPI):
@@ -375,8 +346,6 @@ def _has_shapes(body: Any) -> bool:
 
 
 def _gravity(file: UsdFile) -> np.ndarray:
-    from pxr import UsdGeom, UsdPhysics
-
     length, _ = file.units
     scene = next((prim for prim in file.stage.Traverse() if prim.IsA(UsdPhysics.Scene)), None)
     along = np.zeros(3) if scene is None else np.array(UsdPhysics.Scene(scene).GetGravityDirectionAttr().Get())

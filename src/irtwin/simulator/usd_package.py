@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pxr import Sdf
+
 from irtwin.errors import InputError
 
 PACKAGE = ".usdz"
@@ -22,8 +24,6 @@ def check_package(path: Path) -> tuple[str, ...]:
     Raises InputError where it holds no USD, or what USD does not allow there, and where a layer names a file that is
     not in it: USD would look for that elsewhere.
     """
-    from pxr import Sdf
-
     archive = Sdf.ZipFile.Open(str(path))
     names = tuple(archive.GetFileNames() if archive else ())
     if not names or not names[0].lower().endswith(_LAYERS):
@@ -43,8 +43,6 @@ def check_package(path: Path) -> tuple[str, ...]:
 
 def packed(path: Path, names: Sequence[str], layer: Path) -> bytes:
     """Return the package with a layer, of the file's name, put before its files, which stay as they are."""
-    from pxr import Sdf
-
     archive = Sdf.ZipFile.Open(str(path))
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "whole.usdz")
@@ -74,8 +72,6 @@ def _is_inside(name: str) -> bool:
 
 def _check_layer(path: Path, layer: str, inside: dict[str, str], seen: set[str]) -> None:
     """Look through the files that a layer names, and that these name."""
-    from pxr import Sdf
-
     seen.add(layer)
     for named in Sdf.Layer.FindOrOpen(f"{path}[{layer}]").GetCompositionAssetDependencies():
         name = inside.get(posixpath.normpath(posixpath.join(posixpath.dirname(layer), named)))

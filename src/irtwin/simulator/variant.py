@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Model, compiled_of
-
-if TYPE_CHECKING:
-    import mujoco
 
 DAMPED = 0.05  # of critical damping, in what is soft
 _SECOND, _BEHIND = " beside its servo", " behind its motor"
@@ -92,8 +89,6 @@ def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
 
 def _add_second(spec: mujoco.MjSpec, joint: str) -> None:
     """Put an actuator beside a joint's servo, of a force that numbers are to say."""
-    import mujoco
-
     first = next(one for one in spec.actuators if one.target == joint)
     second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
