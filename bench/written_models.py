@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.robot.urdf_text import with_numbers
 from irtwin.signals.motion import Motion
 from irtwin.twin.described import text_of
 from irtwin.twin.files import load

@@ -10,7 +10,7 @@ from tests.bring.dialects import NAME, good, per_joint, write_text
 from tests.data_sets import irtwin
 
 from irtwin.bring.bring import import_logs
-from irtwin.bring.role import roles
+from irtwin.bring.told import roles
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
 

@@ -8,7 +8,7 @@ import pytest
 
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.robot.urdf_text import with_numbers
 
 URDF = """<?xml version='1.0'?>
 <!-- ü: more bytes than letters -->

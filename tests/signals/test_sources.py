@@ -20,7 +20,7 @@ from irtwin.signals.samples import read_signals
 from irtwin.signals.sources import catalogue
 from irtwin.signals.sources.bag_source import BagSource
 from irtwin.signals.sources.csv_source import CsvSource
-from irtwin.signals.sources.parquet_source import ParquetSource
+from irtwin.signals.sources.parquet_file import ParquetSource
 from irtwin.signals.sources.source import MOST_VALUES, Source
 
 CONTRIBUTING = Path(__file__).parents[2] / "CONTRIBUTING.md"

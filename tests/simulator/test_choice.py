@@ -10,8 +10,8 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import choose
 from irtwin.simulator.fit import Fit
 from irtwin.simulator.play import each
+from irtwin.simulator.refined import softened
 from irtwin.simulator.servos import NAMES, PARTS
-from irtwin.simulator.soft import softened
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from tests.synthetic import arm, as_run, swing
 
 from irtwin.errors import InputError
 from irtwin.signals.log import DataSet
-from irtwin.simulator.commands import commanded_runs
+from irtwin.simulator.playing import commanded_runs
 
 ROBOT = arm(2)
 

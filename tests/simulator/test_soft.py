@@ -10,8 +10,8 @@ from irtwin.simulator.alone import alone
 from irtwin.simulator.choice import DifferingNumbers
 from irtwin.simulator.fit import unjudged
 from irtwin.simulator.play import each
+from irtwin.simulator.refined import softened
 from irtwin.simulator.servos import NAMES, SOFT
-from irtwin.simulator.soft import softened
 
 NOISE = 3e-4
 STIFFNESS = NAMES.index("stiffness")

@@ -22,7 +22,7 @@ from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.sdf_text import sdf_text
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.robot.urdf_text import with_numbers
 from irtwin.signals.motion import Motion
 from irtwin.twin.described import described, places, text_of
 from irtwin.twin.files import to_json

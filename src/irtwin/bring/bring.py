@@ -20,9 +20,8 @@ from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
-from irtwin.bring.role import roles
 from irtwin.bring.taken import TakenLogs, TakenRun, take
-from irtwin.bring.told import UserSaid, told
+from irtwin.bring.told import UserSaid, roles, told
 from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
 from irtwin.errors import InputError

@@ -1,15 +1,16 @@
-"""What the user says of a log on the command line."""
+"""What the user says of logs on the command line: what columns are, and whose logs those are."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, by_column
-from irtwin.signals.log import POWER_PLACES
+from irtwin.signals.log import POWER_PLACES, ROLES
 from irtwin.signals.unit import MOTOR, Unit, unit_of
 
 LEFT_OUT = "-"
@@ -113,3 +114,20 @@ def _target(text: str, robot: Robot) -> tuple[str, Target]:
 
 def _names(robot: Robot) -> str:
     return ", ".join(robot.joint_names)
+
+
+def roles(files: Sequence[Path], said: Iterable[str]) -> Mapping[Path, str]:
+    """Return each file's role, as ROLE and FILE=ROLE say, the last that fits it; else "observed".
+
+    FILE is a path as it is given or a name, with * for any letters. Raises InputError where one names no role or file.
+    """
+    found = dict.fromkeys(files, ROLES[0])
+    for text in said:
+        pattern, _, role = text.rpartition("=")
+        if role not in ROLES:
+            raise InputError(f"--role {text}: give ROLE or FILE=ROLE, where ROLE is {', '.join(ROLES)}")
+        named = [file for file in files if not pattern or any(fits(pattern, one) for one in (str(file), file.name))]
+        if not named:
+            raise InputError(f"--role {text}: no such file is brought; there are {', '.join(map(str, files[:12]))}")
+        found |= dict.fromkeys(named, role)
+    return found

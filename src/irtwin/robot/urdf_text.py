@@ -1,17 +1,19 @@
-"""URDF text of a structure."""
+"""URDF text: of a structure, or another one with single numbers changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
-from irtwin.robot.structure import MOMENTS, Body, Connection, Origin, Solid, Structure
+from irtwin.robot.structure import MOMENTS, Body, Connection, Origin, Solid, Structure, six_numbers
 from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.xml_elements import words
+from irtwin.robot.xml_elements import outermost, with_child, words
 
 
 def urdf_text(name: str, structure: Structure, joints: Iterable[Joint]) -> str:
@@ -80,3 +82,24 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
 
 def _origin(element: Element, origin: Origin) -> None:
     SubElement(element, "origin", xyz=words(*origin.xyz), rpy=words(*origin.rpy))
+
+
+def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping[str, Mapping[str, float]]) -> str:
+    """Return checked URDF text with these bodies of links, in the links' frames, and numbers of joints' <dynamics>."""
+    content = urdf.encode("utf-8")
+    for element in reversed(outermost(content).children):  # from behind: places before stay right
+        name = element.attributes.get("name", "")
+        if element.tag == "link" and name in bodies:
+            content = with_child(content, element, "inertial", _inertial(bodies[name]))
+        elif element.tag == "joint" and dynamics.get(name):
+            said = next((child.attributes for child in element.children if child.tag == "dynamics"), {})
+            words = said | {key: repr(value) for key, value in dynamics[name].items()}
+            tag = " ".join(["<dynamics", *(f"{key}={quoteattr(value)}" for key, value in words.items())])
+            content = with_child(content, element, "dynamics", f"{tag}/>")
+    return content.decode("utf-8")
+
+
+def _inertial(body: pin.Inertia) -> str:
+    centre = " ".join(map(repr, body.lever.tolist()))
+    moments = " ".join(f'{name}="{value!r}"' for name, value in zip(MOMENTS, six_numbers(body.inertia), strict=True))
+    return f'<inertial><origin xyz="{centre}"/><mass value="{float(body.mass)!r}"/><inertia {moments}/></inertial>'

@@ -16,7 +16,7 @@ from irtwin.robot.pseudo_inertia import consistent
 from irtwin.robot.sdf_text import sdf_text
 from irtwin.robot.structure import Structure, structure_of
 from irtwin.robot.urdf import parse_urdf
-from irtwin.robot.urdf_numbers import with_numbers
+from irtwin.robot.urdf_text import with_numbers
 from irtwin.robot.usd_text import usd_text
 from irtwin.twin.twin import Twin
 

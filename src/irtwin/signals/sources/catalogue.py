@@ -11,7 +11,7 @@ from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.sources.bag_source import BagSource
 from irtwin.signals.sources.csv_source import CsvSource
-from irtwin.signals.sources.parquet_source import ParquetSource
+from irtwin.signals.sources.parquet_file import ParquetSource
 from irtwin.signals.sources.source import Source
 
 GROUP = "irtwin.sources"

@@ -1,4 +1,4 @@
-"""Parquet files, opened and read within bounds: by their footer, and by the headers of their pages."""
+"""Parquet files, opened and read within bounds: by their footer, and by the headers of their pages; runs as such."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, ClassVar
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -14,7 +14,7 @@ from pyarrow.parquet import ColumnChunkMetaData, ParquetFile
 
 from irtwin.errors import InputError, first_line
 from irtwin.input_file import Unpacking, check_file
-from irtwin.signals.sources.source import LONGEST_NAME, check_names, check_values
+from irtwin.signals.sources.source import LONGEST_NAME, Source, check_names, check_values
 
 _BYTES = 8  # of a value that is read
 _PAGE = 1000  # bytes that a page counts for beside what it holds: pages without any would take time without end
@@ -135,3 +135,26 @@ def _byte(file: BinaryIO) -> int:
     if not read:
         raise pa.ArrowInvalid("a page's header is cut off")
     return read[0]
+
+
+class ParquetSource(Source):
+    """A Parquet file, read once its own account of itself promises numbers that fit into the memory."""
+
+    suffixes: ClassVar[tuple[str, ...]] = (".parquet",)
+
+    def columns(self) -> Sequence[str]:
+        """Return the names in the file's schema."""
+        with open_parquet(self.path) as file:
+            return list(file.schema_arrow.names)
+
+    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
+        """Return some of the columns, of numbers; there is nothing to repair."""
+        with open_parquet(self.path) as file:
+            self.check_size(count_rows(file), len(columns))
+            for name in columns:
+                kind = file.schema_arrow.field(name).type
+                if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
+                    raise InputError(
+                        f"{self.path}: column {name} is of type {str(kind)[:60]}; export it as numbers, in SI units"
+                    )
+            return read_columns(self.path, file, columns), []
