@@ -10,9 +10,8 @@ from tests.data_sets import write
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.signals.channels import Signals
-from irtwin.signals.frozen import frozen
 from irtwin.signals.log import Run, read_data_set
-from irtwin.signals.sampling import as_sampled
+from irtwin.signals.sampling import as_sampled, frozen
 
 ROBOT = arm(2)
 

@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from irtwin.bring.column_name import Meaning, said_by, words_of
+from irtwin.bring.column_name import Meaning, field_of, first_meaning, said_by, words_of
 from irtwin.bring.doubt import DoubtError, WayOut
-from irtwin.bring.meaning import field_of, first_meaning
 from irtwin.bring.recording import Recording
 from irtwin.bring.told import LEFT_OUT, UserSaid, fits
 from irtwin.errors import InputError

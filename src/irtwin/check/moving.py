@@ -8,10 +8,10 @@ import numpy as np
 
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import choose_cutoff, condition
-from irtwin.signals.frozen import LEAST_RANGE
 from irtwin.signals.log import DataSet, Run, own_runs
 from irtwin.signals.motion import Motion
 from irtwin.signals.samples import FEWEST
+from irtwin.signals.sampling import LEAST_RANGE
 
 _MOST_RUNS = 8
 _MOST_SAMPLES = 40_000  # of a run that are looked at
