@@ -26,6 +26,7 @@ from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
+from irtwin.robot.ros_names import free_name
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.signals.sampling import interval
 from irtwin.storage.files import working_folder
@@ -56,15 +57,11 @@ class Options:
 
     def with_answer(self, answer: WayOut) -> Options:
         """Return them with an answer, as if it had been typed."""
-        result = self
+        said: dict[str, list[str]] = {"--map": [*self.maps], "--gear-ratio": [*self.gear_ratios], "--power-at": []}
         for option, value in answer.options:
-            if option == "--power-at":
-                result = replace(result, power_at=value)
-            elif option == "--gear-ratio":
-                result = replace(result, gear_ratios=(*result.gear_ratios, value))
-            else:
-                result = replace(result, maps=(*result.maps, value))
-        return result
+            said[option].append(value)
+        maps, ratios, places = (tuple(values) for values in said.values())
+        return replace(self, maps=maps, gear_ratios=ratios, power_at=places[-1] if places else self.power_at)
 
 
 @dataclass(frozen=True)
@@ -219,31 +216,22 @@ def _topic(text: str) -> tuple[str, str]:
 def _run_text(log: Recording, run: TakenRun, name: str, form: LogsAlike, options: Options) -> RunText:
     time = run.columns["time"]
     lasts = f"{len(time)} samples, {time[-1] - time[0]:.4g} s at {1 / interval(time):.4g} Hz"
+    load = rtde_names.payload(log) if rtde_names.is_rtde(log.columns) else None
+    why = "what the controller was told, by RTDE"
+    if options.payload_mass is not None:
+        load, why = (options.payload_mass, options.payload_com), "as --payload-mass says"
     text = RunText(
         f"runs/{name}.parquet",
         f"from {log.path.name} ({log.form}): {lasts}",
         started=run.started,
         columns=form.taken.columns if log is form.logs[0] else (),
     )
-    load = rtde_names.payload(log) if rtde_names.is_rtde(log.columns) else None
-    if options.payload_mass is not None:
-        return replace(
-            text,
-            payload_mass=options.payload_mass,
-            payload_com=options.payload_com,
-            payload_why="as --payload-mass says",
-        )
-    if load is not None:
-        return replace(
-            text, payload_mass=load[0], payload_com=load[1], payload_why="what the controller was told, by RTDE"
-        )
-    return text
+    return text if load is None else replace(text, payload_mass=load[0], payload_com=load[1], payload_why=why)
 
 
 def _name(path: Path, taken: Mapping[Path, tuple[RunText, TakenRun]]) -> str:
     name = re.sub(r"[^\w\-]+", "_", path.stem).strip("_") or "run"
-    files = {Path(text.file).stem for text, _ in taken.values()}
-    return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(files) + 3))) if one not in files)
+    return free_name(name, [Path(text.file).stem for text, _ in taken.values()])
 
 
 def found_in(folder: Path) -> tuple[tuple[str, ...], str | None]:

@@ -98,7 +98,8 @@ def said_by(name: str, unit_text: str | None = None) -> Meaning:
     weak = field is None and bool(words) and set(kept) <= _WEAK and len(numbers) == 1
     if field is None:
         any_unit = unit_of(unit_text or text or "", QUANTITIES)
-        field = None if any_unit is None else _by_unit(any_unit)
+        of_unit = (name for name, each in CHANNELS.items() if any_unit and any_unit.si in (each.unit, each.sliding))
+        field = next(of_unit, None)
         unit = any_unit if field is not None else None
         weak = weak and field is None
     if weak:
@@ -150,11 +151,6 @@ def _unit_within(name: str, field: str) -> tuple[str, Unit] | None:
 def words_of(name: str) -> list[str]:
     """Return the words and numbers of a name, in small letters."""
     return [token.lower() for token in _TOKEN.findall(_CAMEL.sub(" ", name))]
-
-
-def _by_unit(unit: Unit) -> str | None:
-    fields = [field for field, each in CHANNELS.items() if unit.si in (each.unit, each.sliding)]
-    return fields[0] if fields else None
 
 
 def first_meaning(name: str, recording: Recording, robot: Robot, target: Target | None) -> Meaning:

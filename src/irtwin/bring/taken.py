@@ -169,7 +169,8 @@ class _Taking:
             elif each.unit is None and seen is not None:
                 if seen.choice is None:
                     could = seen.allowed if seen.allowed[1:] else units(si)  # one that is not sure is no choice
-                    raise self._doubt(each, f"could be in {_or(could)}: {seen.why}", could)
+                    named = " or ".join(unit.name for unit in could)
+                    raise self._doubt(each, f"could be in {named}: {seen.why}", could)
                 self.units[each.column] = seen.choice, seen.why
             elif each.unit is not None:
                 unit = each.unit
@@ -270,10 +271,6 @@ class _Taking:
         why = each.why if unit_why in ("", each.why) else f"{each.why}; {unit.name} {unit_why}"
         channel = CHANNELS[each.field].column(str(each.joint))
         return Taken(each.column, channel, name, " ".join(steps) or "none", why)
-
-
-def _or(choices: Sequence[Unit]) -> str:
-    return " or ".join(unit.name for unit in choices)
 
 
 def _warm(evidence: UnitEvidence) -> UnitEvidence:

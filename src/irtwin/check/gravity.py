@@ -38,11 +38,6 @@ class _Load:
         """By how much at least."""
         return abs(self.turned) - _SURE * self.deviation
 
-    @property
-    def at_most(self) -> float:
-        """By how much at most."""
-        return abs(self.turned) + _SURE * self.deviation
-
 
 def gravity_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the clearest of the joints that gravity turns as no load of this robot would.
@@ -53,7 +48,7 @@ def gravity_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     if rows is None:
         return []
     loads = list(_loads(robot, rows, moving.joints))
-    right = max((load.joint for load in loads if load.at_most < _TURNED), default=-1)
+    right = max((load.joint for load in loads if abs(load.turned) + _SURE * load.deviation < _TURNED), default=-1)
     turned = [load for load in loads if load.surely > _TURNED and load.joint > right]
     if len(turned) < len(loads) and all(abs(load.turned) > np.pi - _TURNED for load in turned):
         return []  # none, or the sign of one torque

@@ -33,18 +33,15 @@ class Moving:
 
 def moving(data_set: DataSet) -> Moving:
     """Return the runs in which something moves, conditioned with one cutoff; at most 8, the beginning of each."""
-    runs = tuple(_beginning(run) for run in own_runs(data_set.runs)[:_MOST_RUNS] if len(run.signals.time) >= FEWEST)
-    runs = tuple(run for run in runs if _moves(run.signals).any())
+    long = [run for run in own_runs(data_set.runs)[:_MOST_RUNS] if len(run.signals.time) >= FEWEST]
+    begun = [replace(run, signals=run.signals.rows(slice(_MOST_SAMPLES))) for run in long]
+    runs = tuple(run for run in begun if _moves(run.signals).any())
     cutoff = choose_cutoff(runs) if runs else None
     motions = tuple(condition(run, data_set.robot, cutoff) for run in runs)
     joints = np.zeros(len(data_set.robot.joints), dtype=bool)
     for run in runs:
         joints |= _moves(run.signals)
     return Moving(runs, motions, joints)
-
-
-def _beginning(run: Run) -> Run:
-    return replace(run, signals=run.signals.rows(slice(_MOST_SAMPLES)))
 
 
 def _moves(signals: Signals) -> np.ndarray:

@@ -54,7 +54,8 @@ class CycleTimes:
             self._least = np.where(self._pauses, np.minimum(self._least, least_pause), self._least)
         self._moves = np.flatnonzero(programme.are("move"))
         self._durations, self._energies = zip(*(self._of_move(int(number)) for number in self._moves), strict=True)
-        self._waiting = min(self._at_rest(int(number)) for number in np.flatnonzero(self._pauses))  # W
+        pauses = [programme.alone(int(number)) for number in np.flatnonzero(self._pauses)]
+        self._waiting = min(float(np.mean(twin.power(pause))) for pause in pauses)  # W
 
     @property
     def fastest(self) -> float:
@@ -78,7 +79,9 @@ class CycleTimes:
         own = self._programme.seconds[self._moves]
         timings = [self._chosen(price), *([own] if own.sum() <= room else [])]
         motions = [(factors, self._programme.retimed(factors)) for factors in self._with_pauses(timings, seconds)]
-        return self._cycle(*min(motions, key=lambda each: self._twin.energy(each[1])))
+        factors, motion = min(motions, key=lambda each: self._twin.energy(each[1]))
+        saved = saving(self._twin, motion, self._programme.motion)
+        return Cycle(factors, motion, cost(self._twin, [motion]).energy, saved)
 
     def curve(self) -> list[Cycle]:
         """Return the timings that take least from the fastest cycle to beyond the cheapest."""
@@ -110,10 +113,6 @@ class CycleTimes:
         each = zip(self._durations, self._energies, strict=True)
         return np.array([seconds[np.argmin(energy + price * seconds)] for seconds, energy in each])
 
-    def _at_rest(self, number: int) -> float:
-        """Return the mean power in a pause, W."""
-        return float(np.mean(self._twin.power(self._programme.alone(number))))
-
     def _with_pauses(self, timings: Sequence[np.ndarray], seconds: float) -> Iterator[np.ndarray]:
         """Yield the factors (S,) of timings of the moves, (M,) s each, in a cycle of so many `seconds`.
 
@@ -131,10 +130,6 @@ class CycleTimes:
             taken = least + max(left, 0.0) * share / max(share.sum(), 1e-9)
             taken[self._moves] = moves
             yield taken / self._programme.seconds
-
-    def _cycle(self, factors: np.ndarray, motion: Motion) -> Cycle:
-        energy = cost(self._twin, [motion]).energy
-        return Cycle(factors, motion, energy, saving(self._twin, motion, self._programme.motion))
 
 
 def _least_price(room_taken: Callable[[float], float], room: float, lowest: float) -> float:

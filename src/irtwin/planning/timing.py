@@ -100,7 +100,9 @@ def rounded(corners: np.ndarray, is_clear: Callable[[np.ndarray], bool]) -> BSpl
     pieces = _PIECES
     while True:
         at = np.linspace(0, way[-1], pieces + 1)
-        path = _clamped(interpolated(way, corners, at))
+        inner = np.linspace(0, 1, pieces - _DEGREE + 2)
+        knots = np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)])
+        path = scipy.interpolate.BSpline(knots, interpolated(way, corners, at), _DEGREE)
         if pieces > _MOST_PIECES or is_clear(path(np.linspace(0, 1, 400))):
             return path
         pieces = pieces * 3 // 2
@@ -139,11 +141,6 @@ def shares(motion: States, limits: MotionLimits, torque: Torque) -> dict[str, np
         "jerk": np.abs(jerk) / limits.jerk,
         "torque": np.abs(torque(q, dq, ddq)) / limits.torque,
     }
-
-
-def _clamped(points: np.ndarray) -> BSpline:
-    inner = np.linspace(0, 1, len(points) - _DEGREE + 1)
-    return scipy.interpolate.BSpline(np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)]), points, _DEGREE)
 
 
 def _topp_ra(path: BSpline, limits: MotionLimits, torque: Torque) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -138,7 +138,8 @@ def _joints(model: pin.Model) -> list[_Joint]:
         # the exponential of -q times `across`, whose cube is 0 for a line and less itself for a turn
         still = np.eye(6) if slides else np.eye(6) + across @ across
         series = np.array([-across, -across @ across]).reshape(2, 2, 3, 6)
-        moved = _stretch(np.flatnonzero(series.any(axis=(0, 1, 3))))
+        first, second, last = np.flatnonzero(series.any(axis=(0, 1, 3)))[[0, 1, -1]].tolist()
+        moved = slice(first, last + 1, second - first)  # two or three of three
         maps = np.concatenate([still, series[:, :, moved].reshape(-1, 6)]) @ parent
         found.append(_Joint(model.parents[index] - 1, axis, maps, moved, -across, slides))
     return found
@@ -148,11 +149,6 @@ def _pieces(samples: int) -> Iterator[slice]:
     """Yield the samples in pieces alike: a short one takes as many calls as a long one."""
     edges = np.linspace(0, samples, -(-samples // _PIECE) + 1).astype(int).tolist()
     return map(slice, edges[:-1], edges[1:])
-
-
-def _stretch(places: np.ndarray) -> slice:
-    """Return the slice of two or three of three places."""
-    return slice(places[0], places[-1] + 1, places[1] - places[0])
 
 
 def _fill(

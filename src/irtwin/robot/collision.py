@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -77,7 +77,10 @@ class CollisionModel:
             )
         self._pair_links()
         self._add_obstacles(obstacles)
-        self._fresh()
+        self._results = pin.GeometryData(self._geometry)
+        names = [str(shape.name) for shape in self._geometry.geometryObjects]
+        names[: len(self._names)] = self._names
+        self._pairs = [(names[pair.first], names[pair.second]) for pair in self._geometry.collisionPairs]
 
     @property
     def checks_itself(self) -> bool:
@@ -97,14 +100,14 @@ class CollisionModel:
     @property
     def own_pairs(self) -> frozenset[frozenset[str]]:
         """The pairs of the robot's own links that are checked, by name."""
-        return frozenset(frozenset(self._pair(pair)) for pair in range(self._own))
+        return frozenset(map(frozenset, self._pairs[: self._own]))
 
     def ever_meeting(self, poses: np.ndarray) -> set[frozenset[str]]:
         """Return the pairs that touch at any of the joint positions, (N, n), by name."""
         results = pin.GeometryData(self._geometry)
         left: dict[frozenset[str], list[int]] = {}
-        for pair in range(len(self._pairs)):
-            left.setdefault(frozenset(self._pair(pair)), []).append(pair)
+        for pair, names in enumerate(self._pairs):
+            left.setdefault(frozenset(names), []).append(pair)
         met: set[frozenset[str]] = set()
         for q in poses:
             if not pin.computeCollisions(self._model, self._data, self._geometry, results, q, False):
@@ -122,7 +125,7 @@ class CollisionModel:
         if not pin.computeCollisions(self._model, self._data, self._geometry, self._results, q, True):
             return None
         return next(
-            self._pair(pair) for pair, result in enumerate(self._results.collisionResults) if result.isCollision()
+            self._pairs[pair] for pair, result in enumerate(self._results.collisionResults) if result.isCollision()
         )
 
     def keep_off(self, margin: float) -> None:
@@ -226,18 +229,15 @@ class CollisionModel:
         pairs = list(self._geometry.collisionPairs)
         always = set(range(len(pairs)))
         results = pin.GeometryData(self._geometry)
-        for q in self._random_poses():
+        lower, upper = self._robot.limits
+        lower, upper = np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi)
+        for q in np.random.default_rng(0).uniform(lower, upper, (_PROBES, len(lower))):
             if not always:
                 return
             pin.updateGeometryPlacements(self._model, self._data, self._geometry, results, q)
             always = {pair for pair in always if pin.computeCollision(self._geometry, results, pair)}
         for pair in always:
             self._geometry.removeCollisionPair(pairs[pair])
-
-    def _random_poses(self) -> Iterable[np.ndarray]:
-        lower, upper = self._robot.limits
-        lower, upper = np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi)
-        return np.asarray(np.random.default_rng(0).uniform(lower, upper, (_PROBES, len(lower))))
 
     def _add_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Pair each obstacle with what moves; the base may stand on it."""
@@ -248,17 +248,6 @@ class CollisionModel:
             index = self._geometry.addGeometryObject(pin.GeometryObject(name, 0, place, coal.Box(*obstacle.size)))
             for shape in moving:
                 self._geometry.addCollisionPair(pin.CollisionPair(shape, index))
-
-    def _fresh(self) -> None:
-        self._results = pin.GeometryData(self._geometry)
-        self._pairs = [(pair.first, pair.second) for pair in self._geometry.collisionPairs]
-
-    def _pair(self, pair: int) -> tuple[str, str]:
-        first, second = (self._name(index) for index in self._pairs[pair])
-        return first, second
-
-    def _name(self, index: int) -> str:
-        return self._names[index] if index < len(self._names) else str(self._geometry.geometryObjects[index].name)
 
 
 def joined(parents: Sequence[int], one: int, other: int) -> bool:

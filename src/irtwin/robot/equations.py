@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -73,12 +73,13 @@ def equations(robot: Robot) -> EquationsOfMotion:
         )
     sympy = library()
     mass, height = _energies(robot)
-    q, dq, _ = symbols_of(len(robot.joints))
+    q, dq, ddq = symbols_of(len(robot.joints))
     gravity = sympy.Matrix([sympy.diff(height, position) for position in q])
     least = _DUST * max(map(abs, mass.atoms(sympy.Float)), default=0.0)
     speed = sympy.Matrix([_speed_terms(mass, q, dq, joint, least) for joint in range(len(q))])
     derived = EquationsOfMotion(robot.joint_names, mass, speed, gravity, 0.0)
-    return EquationsOfMotion(robot.joint_names, mass, speed, gravity, _deviation(robot, derived))
+    torques = [derived.torque(joint) for joint in range(len(q))]
+    return replace(derived, deviation=deviation_of(robot, sympy.lambdify([*q, *dq, *ddq], torques, "numpy")))
 
 
 def library() -> Any:
@@ -168,14 +169,6 @@ def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.nda
             if abs(value) > _DUST * np.abs(beside).max():
                 terms.append(sympy.Float(value) * along * function(angle))
     return sympy.Add(*terms)
-
-
-def _deviation(robot: Robot, derived: EquationsOfMotion) -> float:
-    sympy = library()
-    count = len(robot.joints)
-    q, dq, ddq = symbols_of(count)
-    said = sympy.lambdify([*q, *dq, *ddq], [derived.torque(joint) for joint in range(count)], "numpy")
-    return deviation_of(robot, said)
 
 
 def deviation_of(robot: Robot, said: Callable[..., Sequence[float]]) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 
@@ -12,15 +14,49 @@ _STEPS = 60
 _REACHED = 1e-9  # m and rad
 _DAMPING, _LEAST_DAMPING = 1e-3, 1e-12
 
+Left = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of q (n,): (6,) m and rad to the goal, (6, n) its slope
+
 
 def nearest(
     robot: Robot, target: pin.SE3, start: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> tuple[np.ndarray, float, float]:
     """Return where a descent of the flange to a target from `start` (n,) ends, and what is left: m, rad."""
-    search = _Search(robot, link_frame(robot, flange(robot)), target, lower, upper)
-    q = search.descend(np.clip(start, lower, upper))
-    left = target.actInv(search.place(q))
-    return q, float(np.linalg.norm(left.translation)), float(np.linalg.norm(pin.log3(left.rotation)))
+    model, data, frame = robot.model, robot.model.createData(), link_frame(robot, flange(robot))
+
+    def away(q: np.ndarray) -> pin.SE3:
+        pin.computeJointJacobians(model, data, q)
+        return target.actInv(pin.updateFramePlacement(model, data, frame))
+
+    def left(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        off = away(q)
+        jacobian = np.reshape(pin.getFrameJacobian(model, data, frame, pin.LOCAL), (6, -1))
+        return np.asarray(pin.log6(off).vector), np.asarray(pin.Jlog6(off) @ jacobian)
+
+    q = _descended(left, np.clip(start, lower, upper), lower, upper)
+    off = away(q)
+    return q, float(np.linalg.norm(off.translation)), float(np.linalg.norm(pin.log3(off.rotation)))
+
+
+def _descended(left: Left, q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return where a descent from `q` (n,) ends, by damped least squares within limits."""
+    damping = _DAMPING
+    value, slope = left(q)
+    for _ in range(_STEPS):
+        if np.linalg.norm(value) < _REACHED * 1e-2:
+            break
+        free = ~(((q <= lower) & (slope.T @ value > 0)) | ((q >= upper) & (slope.T @ value < 0)))
+        step = np.zeros_like(q)
+        step[free] = -_damped_step(slope[:, free], value, damping)
+        tried = np.clip(q + step, lower, upper)
+        new, new_slope = left(tried)
+        if new @ new < value @ value:
+            q, value, slope = tried, new, new_slope
+            damping = max(damping * 0.2, _LEAST_DAMPING)
+        else:
+            damping *= 10
+            if damping > 1e6:
+                break
+    return q
 
 
 def _damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.ndarray:
@@ -31,45 +67,3 @@ def _damped_step(slope: np.ndarray, value: np.ndarray, damping: float) -> np.nda
     count = slope.shape[1]
     stacked = np.vstack([slope, np.sqrt(damping) * np.eye(count)])
     return np.asarray(np.linalg.lstsq(stacked, np.append(value, np.zeros(count)))[0])
-
-
-class _Search:
-    """Damped least squares within limits."""
-
-    def __init__(self, robot: Robot, frame: int, goal: pin.SE3, lower: np.ndarray, upper: np.ndarray) -> None:
-        self._model, self._data, self._frame = robot.model, robot.model.createData(), frame
-        self._goal, self._lower, self._upper = goal, lower, upper
-
-    def left(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (6,) m and rad from the pose to the goal, and (6, n) its slope."""
-        place = self.place(q)
-        jacobian = np.reshape(pin.getFrameJacobian(self._model, self._data, self._frame, pin.LOCAL), (6, -1))
-        left = self._goal.actInv(place)
-        return np.asarray(pin.log6(left).vector), np.asarray(pin.Jlog6(left) @ jacobian)
-
-    def place(self, q: np.ndarray) -> pin.SE3:
-        """Return the link's placement."""
-        pin.computeJointJacobians(self._model, self._data, q)
-        return pin.updateFramePlacement(self._model, self._data, self._frame)
-
-    def descend(self, q: np.ndarray) -> np.ndarray:
-        """Return where the descent from `q` ends."""
-        damping = _DAMPING
-        value, slope = self.left(q)
-        for _ in range(_STEPS):
-            if np.linalg.norm(value) < _REACHED * 1e-2:
-                break
-            free = ~(((q <= self._lower) & (slope.T @ value > 0)) | ((q >= self._upper) & (slope.T @ value < 0)))
-            part = slope[:, free]
-            step = np.zeros_like(q)
-            step[free] = -_damped_step(part, value, damping)
-            tried = np.clip(q + step, self._lower, self._upper)
-            new, new_slope = self.left(tried)
-            if new @ new < value @ value:
-                q, value, slope = tried, new, new_slope
-                damping = max(damping * 0.2, _LEAST_DAMPING)
-            else:
-                damping *= 10
-                if damping > 1e6:
-                    break
-        return q

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from itertools import chain, count
 
 from irtwin.robot.description import Robot
 
@@ -22,7 +23,7 @@ def ros_names(names: Iterable[str], otherwise: str) -> dict[str, str]:
     taken = {name for name in given if _VALID.fullmatch(name)}
     made: dict[str, str] = {}
     for name in given:
-        made[name] = name if name in taken else _free(_valid(name, otherwise), taken)
+        made[name] = name if name in taken else free_name(_valid(name, otherwise), taken)
         taken.add(made[name])
     return made
 
@@ -45,9 +46,6 @@ def _valid(name: str, otherwise: str) -> str:
     return words if words[0].isalpha() else f"{otherwise}_{words}"
 
 
-def _free(name: str, taken: set[str]) -> str:
-    number = 2
-    free = name
-    while free in taken:
-        free, number = f"{name}_{number}", number + 1
-    return free
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name, with the first number from 2 on that makes it one that is not taken."""
+    return next(one for one in chain([name], (f"{name}_{number}" for number in count(2))) if one not in taken)

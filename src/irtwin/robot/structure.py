@@ -19,6 +19,7 @@ from irtwin.robot.xml_elements import numbers
 Three = tuple[float, float, float]
 Colours = Mapping[str | None, Element | None]
 _SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "mesh": ()}
+_COUNTS = {"size": 3, "radius": 1, "length": 1}  # numbers of each
 PRIMITIVES = ("box", "cylinder", "sphere")
 PURPOSES = ("visual", "collision")
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of an inertia: xx, yy, zz, xy, xz, yz
@@ -156,7 +157,7 @@ def solids_of(link: Element, colours: Colours, source: str, kinds: Collection[st
             shape = geometry[0] if geometry is not None and len(geometry) else None
             if shape is None or shape.tag not in kinds:
                 continue
-            size = tuple(value for key in _SIZES[shape.tag] for value in _size(shape, key, where))
+            size = tuple(one for key in _SIZES[shape.tag] for one in numbers(shape.get(key), _COUNTS[key], where))
             file = None
             if shape.tag == "mesh":
                 file, size = shape.get("filename", ""), numbers(shape.get("scale", "1 1 1"), 3, where)
@@ -204,10 +205,6 @@ def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
     dynamics = joint.find("dynamics") if name in moving else None
     said = [numbers("0" if dynamics is None else dynamics.get(key, "0"), 1, name)[0] for key in ("damping", "friction")]
     return Connection(name, kind, _parent(joint), child, origin_of(joint), axis, *said)
-
-
-def _size(shape: Element, key: str, where: str) -> tuple[float, ...]:
-    return numbers(shape.get(key), 3 if key == "size" else 1, where)
 
 
 def _colour(visual: Element, colours: Colours, where: str) -> tuple[float, ...] | None:

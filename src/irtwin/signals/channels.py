@@ -103,12 +103,10 @@ class Signals:
         return replace(self, **some)
 
 
-def _channels() -> dict[str, Channel]:
-    hints = get_type_hints(Signals, include_extras=True)
-    return {field: hint.__metadata__[0] for field, hint in hints.items() if hasattr(hint, "__metadata__")}
-
-
-CHANNELS: Mapping[str, Channel] = _channels()  # by field of Signals
+_HINTS = get_type_hints(Signals, include_extras=True)
+CHANNELS: Mapping[str, Channel] = {  # by field of Signals
+    field: hint.__metadata__[0] for field, hint in _HINTS.items() if hasattr(hint, "__metadata__")
+}
 REQUIRED = ("time", "q")  # fields without which a run is none
 
 

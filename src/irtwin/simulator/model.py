@@ -27,6 +27,7 @@ _SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: bey
 _POSES = 64  # over whose inertia a mean is taken
 _APART = 1e-3  # m, frames that are at one place
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
+EFFORT = " as its actuators turn it"  # behind a joint's name: the sensor of that torque
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
 
 
@@ -239,9 +240,8 @@ def compiled_of(
         change(spec)
         for joint in spec.joints:
             if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-                spec.add_sensor(
-                    type=mujoco.mjtSensor.mjSENS_JOINTACTFRC, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint.name
-                )
+                sensor = spec.add_sensor(name=f"{joint.name}{EFFORT}", type=mujoco.mjtSensor.mjSENS_JOINTACTFRC)
+                sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_JOINT, joint.name
         return spec.compile(), delays, added
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error

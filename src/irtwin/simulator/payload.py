@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 
 import numpy as np
+import pinocchio as pin
 
 from irtwin.robot.structure import six_numbers
 from irtwin.robot.xml_elements import Element
@@ -49,11 +50,7 @@ def together(
     """Return mass, centre (3,) and the inertia (3, 3) about it, in the body's frame, of body and mass."""
     body, axes = flange.body, np.empty(9)
     mujoco.mju_quat2Mat(axes, compiled.body_iquat[body])
-    own = axes.reshape(3, 3) * compiled.body_inertia[body] @ axes.reshape(3, 3).T
-    parts = ((float(compiled.body_mass[body]), compiled.body_ipos[body].copy()), (mass, flange.place + off))
-    whole = sum(each for each, _ in parts)
-    centre = sum(each * at for each, at in parts) / whole
-    for each, at in parts:
-        arm = at - centre
-        own = own + each * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return whole, np.asarray(centre), own
+    inertia = axes.reshape(3, 3) * compiled.body_inertia[body] @ axes.reshape(3, 3).T
+    own = pin.Inertia(float(compiled.body_mass[body]), compiled.body_ipos[body], inertia)
+    whole = own + pin.Inertia(mass, flange.place + off, np.zeros((3, 3)))
+    return whole.mass, whole.lever, whole.inertia

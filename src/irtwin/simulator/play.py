@@ -11,7 +11,7 @@ import numpy as np
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
 from irtwin.simulator.engine import mujoco
-from irtwin.simulator.model import Model
+from irtwin.simulator.model import EFFORT, Model
 from irtwin.simulator.servos import NAMES, Servos
 from irtwin.simulator.variant import PlayedModel
 
@@ -173,7 +173,7 @@ def _played(
         (one, place): _state(servos, variant, models[one], stretches[place], size, on_links[one])
         for one, place in pairs
     }
-    efforts = _efforts(variant)
+    efforts = [int(compiled.sensor(f"{joint}{EFFORT}").adr[0]) for joint in servos.model.joints]
     inputs = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
     at_once = max(1, _MOST // (steps * size))
     begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
@@ -208,17 +208,6 @@ def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(time, times, each) for each in values.T])
 
 
-def _efforts(variant: PlayedModel) -> np.ndarray:
-    """Return where among the sensors' values are the torques of the joints' actuators (n,)."""
-    compiled = variant.compiled
-    of = {
-        int(joint): int(compiled.sensor_adr[sensor])
-        for sensor, joint in enumerate(compiled.sensor_objid)
-        if compiled.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTACTFRC
-    }
-    return np.array([of[int(joint)] for joint in variant.joints])
-
-
 def _state(
     servos: Servos,
     variant: PlayedModel,
@@ -231,7 +220,6 @@ def _state(
 
     Links hang from soft joints as in rest.
     """
-    state = np.zeros(size)
     position, speed = stretch.state()
     data = mujoco.MjData(compiled)
     data.qpos[variant.positions], data.qvel[variant.speeds] = position, speed
@@ -240,9 +228,8 @@ def _state(
         twist = data.qfrc_bias[variant.behind] / compiled.jnt_stiffness[compiled.dof_jntid[variant.behind]]
         data.qpos[variant.links] = -twist
         data.qpos[variant.positions[variant.soft]] += twist * on_links[variant.soft]
-    state[1 : 1 + compiled.nq] = data.qpos
-    state[1 + compiled.nq : 1 + compiled.nq + compiled.nv] = data.qvel
     memory = compiled.actuator_actadr[servos.actuators]
-    has = memory >= 0
-    state[1 + compiled.nq + compiled.nv + memory[has]] = position[has]
+    data.act[memory[memory >= 0]] = position[memory >= 0]
+    state = np.empty(size)
+    mujoco.mj_getState(compiled, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     return state

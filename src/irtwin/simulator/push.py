@@ -93,7 +93,8 @@ def _likeliest(fit: Fit, best: Played) -> tuple[int, Push] | None:
     for place, (stretch, torque) in enumerate(zip(fit.stretches, torques, strict=True)):
         if len(torque) < _SHORTEST:
             continue
-        gain, begin, stop, force = _window(_jacobian(fit, stretch, len(torque)), torque / noise, noise)
+        jacobian = _binned(fit.servos.model.flange_jacobian(stretch.q), interval(stretch.time))[-len(torque) :]
+        gain, begin, stop, force = _window(jacobian, torque / noise, noise)
         if gain > best_gain:
             lasts = _samples(interval(stretch.time), _BIN) * interval(stretch.time)
             start = stretch.begin + stretch.time[-1] - (len(torque) - np.array([begin, stop])) * lasts
@@ -109,12 +110,6 @@ def _left(fit: Fit, stretch: PlayedStretch, off: np.ndarray, numbers: np.ndarray
     torque = inertia * smooth[2] + numbers[NAMES.index("damping")] * smooth[1]
     torque += (numbers[0] + numbers[NAMES.index("spring")]) * smooth[0]
     return _binned(torque, gap)
-
-
-def _jacobian(fit: Fit, stretch: PlayedStretch, bins: int) -> np.ndarray:
-    """Return the flange's Jacobian (bins, 3, n)."""
-    found = fit.servos.model.flange_jacobian(stretch.q)
-    return _binned(found, interval(stretch.time))[-bins:]
 
 
 def _binned(values: np.ndarray, gap: float, lasts: float = _BIN) -> np.ndarray:

@@ -95,7 +95,8 @@ class SdfFile(ModelFile):
         version = tuple(int(one) for one in str(root.get("version", "1.7")).split(".") if one.isdigit())
         links = (_link(link, frames, source) for link in model.findall("link"))
         of_joints = [_joint(joint, frames, source, version <= _BEFORE) for joint in model.findall("joint")]
-        drives = {(one.findtext("joint_name") or "").strip(): one for one in _controllers(model)}
+        plugins = (one for one in model.iter("plugin") if _is_controller(one.get("name", "")))
+        drives = {(one.findtext("joint_name") or "").strip(): one for one in plugins}
         joints = [_driven(one, drives[one.name], source) if one.name in drives else one for one in of_joints]
         gravity = root.findtext("world/gravity")
         return assembled(links, joints, np.array(numbers(gravity or "0 0 -9.81", 3, f"{self.path}: gravity")))
@@ -122,10 +123,6 @@ def _text(file: ModelFile, element: XmlElement, name: str) -> str:
 
 def _is_controller(name: str) -> bool:
     return name.rpartition("::")[2] == _CONTROLLER
-
-
-def _controllers(within: Element) -> Iterator[Element]:
-    return (one for one in within.iter("plugin") if _is_controller(one.get("name", "")))
 
 
 def _driven(joint: ModelJoint, controller: Element, source: str) -> ModelJoint:

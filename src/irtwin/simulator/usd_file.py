@@ -126,7 +126,7 @@ class UsdFile(ModelFile):
 
     def spec(self) -> mujoco.MjSpec:
         """Return MuJoCo's specification of it. Raises InputError where it cannot be told, ValueError if no tree."""
-        bodies = _bodies(self)
+        bodies = [prim for prim in self.stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
         connections = [one for prim in _joints(self.stage) if (one := _connection(self, prim)) is not None]
         moved = {one.child for one in connections if one.parent != WORLD or one.kind != "fixed"}
         links = [_link(self, prim, str(prim.GetPath()) in moved) for prim in bodies]
@@ -217,10 +217,6 @@ def _elements(stage: Any) -> Iterator[Element]:
 
 def _name(prim: Any) -> str:
     return str(prim.GetDisplayName() or prim.GetName())
-
-
-def _bodies(file: UsdFile) -> list[Any]:
-    return [prim for prim in file.stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
 
 
 def _world(file: UsdFile, prim: Any) -> tuple[np.ndarray, np.ndarray]:

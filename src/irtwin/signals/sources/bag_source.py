@@ -60,7 +60,9 @@ class BagSource(Source):
             topics = bag.topics
             states = self._states_topic(topics)
             numbers = self._number_topics(topics)
-            self._check_count([topic for topic in topics if topic.name in (states, *numbers.values())])
+            for one in topics:
+                if one.name in (states, *numbers.values()):
+                    self.check_size(one.count, _width(self.robot) if one.kind == JOINT_STATE else 1)
             joints, others = self._messages(bag, states, tuple(numbers.values()))
         table = joints.table()
         known = np.ones(len(joints.recorded), dtype=bool)
@@ -106,11 +108,6 @@ class BagSource(Source):
                 result[column] = matching[0]
         return result
 
-    def _check_count(self, topics: Sequence[Topic]) -> None:
-        width = len(FIELDS) * len(self.robot.joints) + 1
-        for topic in topics:
-            self.check_size(topic.count, width if topic.kind == JOINT_STATE else 1)
-
     def _messages(
         self, bag: BagFile, states: str, numbers: Sequence[str]
     ) -> tuple[_JointStates, Mapping[str, _Numbers]]:
@@ -145,7 +142,7 @@ class _JointStates:
         self._values: dict[str, list[np.ndarray]] = {field: [] for field in FIELDS}
         self._places: dict[tuple[str, ...], list[int] | None] = {}
         self._others: tuple[str, ...] = ()
-        self.width = len(FIELDS) * len(self._names) + 1
+        self.width = _width(source.robot)
 
     def take(self, recorded: int, message: Any) -> None:
         """Keep a message. Raises InputError where it has not as many values as names."""
@@ -227,6 +224,10 @@ class _Numbers:
         times = times.astype(float)
         values = np.interp(wanted, times, np.array(self._values)[::-1][last])
         return values, known_at(wanted, times)
+
+
+def _width(robot: Robot) -> int:
+    return len(FIELDS) * len(robot.joints) + 1
 
 
 def _there(topics: Sequence[str]) -> str:
