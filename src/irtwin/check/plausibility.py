@@ -102,14 +102,13 @@ def _power(robot: Robot, moving: Moving) -> LogFinding | None:
     power, done = (float(np.quantile(np.concatenate(each), 0.99)) for each in zip(*pairs, strict=True))
     if done < _MECHANICAL or not power > 0:
         return None
-    evidence = {"power": power, "mechanical_w": done}
-    if power < _ELECTRICAL * done and power * _KILO > done:
-        say = f"power reaches {power:.3g} where the joints do {done:.3g} W: it looks like kW; convert it to W"
-        return LogFinding("unit", "power", moving.names, True, False, evidence, say)
-    if power > 100 * _KILO * done or (power > _KILO * done and power > 200 * _KILO):
-        say = f"power reaches {power:.3g} where the joints do {done:.3g} W: it looks like mW; convert it to W"
-        return LogFinding("unit", "power", moving.names, True, False, evidence, say)
-    return None
+    in_kilowatts = power < _ELECTRICAL * done and power * _KILO > done
+    in_milliwatts = power > 100 * _KILO * done or (power > _KILO * done and power > 200 * _KILO)
+    if not (in_kilowatts or in_milliwatts):
+        return None
+    unit = "kW" if in_kilowatts else "mW"
+    say = f"power reaches {power:.3g} where the joints do {done:.3g} W: it looks like {unit}; convert it to W"
+    return LogFinding("unit", "power", moving.names, True, False, {"power": power, "mechanical_w": done}, say)
 
 
 def _done(robot: Robot, motion: Motion) -> np.ndarray:

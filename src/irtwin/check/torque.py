@@ -70,7 +70,20 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
 def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return torques whose gravity and inertia are of another size, against the URDF's, than those of the others."""
     rows = rows_of(robot, moving, MANY_ROWS)
-    return [] if rows is None else _scales(robot, moving, rows, rows.nominal())
+    if rows is None:
+        return []
+    nominal, gains = rows.nominal(), dict[int, float]()
+    for joint in np.flatnonzero(moving.joints).tolist():
+        columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]
+        scale_fit = fit(np.column_stack(columns), rows.torque[:, joint])
+        if scale_fit.t(np.eye(5)[0]) > _SURE_SCALE:
+            gains[joint] = float(scale_fit.coefficients[0])
+    usual = float(np.median(list(gains.values()))) if len(gains) >= _OTHERS else 0.0
+    return [
+        _scale(CHANNELS["torque"].column(robot.joints[joint].name), gain / usual, moving)
+        for joint, gain in gains.items()
+        if usual > 0 and not 1 / _SCALED < gain / usual < _SCALED
+    ]
 
 
 @dataclass(frozen=True)
@@ -147,21 +160,6 @@ def _reversed(body: float, lost: float) -> str:
         ("gravity and inertia act in the other direction", body < -_LIKELY),
     )
     return " and ".join(reason for reason, holds in reasons if holds)
-
-
-def _scales(robot: Robot, moving: Moving, rows: RigidBodyRows, nominal: np.ndarray) -> list[LogFinding]:
-    gains = {}
-    for joint in np.flatnonzero(moving.joints).tolist():
-        columns = [nominal[:, joint], rows.ddq[:, joint], friction(rows.dq[:, joint])]
-        scale_fit = fit(np.column_stack(columns), rows.torque[:, joint])
-        if scale_fit.t(np.eye(5)[0]) > _SURE_SCALE:
-            gains[joint] = float(scale_fit.coefficients[0])
-    usual = float(np.median(list(gains.values()))) if len(gains) >= _OTHERS else 0.0
-    return [
-        _scale(CHANNELS["torque"].column(robot.joints[joint].name), gain / usual, moving)
-        for joint, gain in gains.items()
-        if usual > 0 and not 1 / _SCALED < gain / usual < _SCALED
-    ]
 
 
 def _scale(name: str, ratio: float, moving: Moving) -> LogFinding:

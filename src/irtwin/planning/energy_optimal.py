@@ -66,7 +66,8 @@ def cheapest(
         points = search.improve(points, stiffness * least)
         motion = search.motion(points)
         cost = energy(motion, power)
-        if cost < least and search.goes_forward(points) and keeps(motion, limits, torque, collisions):
+        forward = isinstance(search, _Search) or search.goes_forward(points)
+        if cost < least and forward and keeps(motion, limits, torque, collisions):
             best, least = motion, cost
     return best
 
@@ -170,10 +171,6 @@ class _Search:
         """Return the motion of free points (k, n)."""
         spline = self.spline.through(points)
         return Movement(self._seconds, lambda time: _derivatives(spline, time))
-
-    def goes_forward(self, points: np.ndarray) -> bool:
-        """Whether a motion may go so: any may."""
-        return True
 
     def improve(self, points: np.ndarray, stiffness: float) -> np.ndarray:
         """Return points of less cost, with walls of a stiffness, J."""

@@ -120,7 +120,12 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     ]
     findings: list[LogFinding] = []
     topics = _topics(file, document, robot)
-    listed = _resolved(list(_runs(folder, file, document, robot, repair, commanded, repairs, findings, topics)), file)
+    read: list[Run] = []
+    for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
+        listing = TomlTable(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
+        pieces, said, found = _pieces(folder, listing, robot, repair, commanded, topics)
+        read, repairs, findings = read + pieces, repairs + said, findings + found
+    listed = _resolved(read, file)
     runs = tuple(run for run in listed if run.role != PLANNED)
     if not runs:
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
@@ -310,54 +315,42 @@ def _metered(name: str, table: TomlTable) -> Robot:
     )  # fmt: skip
 
 
-def _runs(
-    folder: Path,
-    file: Path,
-    document: dict[str, Any],
-    robot: Robot,
-    repair: bool,
-    commanded: bool,
-    repairs: list[str],
-    findings: list[LogFinding],
-    topics: Mapping[str, str],
-) -> Iterator[Run]:
-    for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
-        table = TomlTable(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
-        table.check_notes(RUN_KEYS)
-        path = table.path("file", folder)
-        role = table.text("role", "observed") or ""
-        if role not in ROLES:
-            raise table.fault("role", f'= "{role}"; use {", ".join(ROLES)}')
-        signals, dropped = read_signals(
-            path, robot, repair=repair, measured=role != PLANNED, commanded=commanded, topics=topics
+def _pieces(
+    folder: Path, table: TomlTable, robot: Robot, repair: bool, commanded: bool, topics: Mapping[str, str]
+) -> tuple[list[Run], list[str], list[LogFinding]]:
+    """Return the run of a table, in pieces where it has holes in time; what was done in reading; what was mended."""
+    table.check_notes(RUN_KEYS)
+    path = table.path("file", folder)
+    role = table.text("role", "observed") or ""
+    if role not in ROLES:
+        raise table.fault("role", f'= "{role}"; use {", ".join(ROLES)}')
+    planned = role == PLANNED
+    signals, said = read_signals(path, robot, repair=repair, measured=not planned, commanded=commanded, topics=topics)
+    if planned:
+        signals = signals.motion
+        check_plan(signals, path)
+    pieces, found = as_sampled(signals, path, () if planned else robot.joint_names)
+    run = Run(
+        name=path.stem,
+        file=path,
+        sha256=checksum(path),
+        role=role,
+        payload_mass=table.number("payload_mass", least=0.0) or 0.0,
+        payload_com=_centre(table),
+        repeat_of=table.text("repeat_of"),
+        performs=table.text("performs"),
+        started=None if planned else _started(table),
+        notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
+        signals=signals,
+        **_made(table, role),
+    )
+    if len(pieces) > 1 and (run.pieces or run.cycles):
+        run = replace(run, pieces=None, cycles=None)
+        said.append(
+            f"{table.file}: {table.name} pieces and cycles are left out: the run is cut at holes in time, and nothing "
+            "says what was made in which part"
         )
-        if role == PLANNED:
-            signals = signals.motion
-            check_plan(signals, path)
-        pieces, sampled = as_sampled(signals, path, () if role == PLANNED else robot.joint_names)
-        repairs += dropped
-        findings += sampled
-        run = Run(
-            name=path.stem,
-            file=path,
-            sha256=checksum(path),
-            role=role,
-            payload_mass=table.number("payload_mass", least=0.0) or 0.0,
-            payload_com=_centre(table),
-            repeat_of=table.text("repeat_of"),
-            performs=table.text("performs"),
-            started=None if role == PLANNED else _started(table),
-            notes={key: value for key, value in table.values.items() if key not in ("file", "role")},
-            signals=signals,
-            **_made(table, role),
-        )
-        if len(pieces) > 1 and (run.pieces or run.cycles):
-            run = replace(run, pieces=None, cycles=None)
-            repairs.append(
-                f"{file}: {table.name} pieces and cycles are left out: the run is cut at holes in time, and nothing "
-                "says what was made in which part"
-            )
-        yield from (_piece(run, number, piece) for number, piece in enumerate(pieces, start=1))
+    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], said, found
 
 
 def _made(table: TomlTable, role: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 
 from irtwin.robot.structure import six_numbers
 from irtwin.simulator.engine import mujoco
@@ -93,7 +94,8 @@ def _check_finite(what: str, *values: np.ndarray | float) -> None:
 
 def _body(parent: mujoco.MjsBody, link: ModelLink, joint: ModelJoint | None) -> mujoco.MjsBody:
     place = link.place if joint is None else joint.origin
-    body = parent.add_body(name=link.name, pos=place[:3, 3], quat=_quaternion(place))
+    turn = scipy.spatial.transform.Rotation.from_matrix(place[:3, :3])
+    body = parent.add_body(name=link.name, pos=place[:3, 3], quat=turn.as_quat(scalar_first=True))
     if link.mass:
         body.mass, body.ipos, body.explicitinertial = link.mass, link.centre, True
         body.fullinertia = six_numbers(link.inertia)
@@ -129,9 +131,3 @@ def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bo
     servo.forcelimited, servo.forcerange = own.actfrclimited, own.actfrcrange
     own.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the servo has it now
     return True
-
-
-def _quaternion(place: np.ndarray) -> np.ndarray:
-    found = np.empty(4)
-    mujoco.mju_mat2Quat(found, place[:3, :3].ravel())
-    return found

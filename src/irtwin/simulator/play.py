@@ -82,11 +82,6 @@ class PlayedStretch:
         position, speed = np.linalg.lstsq(columns, q[near], rcond=None)[0]
         return position, speed
 
-    @property
-    def is_pushed(self) -> bool:
-        """Whether the model is pushed in its run."""
-        return any(one.run == self.run.name for one in self.pushes)
-
     def pushed(self, model: Model, begin: np.ndarray, step: float) -> np.ndarray:
         """Return the torque (N, n) of pushes over steps that begin at times (N,), s since its beginning."""
         found = np.zeros((len(begin), len(model.joints)))
@@ -189,10 +184,9 @@ def _played(
             commands = known[asked]
             for drives in (servos.actuators, *([variant.second] if len(variant.second) else [])):
                 told[row][:, drives] = commands
-            if stretches[place].is_pushed:
-                torque = stretches[place].pushed(servos.model, begin, step)
-                told[row][:, compiled.nu + variant.speeds] = torque
-                told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
+            torque = stretches[place].pushed(servos.model, begin, step)
+            told[row][:, compiled.nu + variant.speeds] = torque
+            told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
         begun = np.array([states[pair] for pair in some])
         found, sensed = rollout([models[one] for one, _ in some], datas, begun, told, control_spec=int(inputs))
         for row, (one, place) in enumerate(some):
