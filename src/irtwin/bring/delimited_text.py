@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from irtwin.bring.head import CLOCK, DATE, LOOKED_AT, Head, head_of, numbers_in
 from irtwin.bring.recording import Recording, as_columns
 from irtwin.errors import InputError
 from irtwin.input_file import read_input
-from irtwin.signals.sources.csv_source import csv_fault
+from irtwin.signals.sources.csv_source import csv_fault, parsed
 from irtwin.signals.sources.parquet_file import is_text
 from irtwin.signals.sources.source import LONGEST_LINE, MOST_COLUMNS
 
@@ -162,27 +161,13 @@ def _table(path: Path, body: str, form: TextForm, names: list[str], before: int)
     """Return the samples, and what is to be said of a last line that was cut off."""
     if form.delimiter == " ":
         body = "\n".join(_BLANKS.sub(" ", line.strip()) for line in body.split("\n"))
-    wrong: list[tuple[int, int, int]] = []
-
-    def note(row: pa.csv.InvalidRow) -> str:
-        wrong.append((row.number or 0, row.actual_columns, row.expected_columns))
-        return "skip"
-
+    numbers, said = [str(k) for k in range(len(names))], {"decimal_point": form.decimal, "null_values": _NULLS}
     try:
-        table = pa.csv.read_csv(
-            io.BytesIO(body.encode()),
-            read_options=pa.csv.ReadOptions(use_threads=False, column_names=[str(k) for k in range(len(names))]),
-            parse_options=pa.csv.ParseOptions(
-                delimiter=form.delimiter, invalid_row_handler=note, ignore_empty_lines=len(names) > 1
-            ),
-            convert_options=pa.csv.ConvertOptions(
-                decimal_point=form.decimal, null_values=_NULLS, strings_can_be_null=True
-            ),
-        )
+        table, wrong = parsed(body.encode(), numbers, form.delimiter, len(names) > 1, **said)
     except pa.ArrowException as error:
         raise InputError(f"{path}: not readable as {form} ({csv_fault(error)}); export it again") from error
     if wrong:
-        line, has, expected = wrong[0]
+        expected, has, line, _ = wrong[0]
         if len(wrong) == 1 and line == table.num_rows + 1 and has < expected:
             return table.rename_columns(names), f"{path}, line {line + before}: the last, is cut off; it is left out"
         raise InputError(

@@ -14,6 +14,7 @@ from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import joint_motions
 from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.motion import Motion
+from irtwin.signals.sampling import interpolated
 
 FEW_ROWS, MANY_ROWS = 900, 1500  # over all runs, of which a fault is looked for
 MOST_JOINTS = 12  # of more no fault is looked for that takes fits of the whole body
@@ -77,16 +78,9 @@ def rows_of(
     step = -(-sum(len(motion.time) for motion in motions) // most)
     if sum(len(motion.time[::step]) for motion in motions) < _FEWEST:
         return None
-    q, dq, ddq = (
-        np.vstack([_at(motion.time[::step] + later, motion.time, getattr(motion, name)) for motion in motions])
-        for name in ("q", "dq", "ddq")
-    )
-    torque = np.vstack(
-        [
-            _at(motion.time[::step] + of_torque, motion.time, motion.torque)
-            for motion in motions
-            if motion.torque is not None
-        ]
+    q, dq, ddq, torque = (
+        np.vstack([interpolated(one.time, getattr(one, name), one.time[::step] + by) for one in motions])
+        for name, by in (("q", later), ("dq", later), ("ddq", later), ("torque", of_torque))
     )
     return RigidBodyRows(robot.model, q, dq, ddq, torque)
 
@@ -97,10 +91,6 @@ def _alike(motions: list[Motion]) -> list[Motion]:
     for motion in motions:
         carried.setdefault((motion.payload_mass, *motion.payload_com), []).append(motion)
     return max(carried.values(), key=lambda alike: sum(len(motion.time) for motion in alike), default=[])
-
-
-def _at(times: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.interp(times, time, column) for column in values.T])
 
 
 def tilted(model: pin.Model, by: tuple[float, float, float]) -> pin.Model:

@@ -62,8 +62,8 @@ def as_sampled(signals: Signals, path: Path, joints: Sequence[str] = ()) -> tupl
 
 
 def interpolated(time: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return values (N, ...) of rising times (N,) at other times (M,), (M, ...): on straight lines between samples."""
-    return np.asarray(scipy.interpolate.make_interp_spline(time, values, k=1)(at))
+    """Return values (N, ...) of rising times (N,) at others (M,), (M, ...): straight in between, at the ends beyond."""
+    return np.asarray(scipy.interpolate.make_interp_spline(time, values, k=1)(np.clip(at, time[0], time[-1])))
 
 
 def earlier(time: np.ndarray, values: np.ndarray, lag: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import pyarrow as pa
 import pyarrow.csv
@@ -19,11 +19,10 @@ _OTHERS = {b";": "semicolons", b"\t": "tabs", b"|": "bars"}
 
 
 class _Parsed(NamedTuple):
-    """A file's samples; `wrong`: lines of more or fewer values than the first, and what they have; how many lines."""
+    """A file's samples; `wrong`: lines of more or fewer values than the first; how many lines."""
 
     table: pa.Table
-    columns: list[str]
-    wrong: list[tuple[int, str]]
+    wrong: list[pa.csv.InvalidRow]
     lines: int
 
 
@@ -36,39 +35,29 @@ class CsvSource(Source):
 
     def columns(self) -> Sequence[str]:
         """Return the names in the first line."""
-        return self._parsed.columns
+        return list(self._parsed.table.column_names)
 
     def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
         """Return some of the columns; `repair` drops lines of more or fewer values than the first."""
-        table, _, wrong, lines = self._parsed
+        table, wrong, lines = self._parsed
         if wrong and not repair:
-            line, what = wrong[0]
+            expected, has, line, _ = wrong[0]
             last = ", the last one: the file was cut off" if line == lines else ""
             raise InputError(
-                f"{self.path}, line {line}{last}: {what}; correct it, or use --repair to drop such samples"
+                f"{self.path}, line {line}{last}: {has} values instead of {expected}; correct it, or use --repair to "
+                "drop such samples"
             )
         self.check_size(table.num_rows, len(columns))
-        shown = ", ".join(str(line) for line, _ in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
+        shown = ", ".join(str(row.number) for row in wrong[:10]) + (" ..." if len(wrong) > 10 else "")
         note = f"{self.path}: {len(wrong)} samples dropped, wrong number of values: line {shown}"
         return table.select(columns), [note] if wrong else []
 
     @cached_property
     def _parsed(self) -> _Parsed:
         text = self._text()
-        wrong: list[tuple[int, str]] = []
-
-        def note(row: pa.csv.InvalidRow) -> str:
-            wrong.append((row.number, f"{row.actual_columns} values instead of {row.expected_columns}"))
-            return "skip"
-
         try:
-            table = pa.csv.read_csv(
-                io.BytesIO(text),
-                read_options=pa.csv.ReadOptions(use_threads=False),
-                parse_options=pa.csv.ParseOptions(invalid_row_handler=note, ignore_empty_lines=False),
-                convert_options=pa.csv.ConvertOptions(strings_can_be_null=True),
-            )
-            return _Parsed(table, list(table.column_names), wrong, text.count(b"\n") + 1)
+            table, wrong = parsed(text)
+            return _Parsed(table, wrong, text.count(b"\n") + 1)
         except (pa.ArrowException, UnicodeDecodeError) as error:
             raise InputError(
                 f"{self.path}: not readable as CSV ({csv_fault(error)}); separate columns by commas"
@@ -92,6 +81,32 @@ class CsvSource(Source):
         if columns > MOST_COLUMNS:
             raise InputError(f"{self.path}, line 1: {columns} columns; a run has at most {MOST_COLUMNS}")
         return text
+
+
+def parsed(
+    text: bytes,
+    names: Sequence[str] | None = None,
+    delimiter: str = ",",
+    ignore_empty_lines: bool = False,
+    **conversion: Any,
+) -> tuple[pa.Table, list[pa.csv.InvalidRow]]:
+    """Return the samples of a text, and its lines of more or fewer values; `names` where no line has them.
+
+    conversion: as `pyarrow.csv.ConvertOptions` takes it. Raises pa.ArrowException, UnicodeDecodeError.
+    """
+    wrong: list[pa.csv.InvalidRow] = []
+
+    def note(row: pa.csv.InvalidRow) -> str:
+        wrong.append(row)
+        return "skip"
+
+    table = pa.csv.read_csv(
+        io.BytesIO(text),
+        pa.csv.ReadOptions(use_threads=False, column_names=names),
+        pa.csv.ParseOptions(delimiter=delimiter, invalid_row_handler=note, ignore_empty_lines=ignore_empty_lines),
+        pa.csv.ConvertOptions(strings_can_be_null=True, **conversion),
+    )
+    return table, wrong
 
 
 def csv_fault(error: Exception) -> str:
