@@ -226,7 +226,8 @@ def _check(recording: Recording, robot: Robot, chosen: Mapping[str, Meaning], se
         others = f" and {len(missing) - 1} other joints" if some and missing[1:] else ""
         what = f"the position of {missing[0]}{others}" if missing else "the time"
         (column,) = CHANNELS["q" if missing else "time"].columns(missing[:1])
-        held = f", or, where they stood still, {_fixed(missing)}" if some else ""
+        fixed = " ".join(f"--fixed {shlex.quote(joint)}" for joint in missing)
+        held = f", or, where they stood still, {fixed}" if some else ""
         times = [name for name in recording.texts if not timed and said_by(name).field == "time"]
         if times:
             raise InputError(
@@ -251,8 +252,3 @@ def _check_work(recording: Recording, chosen: Collection[Meaning]) -> None:
             f"{recording.path}: no column was taken for torque, motor current or power; say which they are, such as "
             f"{shown} (not used are {', '.join(unknown)[:400]})"
         )
-
-
-def _fixed(joints: Sequence[str]) -> str:
-    """Return the options that hold joints."""
-    return " ".join(f"--fixed {shlex.quote(joint)}" for joint in joints)

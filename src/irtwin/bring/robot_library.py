@@ -33,7 +33,8 @@ def robot_of(said: str) -> tuple[Robot, str]:
     known = {_plain(name): (name, file) for name, file in robots().items()}
     robot = known.get(_plain(said))
     if robot is not None:
-        return read_urdf(robot[1]), f"{robot[0]} of {_home(robot[1])}"
+        home = "irtwin" if robot[1].is_relative_to(resources.folder("ontology")) else _PACKAGE
+        return read_urdf(robot[1]), f"{robot[0]} of {home}"
     near = difflib.get_close_matches(_plain(said), known, 5, 0.5)
     names = ", ".join(known[name][0] for name in near or sorted(known))
     more = "" if _installed() else '; pip install "irtwin[robots]" brings others, as ur10 and panda'
@@ -88,10 +89,6 @@ def _installed() -> list[Path]:
     except PackageNotFoundError:
         return []
     return sorted(Path(str(file.locate())) for file in files if file.suffix == ".urdf")
-
-
-def _home(file: Path) -> str:
-    return "irtwin" if file.is_relative_to(resources.folder("ontology")) else _PACKAGE
 
 
 def _plain(name: str) -> str:

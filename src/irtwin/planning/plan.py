@@ -162,10 +162,8 @@ def _joined(legs: Sequence[Plan], rate: float) -> Plan:
     ends = np.cumsum([0.0, *(leg.seconds for leg in legs)])
     time = np.linspace(0.0, ends[-1], max(20, round(ends[-1] * rate)) + 1)
     own = np.concatenate([leg.motion.time + begin for leg, begin in zip(legs, ends, strict=False)])
-    q, dq, ddq = (
-        np.column_stack([np.interp(time, own, column) for column in np.concatenate(values).T])
-        for values in zip(*((leg.motion.q, leg.motion.dq, leg.motion.ddq) for leg in legs), strict=True)
-    )
+    states = [np.concatenate([getattr(leg.motion, name) for leg in legs]) for name in ("q", "dq", "ddq")]
+    q, dq, ddq = (np.column_stack([np.interp(time, own, one) for one in values.T]) for values in states)
     return replace(
         legs[0],
         motion=replace(legs[0].motion, time=time, q=q, dq=dq, ddq=ddq),

@@ -35,11 +35,7 @@ def usd_text(robot: Robot, armature: Mapping[str, float]) -> str:
     links = [body.name for body in structure.bodies]
     names = _identifiers([robot.name, *links, *(one.name for one in structure.connections)])
     whole, base = names[robot.name], links[0]
-    moving, places, within = (
-        {base: base},
-        {base: np.eye(4)},
-        {base: np.eye(4)},
-    )  # links of each; in the world; in these
+    moving, places, within = {base: base}, {base: np.eye(4)}, {base: np.eye(4)}  # links of each; in the world; in these
     bodies: dict[str, list[str]] = {base: [*_place(np.eye(4)), *_mass(structure.bodies[0].spatial)]}
     fixed = _prim("PhysicsFixedJoint", "world_to_base", [f"rel physics:body1 = </{whole}/{names[base]}>"])
     connections = [fixed]
