@@ -16,7 +16,7 @@ import pinocchio as pin
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, joint_motions, link_frame, ranges
+from irtwin.robot.kinematics import flange, joint_axes, link_frame, ranges
 from irtwin.robot.structure import six_numbers
 
 PARALLEL = 1e-5  # rad: axes nearer to parallel than this are taken as such, because files round their angles
@@ -41,7 +41,8 @@ def table_of(robot: Robot, convention: str = "standard", tip: str | None = None)
     if convention not in CONVENTIONS:
         raise InputError(f'there is no Denavit-Hartenberg convention "{convention}"; use {" or ".join(CONVENTIONS)}')
     chain, end = _chain(robot, tip or flange(robot))
-    axes = [_axis(robot, joint) for joint in chain]
+    directions, points = joint_axes(robot, np.zeros((1, len(robot.joints))))
+    axes = [_Line(points[0, joint - 1], directions[0, joint - 1]) for joint in chain]
     kinds = [robot.joints[joint - 1].kind for joint in chain]
     base = _first_frame(axes[0])
     rows, frame = _rows(axes, kinds, base, end, convention)
@@ -73,15 +74,6 @@ def _chain(robot: Robot, tip: str) -> tuple[list[int], np.ndarray]:
     if not chain:
         raise InputError(f'{robot.name}: no joint moves the link "{tip}"; name a link further out')
     return chain, np.array(data.oMf[frame].homogeneous)
-
-
-def _axis(robot: Robot, joint: int) -> _Line:
-    """Return a joint's axis at zero."""
-    model, data = robot.model, robot.model.createData()
-    pin.forwardKinematics(model, data, np.zeros(model.nq))
-    motion, place = joint_motions(model)[joint - 1], data.oMi[joint]
-    direction = place.rotation @ (motion[:3] + motion[3:])  # it slides or turns
-    return _Line(np.array(place.translation), direction / np.linalg.norm(direction))
 
 
 def _first_frame(axis: _Line) -> np.ndarray:

@@ -53,6 +53,19 @@ def joint_motions(model: pin.Model) -> np.ndarray:
     return np.array([np.reshape(each, (6, -1))[:, joint] for joint, each in enumerate(jacobians)])
 
 
+def joint_axes(robot: Robot, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the directions (P, n, 3) of the joints' axes in the base frame in poses (P, n), and a point on each, m."""
+    motions, data = joint_motions(robot.model), robot.model.createData()
+    own = motions[:, :3] + motions[:, 3:]  # a joint slides or turns
+    directions, points = [], []
+    for pose in poses:
+        pin.forwardKinematics(robot.model, data, pose)
+        placed = list(data.oMi)[1:]
+        directions.append([one.rotation @ axis for one, axis in zip(placed, own, strict=True)])
+        points.append([one.translation.copy() for one in placed])
+    return np.array(directions), np.array(points)
+
+
 def ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the greatest positions to draw, (n,) rad or m: within the limits, at most pi either way."""
     lower, upper = robot.limits

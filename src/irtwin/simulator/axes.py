@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import joint_motions, ranges
+from irtwin.robot.kinematics import joint_axes, ranges
 from irtwin.simulator.engine import mujoco
 
 _SLIDES, _TURNS = 2, 3  # MuJoCo's kinds of joints of one coordinate
@@ -69,16 +68,7 @@ def poses_of(robot: Robot) -> np.ndarray:
 
 def robot_axes(robot: Robot, poses: np.ndarray) -> Axes:
     """Return those of the robot's description in poses (P, n)."""
-    turns = np.array([joint.unit == "rad" for joint in robot.joints])
-    motions = joint_motions(robot.model)
-    own = np.where(turns[:, None], motions[:, 3:], motions[:, :3])
-    data, directions, points = robot.model.createData(), [], []
-    for pose in poses:
-        pin.forwardKinematics(robot.model, data, pose)
-        placed = [data.oMi[joint] for joint in range(1, robot.model.njoints)]
-        directions.append([one.rotation @ axis for one, axis in zip(placed, own, strict=True)])
-        points.append([one.translation.copy() for one in placed])
-    return Axes(np.array(directions), np.array(points), turns)
+    return Axes(*joint_axes(robot, poses), np.array([joint.unit == "rad" for joint in robot.joints]))
 
 
 def model_axes(compiled: mujoco.MjModel, joints: Sequence[int], turns: np.ndarray, poses: np.ndarray) -> Axes:

@@ -18,6 +18,7 @@ from irtwin.signals.sources.bag_file import JOINT_STATE, NUMBERS, BagFile, Topic
 from irtwin.signals.sources.source import MOST_VALUES, Source
 
 _LATEST = 1 << 62  # ns since 1970
+_Numbers = tuple[list[int], list[float]]  # of a topic's messages: when each was recorded, ns since 1970; its number
 FIELDS = {"q": "position", "dq": "velocity", "torque": "effort"}  # of sensor_msgs/JointState
 
 
@@ -68,7 +69,7 @@ class BagSource(Source):
         known = np.ones(len(joints.recorded), dtype=bool)
         notes = []
         for column, topic in numbers.items():
-            table[column], heard = others[topic].at(np.array(joints.recorded, dtype=np.int64))
+            table[column], heard = _numbers_at(others[topic], np.array(joints.recorded, dtype=np.int64))
             known &= heard
         if not known.all():
             notes = [f"{self.path}: {int((~known).sum())} joint states left out, at which another topic is silent"]
@@ -112,7 +113,7 @@ class BagSource(Source):
         self, bag: BagFile, states: str, numbers: Sequence[str]
     ) -> tuple[_JointStates, Mapping[str, _Numbers]]:
         joints = _JointStates(self)
-        others = {name: _Numbers() for name in numbers}
+        others: dict[str, _Numbers] = {name: ([], []) for name in numbers}
         left = MOST_VALUES  # what the index said of the count may be wrong
         for topic, recorded, message in bag.messages((states, *numbers)):
             if not 0 <= recorded < _LATEST:
@@ -121,12 +122,13 @@ class BagSource(Source):
                 joints.take(recorded, message)
                 left -= joints.width
             else:
-                others[topic].take(recorded, message)
+                others[topic][0].append(recorded)
+                others[topic][1].append(float(message.data))
                 left -= 2
             if left < 0:
                 raise InputError(f"{self.path}: more than {MOST_VALUES:,} values; cut the run into several")
         joints.check(states)
-        if empty := [topic for topic, values in others.items() if values.empty]:
+        if empty := [topic for topic, (times, _) in others.items() if not times]:
             raise InputError(f"{self.path}: {empty[0]} holds no message, though the bag says so; record it again")
         return joints, others
 
@@ -197,33 +199,15 @@ class _JointStates:
         return None if None in places else [place for place in places if place is not None]
 
 
-class _Numbers:
-    """The values of a topic of numbers."""
+def _numbers_at(messages: _Numbers, recorded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return numbers at other times of recording (N,) ns, straight in between, and whether they are known there.
 
-    def __init__(self) -> None:
-        self._recorded: list[int] = []
-        self._values: list[float] = []
-
-    @property
-    def empty(self) -> bool:
-        """Whether no message came."""
-        return not self._recorded
-
-    def take(self, recorded: int, message: Any) -> None:
-        """Keep a message."""
-        self._recorded.append(recorded)
-        self._values.append(float(message.data))
-
-    def at(self, recorded: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the values at other times (N,) ns, straight in between, and whether they are known there.
-
-        They are not before the first message, after the last, and in a hole.
-        """
-        wanted = (recorded - recorded[0]).astype(float)
-        times, last = np.unique((np.array(self._recorded, dtype=np.int64) - recorded[0])[::-1], return_index=True)
-        times = times.astype(float)
-        values = np.interp(wanted, times, np.array(self._values)[::-1][last])
-        return values, known_at(wanted, times)
+    They are not before the first message, after the last, and in a hole.
+    """
+    wanted = (recorded - recorded[0]).astype(float)
+    times, last = np.unique((np.array(messages[0], dtype=np.int64) - recorded[0])[::-1], return_index=True)
+    times = times.astype(float)
+    return np.interp(wanted, times, np.array(messages[1])[::-1][last]), known_at(wanted, times)
 
 
 def _width(robot: Robot) -> int:

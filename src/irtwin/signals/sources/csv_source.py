@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import pyarrow as pa
 import pyarrow.csv
@@ -18,14 +18,6 @@ _LARGEST = 1_000_000_000  # bytes; held in memory while it is read
 _OTHERS = {b";": "semicolons", b"\t": "tabs", b"|": "bars"}
 
 
-class _Parsed(NamedTuple):
-    """A file's samples; `wrong`: lines of more or fewer values than the first; how many lines."""
-
-    table: pa.Table
-    wrong: list[pa.csv.InvalidRow]
-    lines: int
-
-
 class CsvSource(Source):
     """Values separated by commas, in UTF-8."""
 
@@ -35,7 +27,7 @@ class CsvSource(Source):
 
     def columns(self) -> Sequence[str]:
         """Return the names in the first line."""
-        return list(self._parsed.table.column_names)
+        return list(self._parsed[0].column_names)
 
     def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
         """Return some of the columns; `repair` drops lines of more or fewer values than the first."""
@@ -53,11 +45,11 @@ class CsvSource(Source):
         return table.select(columns), [note] if wrong else []
 
     @cached_property
-    def _parsed(self) -> _Parsed:
+    def _parsed(self) -> tuple[pa.Table, list[pa.csv.InvalidRow], int]:
+        """The file's samples, its lines of more or fewer values than the first, and how many lines it has."""
         text = self._text()
         try:
-            table, wrong = parsed(text)
-            return _Parsed(table, wrong, text.count(b"\n") + 1)
+            return *parsed(text), text.count(b"\n") + 1
         except (pa.ArrowException, UnicodeDecodeError) as error:
             raise InputError(
                 f"{self.path}: not readable as CSV ({csv_fault(error)}); separate columns by commas"
