@@ -145,6 +145,12 @@ def browser() -> Iterator[Any]:
         started.close()
 
 
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
+def database_url(request: pytest.FixtureRequest) -> str | None:
+    """Where a workspace has its rows: None, for a file that it makes itself, or an empty PostgreSQL database."""
+    return None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
+
+
 @pytest.fixture(scope="session")
 def new_postgresql_database() -> Iterator[Callable[[], str]]:
     """Give a function that returns the URL of an empty database: a schema, for a database is 300 files to write."""

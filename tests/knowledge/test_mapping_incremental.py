@@ -280,10 +280,9 @@ def test_where_rows_cannot_be_remembered(place: Place, tmp_path: Path) -> None:
         place.refresh()
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
-def fleet(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Workspace]:
-    url = None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
-    with Workspace(tmp_path / "fleet", url) as place:
+@pytest.fixture
+def fleet(database_url: str | None, tmp_path: Path) -> Iterator[Workspace]:
+    with Workspace(tmp_path / "fleet", database_url) as place:
         small_fleet.fill(place)
         yield place
 

@@ -34,12 +34,10 @@ def data_set(*runs: Run) -> DataSet:
     return DataSet(Path(), robot, runs, ("rigid_body",), 21.0, "mains", True, {"note": "kept"})
 
 
-@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
-def test_a_data_set_comes_back_as_it_was(on_server, tmp_path, request):
+def test_a_data_set_comes_back_as_it_was(database_url, tmp_path):
     first = run(started=datetime(2026, 3, 1, 13, 0, 0, 250_001, timezone(timedelta(hours=1))))
     second = run("second", repeat_of="first")
-    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
-    with Workspace(tmp_path, url) as workspace:
+    with Workspace(tmp_path, database_url) as workspace:
         assert ingest(workspace, data_set(second, first)) == "new"
         assert ingest(workspace, data_set(second, first)) == "unchanged"
         robot = load_robot(workspace, identifier("One arm"))

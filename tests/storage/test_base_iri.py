@@ -19,11 +19,6 @@ from irtwin.storage.database import Workspace
 PLANT = "https://plant.example/energy/"
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
-def database(request: pytest.FixtureRequest) -> str | None:
-    return None if request.param == "sqlite" else str(request.getfixturevalue("new_postgresql_database")())
-
-
 def fill(place: Workspace) -> None:
     robot, joints, runs, series = data_set()
     place.ingest(robot, joints, runs, series)
@@ -62,12 +57,12 @@ def test_no_individual_lies_at_a_path_that_serve_has_for_itself(tmp_path: Path) 
     assert paths - {""} == set(base_iri.SERVED)
 
 
-def test_it_is_kept(tmp_path: Path, database: str | None) -> None:
-    with Workspace(tmp_path, database, base=PLANT) as place:
+def test_it_is_kept(tmp_path: Path, database_url: str | None) -> None:
+    with Workspace(tmp_path, database_url, base=PLANT) as place:
         fill(place)
-    with Workspace(tmp_path, database) as place:
+    with Workspace(tmp_path, database_url) as place:
         assert place.base == PLANT
-    with Workspace(tmp_path, database, base=PLANT) as place:
+    with Workspace(tmp_path, database_url, base=PLANT) as place:
         assert place.base == PLANT
 
 
@@ -79,15 +74,15 @@ def test_it_may_stand_in_a_file(tmp_path: Path) -> None:
         Workspace(tmp_path, base=ID)
 
 
-def test_it_may_change_until_a_robot_is_there(tmp_path: Path, database: str | None) -> None:
-    with Workspace(tmp_path, database) as place:
+def test_it_may_change_until_a_robot_is_there(tmp_path: Path, database_url: str | None) -> None:
+    with Workspace(tmp_path, database_url) as place:
         assert place.base == ID
-    with Workspace(tmp_path, database, base=PLANT) as place:
+    with Workspace(tmp_path, database_url, base=PLANT) as place:
         fill(place)
     for base in (ID, "https://plant.example/other/"):
         with pytest.raises(InputError, match=f"lie below {PLANT}.* cannot move to {base}"):
-            Workspace(tmp_path, database, base=base)
-    with Workspace(tmp_path, database) as place:
+            Workspace(tmp_path, database_url, base=base)
+    with Workspace(tmp_path, database_url) as place:
         assert place.base == PLANT
 
 

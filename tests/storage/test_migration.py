@@ -108,19 +108,15 @@ def test_a_new_workspace_says_the_newest_revision(tmp_path: Path) -> None:
         assert migration.revision(connection) == migration.newest()
 
 
-@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
-def test_an_older_workspace_is_migrated(
-    on_server: bool, tmp_path: Path, later: Path, request: pytest.FixtureRequest
-) -> None:
-    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
-    with Workspace(tmp_path / "place", url) as place:
+def test_an_older_workspace_is_migrated(database_url: str | None, tmp_path: Path, later: Path) -> None:
+    with Workspace(tmp_path / "place", database_url) as place:
         older(place)
-    with Workspace(tmp_path / "place", url) as place, place.engine.connect() as connection:
+    with Workspace(tmp_path / "place", database_url) as place, place.engine.connect() as connection:
         assert migration.revision(connection) == migration.newest()
         assert set(connection.execute(text("SELECT sample_rate_hz FROM run")).scalars()) == {250.0}
         assert connection.execute(text("SELECT count(*) FROM series")).scalar()  # which refer to runs
         assert connection.execute(text("SELECT count(*) FROM run")).scalar() == len(data_set()[2])
-    assert (tmp_path / "place" / f"irtwin.db.{BEFORE}").is_file() is not on_server
+    assert (tmp_path / "place" / f"irtwin.db.{BEFORE}").is_file() is (database_url is None)
 
 
 def test_rows_that_another_program_wrote_are_not_migrated(tmp_path: Path, later: Path) -> None:

@@ -39,20 +39,18 @@ def test_a_table_that_would_be_in_the_way_is_refused(columns: list[Column], said
         Base.metadata.remove(table)
 
 
-@pytest.mark.parametrize("on_server", [False, pytest.param(True, marks=pytest.mark.system)])
 def test_a_workspace_gets_tables_of_packages_later_and_anew(
-    on_server: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+    database_url: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    url = request.getfixturevalue("new_postgresql_database")() if on_server else None
-    with Workspace(tmp_path, url) as place:  # before the package is installed
+    with Workspace(tmp_path, database_url) as place:  # before the package is installed
         assert not inspect(place.engine).has_table("emission")
     table = emission()
     monkeypatch.setattr(database, "package_tables", lambda: (table,))
     try:
         package_tables._check(table, "my_package.tables")
-        with Workspace(tmp_path, url) as place, place.engine.begin() as connection:
+        with Workspace(tmp_path, database_url) as place, place.engine.begin() as connection:
             connection.execute(text("ALTER TABLE emission DROP COLUMN grams"))  # as another version of it had it
-        with Workspace(tmp_path, url) as place:
+        with Workspace(tmp_path, database_url) as place:
             found = {column["name"] for column in inspect(place.engine).get_columns("emission")}
         assert found == {"run_id", "grams", "activity_id"}
     finally:

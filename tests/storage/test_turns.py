@@ -24,22 +24,17 @@ from irtwin.storage.schema import Base
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
-def url(request: pytest.FixtureRequest) -> str | None:
-    return None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
-
-
 def forked(work: Callable[..., None], *arguments: object) -> multiprocessing.process.BaseProcess:
     process = FORKS.Process(target=work, args=arguments)
     process.start()
     return process
 
 
-def test_several_at_once_lose_nothing(tmp_path: Path, url: str | None) -> None:
-    for process in [forked(taken_in, tmp_path, url, name) for name in NAMES]:
+def test_several_at_once_lose_nothing(tmp_path: Path, database_url: str | None) -> None:
+    for process in [forked(taken_in, tmp_path, database_url, name) for name in NAMES]:
         process.join(100)
         assert process.exitcode == 0
-    with Workspace(tmp_path, url) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace(tmp_path, database_url) as place, KnowledgeGraph(place.graph_folder) as graph:
         found = graph.triples(GRAPH_SOURCE)
         for robot_id in (*NAMES, "shared"):
             assert place.read_series(f"{robot_id}.work").num_rows == rows.samples(1).num_rows
@@ -54,12 +49,12 @@ def test_several_at_once_lose_nothing(tmp_path: Path, url: str | None) -> None:
 
 
 @pytest.fixture
-def held(tmp_path: Path, url: str | None) -> Iterator[multiprocessing.process.BaseProcess]:
-    with Workspace(tmp_path, url) as place, rewriting(place) as graph:
+def held(tmp_path: Path, database_url: str | None) -> Iterator[multiprocessing.process.BaseProcess]:
+    with Workspace(tmp_path, database_url) as place, rewriting(place) as graph:
         place.ingest(*rows.data_set())
         map_rows(place, graph)
     reading, ready = FORKS.Pipe(duplex=False)
-    process = forked(hold, tmp_path, url, ready)
+    process = forked(hold, tmp_path, database_url, ready)
     assert reading.poll(60)
     yield process
     process.kill()
@@ -67,11 +62,11 @@ def held(tmp_path: Path, url: str | None) -> Iterator[multiprocessing.process.Ba
 
 
 def test_one_that_waits_too_long_says_so_and_one_that_was_killed_holds_nothing(
-    tmp_path: Path, url: str | None, held: multiprocessing.process.BaseProcess, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, database_url: str | None, held: multiprocessing.process.BaseProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with Workspace(tmp_path, url) as place:
+    with Workspace(tmp_path, database_url) as place:
         monkeypatch.setattr(engine, "BUSY_TIMEOUT", 0.2)
-        if url is None:
+        if database_url is None:
             place.engine.dispose()  # SQLite waits as long as it was told when the connection was made
             place.engine = engine.open_engine(place.engine.url)
         with pytest.raises(InputError, match=r"another process has been writing for 0\.2 s"):
@@ -89,9 +84,9 @@ def test_one_that_waits_too_long_says_so_and_one_that_was_killed_holds_nothing(
         assert place.ingest(*rows.data_set()) == "unchanged"
 
 
-def test_the_turn_is_given_back(tmp_path: Path, url: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_turn_is_given_back(tmp_path: Path, database_url: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "BUSY_TIMEOUT", 0.1)
-    with Workspace(tmp_path, url) as place:
+    with Workspace(tmp_path, database_url) as place:
         for _ in range(2):
             with turns.rewriting_alone(place.engine, place.folder):
                 pass
