@@ -1,7 +1,9 @@
+from itertools import pairwise
+
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
 from tests.individuals import individual
-from tests.knowledge.graphs import reasoned_over
+from tests.knowledge.graphs import graph_of, quad, reasoned_over
 
 from irtwin.knowledge import parts
 from irtwin.knowledge.reasoning import reason
@@ -38,6 +40,11 @@ def changed(quads: list[Quad], subject: str, name: str, value) -> list[Quad]:
     return rest + new
 
 
+def turn(graph: KnowledgeGraph, before: list[Quad], after: list[Quad]) -> None:
+    graph.change(set(before) - set(after), set(after) - set(before))
+    reason(graph)
+
+
 def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
     assert validate(graph) == ()
     report = graph.query(
@@ -47,10 +54,7 @@ def test_two_robots_keep_every_constraint(graph: KnowledgeGraph) -> None:
 
 
 def test_a_property_of_listed_texts_leads_to_no_individual() -> None:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    said = NamedNode(ID + "saving_action/one"), NamedNode(term("Compared_For")), Literal("piece")
-    graph.change((), [Quad(*said, NamedNode(GRAPH_SOURCE + "own"))])
+    graph = graph_of([quad(ID + "saving_action/one", term("Compared_For"), Literal("piece"))])
     assert [one.message for one in validate(graph) if one.property == term("Compared_For")] == []
 
 
@@ -92,9 +96,7 @@ def test_broken_constraints_are_said_in_words(two_robots: list[Quad], wrong: lis
     quads = two_robots
     for subject, name, value, _ in wrong:
         quads = changed(quads, subject, name, value)
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(quads, GRAPH_SOURCE, GRAPH_ACTIVITY)
+    graph = graph_of(quads)
     violations = validate(graph)
     for subject, _, _, message in wrong:
         assert [one for one in violations if one.node == subject and message in str(one)] != [], message
@@ -105,17 +107,13 @@ def test_broken_constraints_are_said_in_words(two_robots: list[Quad], wrong: lis
 
 
 def test_two_values_where_one_may_be_are_not_called_absent(two_robots: list[Quad]) -> None:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
     one = changed(two_robots, RUN, "Payload", Literal(1.0))
-    other = Quad(NamedNode(RUN), NamedNode(term("Payload")), Literal(2.0), NamedNode(GRAPH_SOURCE + "x"))
-    graph.replace([*one, other], GRAPH_SOURCE, GRAPH_ACTIVITY)
-    (violation,) = validate(graph)
+    (violation,) = validate(graph_of([*one, quad(RUN, term("Payload"), Literal(2.0))]))
     assert str(violation).endswith("a run's payload is one number, 0 kg or more (irt:Payload has several values)")
 
 
 def typed(subject: str, kind: str) -> Quad:
-    return Quad(NamedNode(subject), NamedNode(RDF + "type"), NamedNode(term(kind)), NamedNode(GRAPH_SOURCE + "x"))
+    return quad(subject, RDF + "type", term(kind))
 
 
 def untyped(quads: list[Quad], subject: str) -> list[Quad]:
@@ -146,7 +144,7 @@ def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad]) -> Non
     wrong = changed(wrong, PARAMETER, "of_Effect", NamedNode(MAGIC + "2"))
     wrong += [typed(MAGIC + "2", "Effect"), typed(LUCK, "Effect_Family"), typed(FOUND, "Gap_Finding")]
     for name, value in (("located_in_Channel", SMELL), ("has_Family", LUCK)):
-        wrong.append(Quad(NamedNode(FOUND), NamedNode(term(name)), NamedNode(value), wrong[-1].graph_name))
+        wrong.append(quad(FOUND, term(name), value))
     graph = reasoned_over(wrong)
     for name, kind in ((RUN, "IR_RunProcess"), (JOINT, "Robot_Joint"), (MAGIC, "Effect"), (SMELL, "Channel")):
         assert graph.holds(typed(name, kind).triple)
@@ -156,8 +154,7 @@ def test_what_the_closure_would_make_true_is_told(two_robots: list[Quad]) -> Non
 def test_what_the_ontology_adds_to_a_catalogue_is_in_it(graph: KnowledgeGraph, two_robots: list[Quad]) -> None:
     graph.replace(changed(two_robots, PARAMETER, "of_Effect", NamedNode(MAGIC)), GRAPH_SOURCE, GRAPH_ACTIVITY)
     assert {one.value for one in validate(graph)} == {MAGIC}
-    module = Quad(NamedNode(MAGIC), NamedNode(RDF + "type"), NamedNode(term("Effect")), NamedNode(GRAPH_ONTOLOGY))
-    graph.change((), {module})
+    graph.change((), {quad(MAGIC, RDF + "type", term("Effect"), GRAPH_ONTOLOGY)})
     assert validate(graph) == ()
 
 
@@ -208,15 +205,8 @@ def test_only_the_robot_that_changed_is_checked_again(two_robots: list[Quad], ch
     graph = reasoned_over(broken)
     assert tuple(map(str, validate(graph))) == violations_anew(broken)
     worse = changed(broken, RUN, "Run_Time", None)
-    for now in (worse, broken, two_robots):
-        as_stored = KnowledgeGraph()
-        as_stored.replace(now, GRAPH_SOURCE, GRAPH_ACTIVITY)
-        current, new = (
-            {one for one in of.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))}
-            for of in (graph, as_stored)
-        )
-        graph.change(current - new, new - current)
-        reason(graph)
+    for before, now in pairwise([broken, worse, broken, two_robots]):
+        turn(graph, before, now)
         checked.clear()
         found = validate(graph)
         again = set().union(*checked)
@@ -234,8 +224,7 @@ def test_a_change_that_breaks_nothing_is_not_shown_to_pyshacl(
     assert validate(graph) == ()
     monkeypatch.setattr(validation.pyshacl, "validate", None)
     longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
-    graph.change(set(two_robots) - set(longer), set(longer) - set(two_robots))
-    reason(graph)
+    turn(graph, two_robots, longer)
     assert validate(graph) == ()
 
 
@@ -263,14 +252,12 @@ def test_a_part_that_was_just_reasoned_over_is_not_read_again(
     graph = reasoned_over(two_robots)
     assert validate(graph) == ()
     longer = changed(two_robots, RUN, "Run_Time", Literal(99.0))
-    graph.change(set(two_robots) - set(longer), set(longer) - set(two_robots))
-    reason(graph)
+    turn(graph, two_robots, longer)
     with monkeypatch.context() as patch:
         patch.setattr(parts, "around", None)
         assert validate(graph) == ()
     wrong = changed(two_robots, RUN, "Run_Time", None)
-    graph.change(set(longer) - set(wrong), set(wrong) - set(longer))
-    reason(graph)
+    turn(graph, longer, wrong)
     assert len(validate(graph)) == 1
 
 
