@@ -1,5 +1,4 @@
-import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -23,6 +22,11 @@ def quad(subject: str, value: float, graph: str) -> Quad:
 
 def total(graph: KnowledgeGraph) -> float:
     return graph.query("SELECT (SUM(?energy) AS ?total) { ?s irt:Energy ?energy }")[0]["total"]
+
+
+def broken_off(*quads: Quad) -> Iterator[Quad]:
+    yield from quads
+    raise RuntimeError("the database went away")
 
 
 def test_triple_in_two_graphs_counts_once() -> None:
@@ -81,24 +85,15 @@ def test_same_quads_change_nothing(two_robots: list[Quad], graph: KnowledgeGraph
 
 def test_failed_replace_leaves_the_former_content(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
     before = graph.triples()
-
-    def breaking():
-        yield two_robots[0]
-        raise RuntimeError("the database went away")
-
     with pytest.raises(RuntimeError):
-        graph.replace(breaking(), GRAPH_SOURCE)
+        graph.replace(broken_off(two_robots[0]), GRAPH_SOURCE)
     assert graph.triples() == before
 
 
 def test_failed_first_load_leaves_nothing(tmp_path: Path) -> None:
-    def breaking():
-        yield quad("x", 1.0, A)
-        raise RuntimeError("the database went away")
-
     with KnowledgeGraph(tmp_path / "graph") as graph:
         with pytest.raises(RuntimeError):
-            graph.replace(breaking(), A)
+            graph.replace(broken_off(quad("x", 1.0, A)), A)
         assert graph.graphs() == []
         assert graph.triples() == set()
 
@@ -107,16 +102,11 @@ def test_a_first_load_that_fails_after_its_first_piece_leaves_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(union_store, "_AT_ONCE", 2)
-
-    def breaking():
-        yield from (quad(name, 1.0, A) for name in "xyz")
-        raise RuntimeError("the database went away")
-
     with KnowledgeGraph(tmp_path / "graph") as graph:
         graph.replace([quad("x", 1.0, B), quad("w", 1.0, B)], B)
         before = graph.triples()
         with pytest.raises(RuntimeError):
-            graph.replace(breaking(), A)
+            graph.replace(broken_off(*(quad(name, 1.0, A) for name in "xyz")), A)
         assert graph.graphs() == [B]
         assert graph.triples() == before
         graph.replace((quad(name, 1.0, A) for name in "vwxyz"), A)
@@ -194,62 +184,6 @@ def test_too_many_answers_are_refused(graph: KnowledgeGraph, monkeypatch: pytest
     with pytest.raises(InputError, match="add a LIMIT"):
         graph.query("SELECT * { ?s ?p ?o }")
     assert len(graph.query("SELECT * { ?s ?p ?o } LIMIT 10")) == 10
-
-
-@pytest.fixture
-def other_server():
-    """A server on this machine that notes who asks it; yields its URL and the list of requests."""
-    requests: list[str] = []
-
-    class Listener(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            requests.append(self.path)
-            self.send_error(404)
-
-        do_POST = do_GET
-
-        def log_message(self, *arguments: object) -> None:
-            pass
-
-    server = HTTPServer(("127.0.0.1", 0), Listener)
-    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}/", requests
-    server.shutdown()
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "SELECT * { SERVICE <URL> { ?s ?p ?o } }",
-        "SELECT * { service silent <URL> { ?s ?p ?o } }",
-        "PREFIX : <URL> SELECT * { SERVICE:sparql { ?s ?p ?o } }",
-        "PREFIX service: <URL> SELECT * { SERVICE service:x { ?s ?p ?o } }",
-        "SELECT * { BIND(1 AS ?x) ?s ?p 1SERVICE <URL> { ?s ?p ?o } }",
-        "SELECT * { VALUES ?x { <URL> } SERVICE?x { ?s ?p ?o } }",
-        "SELECT * { # ' \n SERVICE <URL> { ?s ?p '' } }",
-        'SELECT * { BIND("\\"" AS ?q) SERVICE <URL> { ?s ?p "" } }',
-        "SELECT * { BIND('''it's''' AS ?q) SERVICE <URL> { ?s ?p '' } }",
-        "SELECT * { BIND(1 AS ?x) FILTER(?x<2) SERVICE <URL> { ?s ?p ?o FILTER(?o>1) } }",
-        "SELECT * { \\u0053ERVICE <URL> { ?s ?p ?o } }",
-    ],
-)
-def test_no_query_reaches_another_server(graph: KnowledgeGraph, other_server, text: str) -> None:
-    url, requests = other_server
-    with pytest.raises(InputError):
-        graph.query(text.replace("URL", url))
-    assert requests == []
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        'SELECT * { ?service ?p "SERVICE" }',
-        "PREFIX ex: <https://example.org/service#> SELECT * { ?s a ex:Customer_Service }",
-        "SELECT * { ?s ?p ?o } # SERVICE",
-    ],
-)
-def test_the_word_itself_is_harmless(graph: KnowledgeGraph, text: str) -> None:
-    graph.query(text)
 
 
 def test_broken_turtle_names_file_and_line(tmp_path: Path) -> None:

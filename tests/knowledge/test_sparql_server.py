@@ -10,16 +10,15 @@ from functools import partial
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
-from pyoxigraph import Literal, NamedNode, Quad, Store
+from pyoxigraph import Quad, Store
+from tests.knowledge.test_graph import A, B, quad, total
 from tests.sparql_servers import oxigraph
 
 from irtwin.errors import InputError
 from irtwin.knowledge.questions.queries import ask, named_questions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.sparql_server import TOKEN, SparqlServer
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE, term
-
-A, B = "https://example.org/g/a", "https://example.org/g/b"
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_ONTOLOGY, GRAPH_SOURCE
 
 
 @pytest.fixture(scope="module")
@@ -35,16 +34,6 @@ def served(server_url: str, two_robots: list[Quad]) -> KnowledgeGraph:
     graph.load_ontology()
     graph.replace(two_robots, GRAPH_SOURCE, GRAPH_ACTIVITY)
     return graph
-
-
-def quad(subject: str, value: float, graph: str) -> Quad:
-    return Quad(
-        NamedNode(f"https://example.org/{subject}"), NamedNode(term("Energy")), Literal(value), NamedNode(graph)
-    )
-
-
-def total(graph: KnowledgeGraph) -> float:
-    return graph.query("SELECT (SUM(?energy) AS ?total) { ?s irt:Energy ?energy }")[0]["total"]
 
 
 def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
