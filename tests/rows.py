@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from irtwin.storage.database import Workspace
 
 ROBOT = "KUKA_KR6_R700"
+DataSet = tuple[RobotRow, list[JointRow], list[RunRow], dict[str, pa.Table]]
 NOON = datetime(2026, 3, 1, 12, tzinfo=UTC)
 
 
@@ -87,35 +88,22 @@ def samples(seed: int) -> pa.Table:
     return pa.table({"time": time, "q_joint_a1": np.sin(seed + time), "power": 100.0 + time})
 
 
-def data_set() -> tuple[RobotRow, list[JointRow], list[RunRow], dict[str, pa.Table]]:
+def data_set() -> DataSet:
     # The first run repeats a later one: the order of rows is the user's.
     runs = [run("again", repeat_of=f"{ROBOT}.work"), run("work")]
     return robot(), joints(), runs, {item.run_id: samples(seed) for seed, item in enumerate(runs)}
 
 
-def activity(name: str, provider: str, subject: str = f"robot/{ROBOT}") -> Activity:
+def activity(name: str, provider: str, subject: str = f"robot/{ROBOT}", robot_id: str = ROBOT) -> Activity:
     return Activity(
-        activity_id=name,
-        robot_id=ROBOT,
-        provider=provider,
-        subject=subject,
-        started=NOON,
-        ended=NOON,
+        activity_id=name, robot_id=robot_id, provider=provider, subject=subject, started=NOON, ended=NOON,
         software="irtwin 0.1.0",
-    )
+    )  # fmt: skip
 
 
 def keep(workspace: Workspace, robot_id: str, provider: str, subject: str, made: Made) -> None:
     """Keep what a provider made, as the planner does."""
-    by = Activity(
-        activity_id=f"{provider}.{subject}",
-        robot_id=robot_id,
-        provider=provider,
-        subject=subject,
-        started=NOON,
-        ended=NOON,
-        software="x",
-    )
+    by = activity(f"{provider}.{subject}", provider, subject, robot_id)
     workspace.replace_activity(by, made.used, made.rows, made.series, made.documents)
 
 

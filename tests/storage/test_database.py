@@ -17,10 +17,9 @@ WORK = f"{rows.ROBOT}.work"
 TWIN, OTHER = f"{rows.ROBOT}.t1", f"{rows.ROBOT}.t2"
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.system)])
-def workspace(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Workspace]:
-    url = None if request.param == "sqlite" else request.getfixturevalue("new_postgresql_database")()
-    with Workspace(tmp_path / "workspace", url) as opened:
+@pytest.fixture
+def workspace(database_url: str | None, tmp_path: Path) -> Iterator[Workspace]:
+    with Workspace(tmp_path / "workspace", database_url) as opened:
         yield opened
 
 
@@ -40,18 +39,21 @@ def state(workspace: Workspace) -> dict[str, object]:
 def populate(workspace: Workspace) -> None:
     workspace.ingest(*rows.data_set())
     workspace.replace_activity(rows.activity("state.1", "run_state", "run"), ["series"], rows.run_state())
+    identify(workspace, "twin.1", TWIN)
     workspace.replace_activity(
-        rows.activity("twin.1", "identification"),
-        ["runs"],
-        rows.twin(TWIN),
-        documents={f"twins/{TWIN}.json": b"{}"},
+        rows.activity("energy.1", "energy"), ["twin"], rows.run_energy(TWIN), series={WORK: rows.samples(9)}
     )
-    workspace.replace_activity(
-        rows.activity("energy.1", "energy"),
-        ["twin"],
-        rows.run_energy(TWIN),
-        series={WORK: rows.samples(9)},
-    )
+
+
+def identify(workspace: Workspace, activity: str, twin: str) -> None:
+    by = rows.activity(activity, "identification")
+    workspace.replace_activity(by, ["runs"], rows.twin(twin), documents={f"twins/{twin}.json": b"{}"})
+
+
+def another_robot() -> rows.DataSet:
+    """Return the rows and series of a robot with one run."""
+    run = rows.run("alone", run_id="Other.alone", robot_id="Other")
+    return rows.robot(robot_id="Other"), [], [run], {run.run_id: rows.samples(4)}
 
 
 def test_a_data_set_is_taken_in(workspace: Workspace) -> None:
@@ -94,17 +96,15 @@ def test_a_changed_data_set_replaces_all_that_was_derived(workspace: Workspace, 
         runs, series = [runs[1]], {WORK: series[WORK]}
     assert workspace.ingest(robot, joints, runs, series) == "replaced"
     found = state(workspace)
-    assert not any(
-        found[table] for table in ("activity", "activity_use", "run_state", "twin", "run_energy", "twins files")
-    )
+    derived = ("activity", "activity_use", "run_state", "twin", "run_energy", "twins files")
+    assert not any(found[table] for table in derived)
     assert len(found["run"]) == len(runs)  # type: ignore[arg-type]
     assert workspace.read_series(WORK).equals(series[WORK])
 
 
 def test_another_robot_is_left_alone(workspace: Workspace) -> None:
     populate(workspace)
-    other = rows.run("alone", run_id="Other.alone", robot_id="Other")
-    assert workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)}) == "new"
+    assert workspace.ingest(*another_robot()) == "new"
     workspace.drop_robot(rows.ROBOT)
     with workspace.reading() as session:
         assert session.scalars(select(RunRow.run_id)).all() == ["Other.alone"]
@@ -157,12 +157,7 @@ def test_what_an_activity_read_is_named_below_the_base_and_a_run_informed_it(wor
 def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace) -> None:
     populate(workspace)
     assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))
-    workspace.replace_activity(
-        rows.activity("twin.2", "identification"),
-        [],
-        rows.twin(OTHER),
-        documents={f"twins/{OTHER}.json": b"{2}"},
-    )
+    identify(workspace, "twin.2", OTHER)
     with workspace.reading() as session:
         assert session.scalars(select(TwinRow.twin_id)).all() == [OTHER]
         assert session.scalars(select(RunEnergy)).all() == []

@@ -30,6 +30,20 @@ SERIES = {
 }
 
 
+def write(place: Path, *tables: type[Base]) -> None:
+    """Make a workspace with a row of each table."""
+    with Workspace(place) as workspace, engine.writing(workspace.engine) as session:
+        for table in tables:
+            session.execute(insert(of(table)), [row_of(table)])
+
+
+def change(place: Path, words: str, *values: object) -> None:
+    """Change its rows as another program does."""
+    with closing(sqlite3.connect(place / "irtwin.db")) as database:
+        database.execute(words, values) if values else database.executescript(words)
+        database.commit()
+
+
 def row_of(table: type[Base]) -> dict[str, Any]:
     if table is Series:
         return dict(SERIES)
@@ -98,23 +112,15 @@ def of(table: type[Base]) -> Table:
 def test_a_workspace_whose_rows_another_program_changed_is_not_opened(
     tmp_path: Path, table: type[Base], column: str, value: object
 ) -> None:
-    with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
-        for one in dict.fromkeys([RobotRow, table]):
-            session.execute(insert(of(one)), [row_of(one)])
-    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
-        database.execute(f"UPDATE {of(table).name} SET {column} = ?", (value,))
-        database.commit()
+    write(tmp_path, *dict.fromkeys([RobotRow, table]))
+    change(tmp_path, f"UPDATE {of(table).name} SET {column} = ?", value)
     with pytest.raises(InputError, match=r"a row of table [a-z]+ was changed by another program: .*restore a backup"):
         Workspace(tmp_path)
 
 
 def test_a_row_that_refers_to_none_is_told(tmp_path: Path) -> None:
-    with Workspace(tmp_path) as place, engine.writing(place.engine) as session:
-        session.execute(insert(of(RobotRow)), [row_of(RobotRow)])
-        session.execute(insert(of(JointRow)), [row_of(JointRow)])
-    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
-        database.execute("DELETE FROM robot")
-        database.commit()
+    write(tmp_path, RobotRow, JointRow)
+    change(tmp_path, "DELETE FROM robot")
     with pytest.raises(InputError, match=r"a row of table joint .*: it refers to no row of robot; restore a backup"):
         Workspace(tmp_path)
 
@@ -130,11 +136,8 @@ def test_a_row_that_refers_to_none_is_told(tmp_path: Path) -> None:
     ],
 )
 def test_a_workspace_with_anothers_queries_in_its_tables_is_not_opened(tmp_path: Path, words: str) -> None:
-    Workspace(tmp_path).close()
-    with closing(sqlite3.connect(tmp_path / "irtwin.db")) as database:
-        database.executescript(words)
-    with pytest.raises(
-        InputError,
-        match=r"holds the (view|trigger) '(run_price|alembic_version|(irtwin_)?mine)', which irtwin did not make",
-    ):
+    write(tmp_path)
+    change(tmp_path, words)
+    foreign = r"holds the (view|trigger) '(run_price|alembic_version|(irtwin_)?mine)', which irtwin did not make"
+    with pytest.raises(InputError, match=foreign):
         Workspace(tmp_path)

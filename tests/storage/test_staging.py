@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from tests import killed_writers, rows
 from tests.forks import FORKS
-from tests.storage.test_database import WORK, populate, state, workspace
+from tests.storage.test_database import WORK, another_robot, populate, state, workspace
 
 from irtwin.errors import InputError
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import values
-from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, Activity
+from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN
 from irtwin.storage.staging import staged
 
 pytestmark = pytest.mark.slow
@@ -60,14 +60,9 @@ def test_a_message_names_the_workspace_not_the_place_apart(workspace: Workspace)
 
 def test_other_robots_and_live_runs_stay(workspace: Workspace) -> None:
     populate(workspace)
-    other = rows.run("alone", run_id="Other.alone", robot_id="Other")
-    workspace.ingest(rows.robot(robot_id="Other"), [], [other], {"Other.alone": rows.samples(4)})
+    workspace.ingest(*another_robot())
     live = rows.run("live_1", kind=LIVE_RUN, role=None)
-    activity = Activity(
-        activity_id="live.1", robot_id=rows.ROBOT, provider=LIVE, subject="run", started=rows.NOON, ended=rows.NOON,
-        software="irtwin",
-    )  # fmt: skip
-    workspace.keep_run(live, rows.samples(8), {"activity": [values(activity)]})
+    workspace.keep_run(live, rows.samples(8), {"activity": [values(rows.activity("live.1", LIVE, "run"))]})
     robot, joints, runs, series = rows.data_set()
     with staged(workspace, rows.ROBOT) as apart:
         assert apart.ingest(robot, joints[:1], runs, series) == "replaced"
