@@ -16,10 +16,10 @@ from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, RDFS
 from irtwin.report.questions import Answers
-from irtwin.resources import folder
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from tests import small_fleet
+from tests.mapped import MAPPINGS
 
 TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 HOSTILE = "=1+1\"><script>alert('x')</script>"
@@ -38,7 +38,7 @@ def robots(place: Path) -> list[Quad]:
                 update(schema.RunEnergy).where(of_arm_c).values(energy_from="mechanical", measured_energy_j=None)
             )
             session.execute(update(schema.RobotRow).where(schema.RobotRow.robot_id == "Arm_D").values(name=HOSTILE))
-        quads = list(map_database(workspace.engine, sorted(folder("mappings").glob("*.r2rml.ttl"))))
+        quads = list(map_database(workspace.engine, MAPPINGS))
     label = Quad(NamedNode(PLACE), NamedNode(f"{RDFS}label"), Literal(HOSTILE), NamedNode(f"{GRAPH_SOURCE}place"))
     return [*quads, label]
 

@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pyoxigraph import Literal, NamedNode, Quad, Triple
+from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse
+from tests.mapped import ontology_graph
 
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_INFERRED, GRAPH_REASONED, GRAPH_SOURCE
+from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_INFERRED, GRAPH_REASONED, GRAPH_SOURCE, PREFIXES, SH
 
 DRAWN = GRAPH_SOURCE + "drawn"
+EX = "https://example.org/"  # of what is made up
+_SPACES = PREFIXES | {
+    "ex": EX,
+    "sh": SH,
+    "swrl": "http://www.w3.org/2003/11/swrl#",
+    "swrlb": "http://www.w3.org/2003/11/swrlb#",
+}
+TURTLE = "".join(f"@prefix {name}: <{space}> . " for name, space in _SPACES.items()) + "\n"
+
+
+def turtle(text: str) -> set[Triple]:
+    """Return what a text in Turtle says; it needs to declare none of the usual prefixes."""
+    return {quad.triple for quad in parse(TURTLE + text, format=RdfFormat.TURTLE)}
 
 
 def quad(subject: str, predicate: str, value: str | Literal, graph: str = DRAWN) -> Quad:
@@ -27,8 +41,7 @@ def inferred(graph: KnowledgeGraph) -> dict[str, set[Triple]]:
 
 def graph_of(quads: Iterable[Quad]) -> KnowledgeGraph:
     """Return the ontology's graph with quads of sources and activities."""
-    graph = KnowledgeGraph()
-    graph.load_ontology()
+    graph = ontology_graph()
     graph.replace(quads, GRAPH_SOURCE, GRAPH_ACTIVITY)
     return graph
 

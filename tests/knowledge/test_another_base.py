@@ -13,8 +13,9 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
 from tests import small_fleet
+from tests.mapped import MAPPINGS
 
-from irtwin import asking, resources
+from irtwin import asking
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.questions.queries import ask, named_questions
@@ -59,8 +60,7 @@ def _filled(place: Path, base: str | None) -> Filled:
         small_fleet.fill(workspace)
         with KnowledgeGraph(place / "graph", base=workspace.base) as graph:
             graph.load_ontology()
-            documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-            refresh(graph, workspace.engine, documents, workspace.mapped_rows)
+            refresh(graph, workspace.engine, MAPPINGS, workspace.mapped_rows)
             reason(graph)
     return Filled(place, KnowledgeGraph(place / "graph", read_only=True))  # which only the graph tells of its base
 
@@ -153,5 +153,5 @@ def _status(request: Request, error: Exception) -> Response:
 
 
 def test_mappings_that_ship_leave_the_base_to_the_workspace() -> None:
-    for file in resources.folder("mappings").glob("*.r2rml.ttl"):
+    for file in MAPPINGS:
         assert ID not in file.read_text(encoding="utf-8"), file.name

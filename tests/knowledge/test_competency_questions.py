@@ -12,35 +12,32 @@ from pyoxigraph import NamedNode, Triple
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 from tests import small_fleet
+from tests.mapped import map_into, ontology_graph
+from tests.plants import TARIFF
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import THEMES, ask, named_questions, to_csv
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.table import Row
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_INFERRED, GRAPH_SOURCE, RDF, shorten
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, RDF, shorten
 from irtwin.resources import folder
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 
 ANSWERS = Path(__file__).parent / "questions"
 QUESTIONS = named_questions()
-TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
     place = tmp_path_factory.mktemp("fleet")
     (place / "plant.toml").write_text(TARIFF, encoding="utf-8")
-    graph = KnowledgeGraph(workspace=place)
-    graph.load_ontology()
     with Workspace(place) as workspace:
         small_fleet.fill(workspace)
-        documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        graph = map_into(ontology_graph(place), workspace)
     reason(graph)
     return graph
 
@@ -184,8 +181,7 @@ def test_a_robots_energies_are_sums_over_the_same_runs(tmp_path: Path) -> None:
                 "Total_Returned_Energy": sum(row.returned_energy_j for row in rows),
                 "Total_Modelled_Energy": sum(row.modelled_energy_j for row in [*rows, one]),
             }
-        graph = KnowledgeGraph()
-        graph.replace(map_database(workspace.engine, [folder("mappings") / "totals.r2rml.ttl"]), GRAPH_SOURCE)
+        graph = map_into(KnowledgeGraph(), workspace, [folder("mappings") / "totals.r2rml.ttl"])
     for name, value in sums.items():
         asked = f"SELECT ?value {{ <https://w3id.org/irtwin/id/robot_total/Arm_A> irt:{name} ?value }}"
         assert graph.query(asked).rows[0]["value"] == pytest.approx(value)

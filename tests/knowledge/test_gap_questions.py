@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from pyoxigraph import RdfFormat, parse
 from tests import gap_cases, rows
+from tests.mapped import map_into, ontology_graph
 
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.owl_dl import classify
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.reasoning import asserted, reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
-from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 from irtwin.storage.schema import JointRow
 
@@ -26,8 +22,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module", params=gap_cases.VERDICTS)
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, KnowledgeGraph]:
     verdict = request.param
-    graph = KnowledgeGraph()
-    graph.load_ontology()
     with Workspace(tmp_path_factory.mktemp("w")) as workspace:
         joints = [
             JointRow(robot_id=rows.ROBOT, name=name, position=k, kind="revolute")
@@ -36,8 +30,7 @@ def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
         runs = [rows.run(name) for name in gap_cases.RUNS]
         workspace.ingest(rows.robot(), joints, runs, {run.run_id: rows.samples(1) for run in runs})
         record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
-        mappings = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
-        graph.replace(map_database(workspace.engine, mappings), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        graph = map_into(ontology_graph(), workspace)
     reason(graph)
     return verdict, graph
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pyoxigraph import RdfFormat, parse
-
-from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.store.graph import KnowledgeGraph
+from tests.knowledge.graphs import reasoned_over
 
 SOURCE = "https://w3id.org/irtwin/graph/source/rules"
 MODEL, AGAIN = "model the effect", "identify the twin again"
@@ -100,10 +98,7 @@ def individuals() -> str:
 @pytest.fixture(scope="module")
 def actions() -> dict[str, set[str]]:
     """What is to be done, by the individual that it is concluded of."""
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(parse(individuals(), format=RdfFormat.TRIG), SOURCE)
-    reason(graph)
+    graph = reasoned_over(parse(individuals(), format=RdfFormat.TRIG))
     found: dict[str, set[str]] = {}
     rows = graph.query(
         """SELECT ?of ?label WHERE {

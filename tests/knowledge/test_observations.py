@@ -9,10 +9,10 @@ import pytest
 import rdflib
 from pyoxigraph import RdfFormat, Triple, serialize
 from tests import small_fleet
+from tests.mapped import map_into, ontology_graph
 
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, ID
+from irtwin.knowledge.vocabulary import ID
 from irtwin.resources import folder, shipped
 from irtwin.storage.database import Workspace
 
@@ -24,13 +24,9 @@ SHAPE = rdflib.URIRef("https://w3id.org/irtwin/shapes/observation")
 
 @pytest.fixture(scope="module")
 def graph(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
     with Workspace(tmp_path_factory.mktemp("fleet")) as workspace:
         small_fleet.fill(workspace)
-        documents = [folder("mappings") / f"{name}.r2rml.ttl" for name in FILES]
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    return graph
+        return map_into(ontology_graph(), workspace, [folder("mappings") / f"{name}.r2rml.ttl" for name in FILES])
 
 
 def said(graph: KnowledgeGraph, iri: str) -> set[tuple[str, str]]:

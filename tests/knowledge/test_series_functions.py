@@ -10,12 +10,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from tests import rows
+from tests.mapped import map_into, ontology_graph
 
-from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE, SERIES
+from irtwin.knowledge.vocabulary import SERIES
 from irtwin.storage.database import Workspace
 
 TIME = 10.0 + np.arange(5) / 4
@@ -32,9 +31,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReque
         robot, joints, runs, series = rows.data_set()
         series[f"{rows.ROBOT}.work"] = pa.table({"time": TIME, "power": POWER})
         place.ingest(robot, joints, runs, series)
-        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-        graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-        yield graph
+        yield map_into(graph, place)
 
 
 def ask(graph: KnowledgeGraph, call: str) -> object:
@@ -125,7 +122,6 @@ def test_no_file_outside_the_workspace_is_read(graph: KnowledgeGraph, tmp_path: 
 
 
 def test_every_function_is_described_in_the_ontology(tmp_path: Path) -> None:
-    graph = KnowledgeGraph(workspace=tmp_path)
-    graph.load_ontology()
+    graph = ontology_graph(tmp_path)
     told = graph.query("SELECT ?f { ?f a irt:Series_Function ; rdfs:label ?l ; skos:definition ?d ; skos:example ?e }")
     assert {row["f"] for row in told} == {name.value for name in graph._functions({}) if name.value.startswith(SERIES)}

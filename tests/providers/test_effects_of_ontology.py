@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 from tests import small_robots
+from tests.mapped import ontology_graph
 
 from irtwin import workflow
 from irtwin.errors import InputError
@@ -18,9 +19,7 @@ from irtwin.storage.database import Workspace
 
 @pytest.fixture
 def graph() -> KnowledgeGraph:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    return graph
+    return ontology_graph()
 
 
 def test_those_that_ship_are_the_same(graph: KnowledgeGraph) -> None:

@@ -8,27 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import mesh_robots
+from tests.mapped import map_into
 from tests.mesh_robots import ARM, HAND, SLIDE
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.mesh_files import mesh_copies, meshes_of_graph
 from irtwin.providers.names import robot_iri
 from irtwin.providers.records import ingest
-from irtwin.resources import folder
 from irtwin.robot.meshes import Mesh
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
 
 
 def meshes_in(workspace: Workspace) -> dict[str, Mesh]:
-    graph = KnowledgeGraph()
-    graph.replace(
-        map_database(workspace.engine, sorted(folder("mappings").glob("*.r2rml.ttl"))), GRAPH_SOURCE, GRAPH_ACTIVITY
-    )
-    return dict(meshes_of_graph(graph, robot_iri("Meshed"), workspace.folder))
+    return dict(meshes_of_graph(map_into(KnowledgeGraph(), workspace), robot_iri("Meshed"), workspace.folder))
 
 
 def stored(workspace: Workspace) -> list[Path]:

@@ -1,9 +1,10 @@
 """The planner: what is run, in which order, and what never is."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from pyoxigraph import RdfFormat, parse
+from tests.mapped import ontology_graph
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
@@ -17,12 +18,9 @@ DECLARED = "SELECT ?name { ?one irt:applies_to ?class ; irt:Entry_Point ?name }"
 
 
 @pytest.fixture
-def graph(tmp_path: Path) -> KnowledgeGraph:
+def graph() -> KnowledgeGraph:
     """Two robots: A with a twin, B without; run A.1 has its energy, A.2 lacks it."""
-    from pyoxigraph import RdfFormat, parse
-
-    graph = KnowledgeGraph()
-    graph.load_ontology()
+    graph = ontology_graph()
     quads = """
         @prefix irt: <https://w3id.org/irtwin#> . @prefix : <https://w3id.org/irtwin/id/> .
         <https://w3id.org/irtwin/graph/source/x> {

@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import synthetic
+from tests.mapped import map_into
 from tests.virtual.scene_data import HOSTILE, bare, kr6, run
 
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.names import identifier, robot_iri
 from irtwin.providers.records import ingest
 from irtwin.providers.robot_of_graph import robot_of_graph
-from irtwin.resources import folder
 from irtwin.robot.denavit_hartenberg import ChainTable, Row
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import flange, link_placements
@@ -52,13 +50,9 @@ ROBOTS = {
 
 def described(robot: Robot, place: Path) -> KnowledgeGraph:
     """The graph of a robot without runs."""
-    data_set = DataSet(place, robot, (), None, None, "mains", True, {})
-    graph = KnowledgeGraph()
     with Workspace(place / "workspace") as workspace:
-        ingest(workspace, data_set)
-        documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    return graph
+        ingest(workspace, DataSet(place, robot, (), None, None, "mains", True, {}))
+        return map_into(KnowledgeGraph(), workspace)
 
 
 def poses(robot: Robot) -> np.ndarray:

@@ -6,14 +6,12 @@ from pathlib import Path
 
 import pytest
 from tests import small_robots
+from tests.mapped import map_into, ontology_graph
 
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.records import ingest
 from irtwin.providers.structure_rows import structure_rows
-from irtwin.resources import folder
 from irtwin.robot.chain_table import table_of
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
@@ -28,14 +26,10 @@ Told = tuple[DataSet, KnowledgeGraph]
 def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     place = tmp_path_factory.mktemp("structure")
     data_set = read_data_set(small_robots.data_set(place / "data", "Arm X", joints=3))
-    graph = KnowledgeGraph()
-    graph.load_ontology()
     with Workspace(place / "workspace") as workspace:
         assert ingest(workspace, data_set) == "new"
         assert ingest(workspace, data_set) == "unchanged"
-        documents = sorted(folder("mappings").glob("*.r2rml.ttl"))
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    return data_set, graph
+        return data_set, map_into(ontology_graph(), workspace)
 
 
 def test_links_and_joints_are_those_of_the_urdf(told: Told) -> None:
