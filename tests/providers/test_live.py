@@ -7,7 +7,7 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +15,10 @@ import pytest
 from pyoxigraph import Quad
 from sqlalchemy import select
 from tests import rows
+from tests.mapped import map_into
 from tests.waiting import wait_for
 
-from irtwin import resources
 from irtwin.errors import InputError
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
@@ -29,7 +28,7 @@ from irtwin.live.live_run import columns, journal_rows
 from irtwin.live.live_twin import LiveTwin
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
-from irtwin.storage.schema import LIVE, PLANNED_RUN, RunRow
+from irtwin.storage.schema import LIVE, LIVE_RUN, PLANNED_RUN, RunRow
 
 pytestmark = pytest.mark.slow
 
@@ -66,6 +65,23 @@ def state(number: int, robot: str = rows.ROBOT, said: bool = True) -> State:
     return State(robot, NOON + at, ((math.sin(at), 0.5), speed, (10.0, -3.0), UNSAID, (400.0 + number,)))
 
 
+def send(twin: LiveTwin, numbers: Iterable[int], late: float = 0.0, said: bool = True) -> None:
+    """Send states of the swing whose times are wrong by so many seconds."""
+    for number in numbers:
+        right = state(number, said=said)
+        twin.receive(dataclasses.replace(right, time=right.time + late))
+
+
+def live_runs(place: Workspace) -> list[RunRow]:
+    with place.reading() as session:
+        return list(session.scalars(select(RunRow).where(RunRow.kind == LIVE_RUN).order_by(RunRow.start_time)))
+
+
+def counts(place: Workspace) -> list[tuple[float, int]]:
+    """When each live run began, s from noon, and its samples."""
+    return [(round(run.start_time.timestamp() - NOON, 3), run.sample_count) for run in live_runs(place)]
+
+
 def quads(graph: KnowledgeGraph) -> set[Quad]:
     below = (GRAPH_SOURCE, GRAPH_ACTIVITY)
     found = graph.answer("SELECT ?g ?s ?p ?o { GRAPH ?g { ?s ?p ?o } }")
@@ -78,20 +94,17 @@ def quads(graph: KnowledgeGraph) -> set[Quad]:
 
 def mapped(place: Workspace) -> set[Quad]:
     with KnowledgeGraph() as fresh:
-        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-        fresh.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-        return quads(fresh)
+        return quads(map_into(fresh, place))
 
 
 def live_run(place: Workspace) -> RunRow:
-    with place.reading() as session:
-        return session.scalars(select(RunRow).where(RunRow.kind == "Live_Run")).one()
+    (run,) = live_runs(place)
+    return run
 
 
 def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, graph: KnowledgeGraph) -> None:
     with LiveTwin(place, graph) as twin:
-        for number in range(100):
-            twin.receive(state(number))
+        send(twin, range(100))
         wait_for(lambda: graph.query(NOW) and graph.query(NOW)[0]["count"] == 100)
         (row,) = graph.query(NOW)
         assert row["time"].timestamp() == pytest.approx(NOON + 0.99, abs=1e-6)
@@ -113,8 +126,7 @@ def test_the_graph_shows_the_newest_state_while_the_run_lasts(place: Workspace, 
 )
 def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: KnowledgeGraph, said: bool) -> None:
     with LiveTwin(place, graph) as twin:
-        for number in range(500):
-            twin.receive(state(number, said=said))
+        send(twin, range(500), said=said)
         wait_for(lambda: graph.query(NOW) and graph.query(NOW)[0]["count"] == 500)
         shown = {quad for quad in quads(graph) if quad.predicate.value.endswith(("Joint_Speed", "Joint_Acc"))}
     assert twin.stored == 500
@@ -130,13 +142,11 @@ def test_at_the_end_it_is_a_run_like_any_other(place: Workspace, graph: Knowledg
     (row,) = graph.query(TOOK_PLACE)
     assert [row[at].timestamp() for at in ("start", "end")] == pytest.approx([NOON, NOON + 4.99], abs=1e-6)
     assert shown <= quads(graph)  # what was shown last is what the run ended with
-    (taken,) = graph.query(
-        "SELECT ?e ?from { ?run irt:Energy_Consumption ?e ; irt:Energy_From ?from ; irt:State_Time ?at }"
-    )
-    assert taken["from"] == "measured"  # it has no twin
-    assert taken["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
-    energy = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
-    assert energy[0]["e"] == pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
+    energy = pytest.approx(np.trapezoid(400.0 + np.arange(500), dx=0.01), rel=1e-5)
+    taken = graph.query("SELECT ?e ?by { ?run irt:Energy_Consumption ?e ; irt:Energy_From ?by ; irt:State_Time ?at }")
+    assert taken.rows == ({"e": energy, "by": "measured"},)  # it has no twin
+    found = graph.query(f"SELECT (series:integral(id:run\\/{run.run_id}, 'power', 0, 10) AS ?e) {{}}")
+    assert found.rows == ({"e": energy},)
     assert not list((place.folder / "live").iterdir())
 
 
@@ -163,8 +173,7 @@ def test_a_run_names_the_plan_that_it_carries_out(place: Workspace, graph: Knowl
             with pytest.raises(InputError, match=said):
                 twin.receive(dataclasses.replace(state(0), performs=plan))
         twin.receive(dataclasses.replace(state(0), performs="reach"))
-        for number in range(1, 5):
-            twin.receive(state(number))
+        send(twin, range(1, 5))
         wait_for(lambda: graph.query("SELECT ?plan { ?run a irt:Live_Run ; irt:performs / irt:Run_Name ?plan }"))
     assert live_run(place).performs == f"{rows.ROBOT}.reach"
     assert quads(graph) == mapped(place)
@@ -185,8 +194,7 @@ def test_a_run_of_a_crash_outlasts_its_plan(place: Workspace, graph: KnowledgeGr
 @pytest.mark.parametrize("place", [False, pytest.param(True, marks=pytest.mark.system)], indirect=True)
 def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: KnowledgeGraph) -> None:
     with LiveTwin(place, graph) as twin:
-        twin.receive(state(0))
-        twin.receive(state(1))
+        send(twin, range(2))
     assert place.ingest(*rows.data_set()) == "unchanged"
     robot, joints, runs, series = rows.data_set()
     robot.weight_kg = 51.0
@@ -207,8 +215,7 @@ def test_a_long_stream_becomes_several_runs(
             twin.receive(state(number))
             if number % 50 == 0:
                 time.sleep(0.05)
-    with place.reading() as session:
-        runs = session.scalars(select(RunRow).where(RunRow.kind == "Live_Run").order_by(RunRow.start_time)).all()
+    runs = live_runs(place)
     assert len(runs) > 1
     assert sum(run.sample_count for run in runs) == 450
     power = np.concatenate([place.read_series(run.run_id)["power"].to_numpy() for run in runs])
@@ -228,86 +235,58 @@ def test_states_that_are_not_later_are_refused(place: Workspace, graph: Knowledg
         twin.receive(state(7))
 
 
-def moved(number: int, by: float) -> State:
-    """A state of the swing whose time is wrong by some seconds."""
-    right = state(number)
-    return dataclasses.replace(right, time=right.time + by)
-
-
-def counts(place: Workspace) -> list[tuple[float, int]]:
-    """When each live run began, s from noon, and its samples."""
-    with place.reading() as session:
-        found = session.scalars(select(RunRow).where(RunRow.kind == "Live_Run").order_by(RunRow.start_time))
-        return [(round(run.start_time.timestamp() - NOON, 3), run.sample_count) for run in found]
-
-
 @pytest.mark.parametrize("wrong", [1800.0, -1800.0])
 def test_a_state_of_a_wrong_time_is_refused_by_itself(place: Workspace, graph: KnowledgeGraph, wrong: float) -> None:
     with LiveTwin(place, graph) as twin:
-        for number in range(50):
-            twin.receive(state(number))
-        twin.receive(moved(50, wrong))
+        send(twin, range(50))
+        send(twin, [50], late=wrong)
         with pytest.raises(InputError, match="more than 60 s away from its neighbours"):
             twin.receive(state(51))
-        for number in range(52, 150):
-            twin.receive(state(number))
+        send(twin, range(52, 150))
     assert counts(place) == [(0.0, 149)]
 
 
 def test_a_state_far_ahead_of_the_clock_is_refused(place: Workspace, graph: KnowledgeGraph) -> None:
     with LiveTwin(place, graph) as twin:
-        for first in (0, 1):  # as the first of a robot, and later
+        for first in (0, 100):  # as the first of a robot, and later
             with pytest.raises(InputError, match=r"more than 7200 s ahead of the clock here, by \d+ s"):
                 twin.receive(dataclasses.replace(state(0), time=253402300799.0))
-            for number in range(100 * first, 100 * first + 100):
-                twin.receive(state(number))
+            send(twin, range(first, first + 100))
     assert counts(place) == [(0.0, 200)]
 
 
-def test_a_hole_in_a_stream_ends_the_run(place: Workspace, graph: KnowledgeGraph) -> None:
+@pytest.mark.parametrize(
+    ("sent", "kept"),
+    [
+        pytest.param([(range(50), 0.0), (range(30), 300.0)], [(0.0, 50), (300.0, 30)], id="a hole ends the run"),
+        pytest.param([([0], 0.0), ([0], 300.0)], [(0.0, 1), (300.0, 1)], id="the last after a hole is kept"),
+        pytest.param([([0], 1800.0), (range(1, 100), 0.0)], [(0.01, 99), (1800.0, 1)], id="the first may be wrong"),
+    ],
+)
+def test_a_state_far_from_its_neighbour_is_of_another_run(
+    place: Workspace, graph: KnowledgeGraph, sent: list[tuple[Iterable[int], float]], kept: list[tuple[float, int]]
+) -> None:
     with LiveTwin(place, graph) as twin:
-        for number in range(50):
-            twin.receive(state(number))
-        for number in range(30):
-            twin.receive(moved(number, 300.0))
-    assert counts(place) == [(0.0, 50), (300.0, 30)]
-    assert twin.stored == 80
-
-
-def test_the_last_state_after_a_hole_is_kept(place: Workspace, graph: KnowledgeGraph) -> None:
-    with LiveTwin(place, graph) as twin:
-        twin.receive(state(0))
-        twin.receive(moved(0, 300.0))
-    assert counts(place) == [(0.0, 1), (300.0, 1)]
-
-
-def test_a_first_state_of_a_wrong_time_does_not_stop_the_rest(place: Workspace, graph: KnowledgeGraph) -> None:
-    with LiveTwin(place, graph) as twin:
-        twin.receive(moved(0, 1800.0))
-        for number in range(1, 100):
-            twin.receive(state(number))
-    assert counts(place) == [(0.01, 99), (1800.0, 1)]
+        for numbers, late in sent:
+            send(twin, numbers, late)
+    assert counts(place) == kept
+    assert twin.stored == sum(count for _, count in kept)
 
 
 @pytest.mark.parametrize("restarted", [True, False])
-def test_a_log_that_comes_again_is_stored_once(
-    place: Workspace, graph: KnowledgeGraph, restarted: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_log_that_comes_again_is_stored_once(place: Workspace, graph: KnowledgeGraph, restarted: bool) -> None:
     twin = LiveTwin(place, graph)
-    for number in range(50):
-        twin.receive(state(number))
+    send(twin, range(50))
     if restarted:
         twin.stop()
         twin = LiveTwin(place, graph)
     else:  # by the hole, the first run ends while the watching goes on
-        for number in range(3):
-            twin.receive(moved(number, -300.0))
+        send(twin, range(3), late=-300.0)
         wait_for(lambda: counts(place) == [(0.0, 50)])
     for number in range(50):
         with pytest.raises(InputError, match=r"the stored run \S+live_20260301T120000000000 covers this time"):
             twin.receive(state(number))
-    for number in range(50, 80):
-        twin.receive(state(number))
+    send(twin, range(50, 80))
     twin.stop()
     assert counts(place) == ([] if restarted else [(-300.0, 3)]) + [(0.0, 50), (0.5, 30)]
     assert quads(graph) == mapped(place)
@@ -319,8 +298,7 @@ def test_where_storage_is_slow_the_source_waits(
     monkeypatch.setattr(live, "MOST_WAITING", 10)
     lines: list[str] = []
     with LiveTwin(place, graph, lines.append) as twin:
-        for number in range(50):
-            twin.receive(state(number))
+        send(twin, range(50))
         assert twin.waited > 0.1
     assert twin.stored == live_run(place).sample_count == 50
     assert lines == ["storage cannot keep up: the source waits (back-pressure); no sample is lost"]
@@ -379,8 +357,7 @@ def test_a_kill_loses_no_stored_sample(place: Workspace, tmp_path: Path) -> None
     with KnowledgeGraph(place.graph_folder) as graph, LiveTwin(place, graph, lines.append):
         run = live_run(place)
         assert run.sample_count >= stored >= 1000
-        assert place.read_series(run.run_id)["power"].to_numpy().tolist() == [
-            400.0 + i for i in range(run.sample_count)
-        ]
+        power = place.read_series(run.run_id)["power"].to_numpy()
+        np.testing.assert_array_equal(power, 400.0 + np.arange(run.sample_count))
         assert quads(graph) == mapped(place)
     assert lines == [f"{run.run_id}: a crash ended this run; its {run.sample_count} samples on disk are kept"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,9 +75,17 @@ def states(run: LoggedRun, torque: Callable[[float], float] = lambda at: 0.0, po
         yield State("Arm", NOON + float(at), tuple(values))
 
 
-def live_run(place: Workspace) -> schema.RunRow:
+def watch(place: Workspace, graph: KnowledgeGraph, states: Iterable[State]) -> None:
+    with LiveTwin(place, graph) as twin:
+        for state in states:
+            twin.receive(state)
+
+
+def energy_of(place: Workspace) -> schema.RunEnergy:
+    """Return the energy of the one live run."""
     with place.reading() as session:
-        return session.scalars(select(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)).one()
+        of_live = select(schema.RunEnergy).join(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)
+        return session.scalars(of_live).one()
 
 
 def test_energy_grows_while_the_run_lasts_and_the_end_breaks_no_shape(
@@ -108,7 +116,7 @@ def test_energy_grows_while_the_run_lasts_and_the_end_breaks_no_shape(
     (streams,) = graph.query("SELECT ?stream ?used { ?run irt:Stream_State ?stream ; irt:modelled_by ?used }")
     assert streams["stream"] == "ended"
     assert not graph.query(ALARMS)
-    series = place.read_series(live_run(place).run_id, "modelled")
+    series = place.read_series(energy_of(place).run_id, "modelled")
     assert {"time", "held_out", "power", "power_model", "energy", "energy_model"} <= set(series.column_names)
     assert series["energy"].to_numpy()[-1] == pytest.approx(row["energy"])
     reason(graph)
@@ -150,9 +158,7 @@ def test_a_gap_that_lasts_raises_one_alarm_and_clears_it(
 
 def test_a_run_that_the_twin_misses_raises_an_alarm_when_it_ends(place: Workspace, graph: KnowledgeGraph) -> None:
     metered = replace((run := log()).signals, power=run.signals.power + 500.0)
-    with LiveTwin(place, graph) as twin:
-        for state in states(replace(run, signals=metered)):
-            twin.receive(state)
+    watch(place, graph, states(replace(run, signals=metered)))
     (alarm,) = (row for row in ask(graph, "alarms") if row["rule"] == "twin_alarm")
     assert (alarm["state"], alarm["since"].timestamp()) == ("active", NOON)
     assert alarm["reason"].startswith("the twin misses the energy of this run by ")
@@ -163,16 +169,12 @@ def test_a_run_that_the_twin_misses_raises_an_alarm_when_it_ends(place: Workspac
 
 
 def test_a_push_of_half_a_second_raises_none(place: Workspace, graph: KnowledgeGraph) -> None:
-    with LiveTwin(place, graph) as twin:
-        for state in states(log(), torque=lambda at: 25.0 if 4.0 < at < 4.5 else 0.0):
-            twin.receive(state)
+    watch(place, graph, states(log(), torque=lambda at: 25.0 if 4.0 < at < 4.5 else 0.0))
     assert not graph.query(ALARMS)
 
 
 def test_power_that_is_not_measured_is_modelled(place: Workspace, graph: KnowledgeGraph) -> None:
-    with LiveTwin(place, graph) as twin:
-        for state in states(log(), power=False):
-            twin.receive(state)
+    watch(place, graph, states(log(), power=False))
     (row,) = graph.query(ENERGY)
     assert row["energy"] == row["modelled"]
     assert row["from"] != "measured"
@@ -193,19 +195,12 @@ def test_what_a_crash_left_gets_its_energy_too(place: Workspace, graph: Knowledg
 
 @pytest.mark.nightly
 def test_a_new_twin_gives_live_runs_their_energy_anew(place: Workspace, tmp_path: Path) -> None:
-    with KnowledgeGraph.of_workspace(place) as graph, LiveTwin(place, graph) as twin:
-        for state in states(log()):
-            twin.receive(state)
-    with place.reading() as session:
-        old = session.scalars(
-            select(schema.RunEnergy).join(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)
-        ).one()
+    with KnowledgeGraph.of_workspace(place) as graph:
+        watch(place, graph, states(log()))
+    old = energy_of(place)
     run_all(small_robots.data_set(tmp_path / "data", "Arm"), place.folder)  # the same once more
     run_all(small_robots.data_set(tmp_path / "other", "Arm", seed=4), place.folder)
-    with place.reading() as session:
-        new = session.scalars(
-            select(schema.RunEnergy).join(schema.RunRow).where(schema.RunRow.kind == schema.LIVE_RUN)
-        ).one()
+    new = energy_of(place)
     assert new.twin_id != old.twin_id
     assert new.energy_consumption_j == pytest.approx(old.energy_consumption_j, rel=1e-3)  # as measured
     assert new.modelled_energy_j != old.modelled_energy_j

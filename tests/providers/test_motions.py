@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from sqlalchemy import select
+from tests.providers.test_gap_provider import NOTHING, diagnosis, shrink
 from tests.rows import keep
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
-from irtwin.document.curves import Curves
-from irtwin.document.document import Cutoff, Document, Gap, Shrink
+from irtwin.document.document import Cutoff
 from irtwin.providers import energy, identification, motions, run_state
 from irtwin.providers.gap import adopt, record
 from irtwin.providers.motions import robot_motions
@@ -85,7 +85,8 @@ def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     for run_id in ids:
         keep(workspace, NAME, "energy", run_iri(run_id), energy.provide(workspace, run_id))
     better = to_json(identify(ROBOT, robot_motions(workspace, NAME).own, EFFECTS))
-    record(workspace, NAME, DIAGNOSIS, Curves(follows=(), runs=(), experiment=None), better)
+    found = diagnosis(locations=[], findings=[], causes=[], shrink=shrink(RUNS[0].name))
+    record(workspace, NAME, found, NOTHING, better)
     adopt(workspace, NAME)
     assert len({choose_cutoff([run]) for run in RUNS}) == len(RUNS)
     assert sorted(conditioned) == [(run.name, choose_cutoff(RUNS)) for run in RUNS]
@@ -94,28 +95,6 @@ def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     document = workspace.read_document(twin.file, twin.sha256).decode()
     assert twin.cutoff_why == WHY
     assert twin.cutoff_hz == from_json(document, Path("twin.json")).cutoff == choose_cutoff(RUNS)
-
-
-NOTHING_CLOSED = Shrink(
-    held_out_runs=(),
-    noise_floor_from=None,
-    torque_rmse=None,
-    power_rmse=None,
-    energy_error_percent=None,
-    closed_fraction=None,
-    by_cause=(),
-)
-DIAGNOSIS = Document(
-    verdict="attributed",
-    robot=NAME,
-    gap=Gap(energy_error_percent=None),
-    locations=(),
-    findings=(),
-    causes=(),
-    not_testable=(),
-    shrink=NOTHING_CLOSED,
-    next_experiment=None,
-)
 
 
 def test_a_simulators_runs_have_no_say_in_the_cutoff_but_have_it_too(workspace: Workspace) -> None:
