@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from pyoxigraph import CanonicalizationAlgorithm, Dataset, NamedNode, Quad
+from pyoxigraph import NamedNode, Quad
 
 from irtwin.asking import BEHIND, UPDATING, ask, standing
 from irtwin.errors import GraphBehind, InputError
@@ -24,21 +24,16 @@ from irtwin.storage.schema import LIVE
 from tests import data_sets, sparql_servers
 from tests.forks import FORKS
 from tests.killed_writers import broken_off, killed, take_in
+from tests.mapped import said
 
 pytestmark = pytest.mark.slow
 
 NOT_COMPARED = (GRAPH_CHANGED, f"{GRAPH_SOURCE}version")  # notes, and a name that is drawn
 
 
-def said(graph: KnowledgeGraph) -> set[Quad]:
-    found = Dataset(quad for quad in graph.quads() if quad.graph_name.value not in NOT_COMPARED)  # type: ignore[union-attr]
-    found.canonicalize(CanonicalizationAlgorithm.UNSTABLE)  # blank nodes have no names of their own
-    return set(found)
-
-
 def answered(folder: Path) -> tuple[set[Quad], str | None]:
     with Snapshot(folder / "graph") as snapshot:
-        return said(snapshot.graph), standing(snapshot.graph, folder)
+        return said(snapshot.graph, *NOT_COMPARED), standing(snapshot.graph, folder)
 
 
 def made_anew(folder: Path, tmp_path: Path, database: str | None = None) -> set[Quad]:
@@ -49,7 +44,7 @@ def made_anew(folder: Path, tmp_path: Path, database: str | None = None) -> set[
         map_rows(place, graph)
         (tmp_path / "kept").rename(place.mapped_rows)
         conclude(graph, lambda line: None)
-        return said(graph)
+        return said(graph, *NOT_COMPARED)
 
 
 @pytest.fixture(scope="module")
@@ -124,21 +119,22 @@ def test_on_servers_as_well(tmp_path: Path, new_postgresql_database: Callable[[]
             with Workspace(tmp_path, database, graph_url=server.url) as place, rewriting(place):
                 pass
             assert standing(graph, tmp_path) is None
-            assert without_notes(said(graph)) == without_notes(made_anew(tmp_path, tmp_path, database))
+            assert without_notes(said(graph, *NOT_COMPARED)) == without_notes(made_anew(tmp_path, tmp_path, database))
 
 
-def test_a_writer_at_work_is_told_apart(before: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "workspace"
-    shutil.copytree(before, folder)
+@pytest.fixture
+def folder(before: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(before, tmp_path / "workspace"))
+
+
+def test_a_writer_at_work_is_told_apart(folder: Path) -> None:
     broken_off(folder, "B")
     assert answered(folder)[1] == BEHIND
     with Workspace(folder) as place, turns.rewriting_alone(place.engine, folder):
         assert answered(folder)[1] == UPDATING
 
 
-def test_who_asks_is_warned(before: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "workspace"
-    shutil.copytree(before, folder)
+def test_who_asks_is_warned(folder: Path) -> None:
     broken_off(folder, "B")
     with pytest.warns(GraphBehind, match=r"behind the database, .*; `irtwin workspace reason --workspace \S+` catches"):
         ask("ASK {}", folder)
@@ -150,18 +146,15 @@ def test_who_asks_is_warned(before: Path, tmp_path: Path) -> None:
     assert not status(folder).faults and not data_sets.irtwin("query", "ASK {}", "--workspace", folder).err
 
 
-def test_what_fails_before_it_changes_anything_leaves_the_graph_whole(before: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "workspace"
-    shutil.copytree(before, folder)
+def test_what_fails_before_it_changes_anything_leaves_the_graph_whole(folder: Path) -> None:
     with pytest.raises(InputError, match="no robot"), Workspace(folder) as place, rewriting(place):
         find_robot(place, "Nobody")
     assert answered(folder)[1] is None
 
 
-def test_runs_that_a_killed_live_left_are_told(before: Path, tmp_path: Path) -> None:
-    shutil.copytree(before, tmp_path / "workspace")
-    journal = Journal(tmp_path / "workspace" / LIVE, Header("A.live_1", "A", 0.0, ("time",)))
-    assert not status(tmp_path / "workspace").faults  # it is watched just now
+def test_runs_that_a_killed_live_left_are_told(folder: Path) -> None:
+    journal = Journal(folder / LIVE, Header("A.live_1", "A", 0.0, ("time",)))
+    assert not status(folder).faults  # it is watched just now
     journal.close()
-    (fault,) = status(tmp_path / "workspace").faults
+    (fault,) = status(folder).faults
     assert fault.startswith("A.live_1 is in the graph as it was when `irtwin live` was killed; the next `irtwin live`")
