@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+from tests.knowledge.graphs import EX, turtle
 
 from irtwin.knowledge.rules import swrl
 from irtwin.knowledge.rules.as_swrl import MOST_VALUES, Written, as_swrl
@@ -11,11 +12,14 @@ from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, GRAPH_SOURCE, LIMIT, term
 
-EX = "https://example.org/"
-MODEL = """@prefix : <https://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
-@prefix xsd: <http://www.w3.org/2001/XMLSchema#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+IN_SWRL = {
+    *("condition number beyond the limit", "energy error beyond the limit", "idle share beyond the limit"),
+    *("standby share beyond the limit", "twin to identify again"),
+}
+MODEL = """@prefix : <https://example.org/> .
 :C a owl:Class . :D a owl:Class . :p a owl:ObjectProperty . :limit a owl:DatatypeProperty ; rdfs:range xsd:double .
 :double a owl:DatatypeProperty ; rdfs:range xsd:double . :count a owl:DatatypeProperty ; rdfs:range xsd:integer .
 :when a owl:DatatypeProperty ; rdfs:range xsd:dateTime . :name a owl:DatatypeProperty ; rdfs:range xsd:string .
@@ -28,8 +32,7 @@ MODEL = """@prefix : <https://example.org/> . @prefix owl: <http://www.w3.org/20
 @pytest.fixture(scope="module")
 def model() -> KnowledgeGraph:
     graph = KnowledgeGraph()
-    facts = parse(MODEL.encode(), format=RdfFormat.TURTLE)
-    graph.replace((Quad(*quad.triple, NamedNode(GRAPH_ONTOLOGY)) for quad in facts), GRAPH_ONTOLOGY)
+    graph.replace(in_graph(turtle(MODEL), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
     return graph
 
 
@@ -53,10 +56,7 @@ def test_the_shipped_rules_say_the_same_in_swrl(graph: KnowledgeGraph) -> None:
     written = as_swrl(graph, rules)
     left_out = {rule.label: why for rule, why in written.left_out}
     in_swrl = [rule for rule in rules if rule.label not in left_out]
-    assert {rule.label for rule in in_swrl} == {
-        *("condition number beyond the limit", "energy error beyond the limit", "idle share beyond the limit"),
-        *("standby share beyond the limit", "twin to identify again"),
-    }
+    assert {rule.label for rule in in_swrl} == IN_SWRL
     facts = graph.triples()
     assert said(conclusions(facts, read_back(written))) == said(conclusions(facts, in_swrl)) != set()
     assert not any("BuiltinAtom" in str(triple) for triple in written.triples)  # HermiT takes none
@@ -68,9 +68,8 @@ def test_the_shipped_rules_say_the_same_in_swrl(graph: KnowledgeGraph) -> None:
 def test_the_limits_are_those_of_the_graph(graph: KnowledgeGraph) -> None:
     limit, value = NamedNode(LIMIT + "idle_share"), NamedNode(term("Limit_Value"))
     said = (one for one in graph.triples(GRAPH_ONTOLOGY) if (one.subject, one.predicate) != (limit, value))
-    quads = [Quad(*one, NamedNode(GRAPH_ONTOLOGY)) for one in said]
     own = Quad(limit, value, Literal(0.15), NamedNode(GRAPH_SOURCE + "own"))
-    graph.replace(quads, GRAPH_ONTOLOGY)
+    graph.replace(in_graph(list(said), GRAPH_ONTOLOGY), GRAPH_ONTOLOGY)
     idle = [rule for rule in all_rules(graph.resources) if rule.label == "idle share beyond the limit"]
     assert as_swrl(graph, idle).left_out[0][1] == "what it looks up has no values in the graph"
     graph.change((), {own})

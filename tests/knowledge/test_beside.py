@@ -3,17 +3,14 @@
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from pyoxigraph import Quad, RdfFormat, Triple, parse
+from pyoxigraph import Quad, Triple
+from tests.knowledge.graphs import turtle
+from tests.mapped import ontology_graph
 
 from irtwin.knowledge.owl_rl.beside import Equality, FactsClosure
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.owl_rl.schema import Schema
-from irtwin.knowledge.store.graph import KnowledgeGraph
 
-PREFIXES = """
-@prefix ex: <https://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
-"""
 AXIOMS = [
     "ex:C rdfs:subClassOf ex:D .",
     "ex:D owl:equivalentClass ex:E .",
@@ -47,10 +44,6 @@ FACTS += [f"ex:{one} a ex:{kind} ." for one in "abc" for kind in "CDEFGHJL"]
 FACTS += ["ex:a ex:v 1 .", "ex:b ex:v 1.0 .", 'ex:c ex:v "x" .', "ex:a ex:q ex:o .", "ex:b ex:p ex:o ."]
 
 
-def triples(statements: list[str]) -> set[Triple]:
-    return {quad.triple for quad in parse(PREFIXES + "\n".join(statements), format=RdfFormat.TURTLE)}
-
-
 def together(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
     """Return what is concluded, None for a contradiction."""
     try:
@@ -76,7 +69,7 @@ def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
     ['ex:c ex:v "x" .', *(f"ex:a ex:{p} ex:{o} ." for p in "pq" for o in "abc"), "ex:a ex:r ex:a ."],
 )
 def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
-    ontology, facts = triples(axioms), triples(said)
+    ontology, facts = turtle(" ".join(axioms)), turtle(" ".join(said))
     try:
         assert beside(ontology, facts) == together(ontology, facts)
     except Equality:
@@ -85,9 +78,7 @@ def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
 
 
 def test_facts_that_come_later(two_robots: list[Quad]) -> None:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    ontology, facts = graph.triples(), sorted((quad.triple for quad in two_robots), key=str)
+    ontology, facts = ontology_graph().triples(), sorted((quad.triple for quad in two_robots), key=str)
     schema = Schema(ontology)
     closure = FactsClosure(schema, facts[::2])
     closure.add(facts[1::2])
@@ -95,7 +86,7 @@ def test_facts_that_come_later(two_robots: list[Quad]) -> None:
 
 
 def test_terms_that_are_the_same_are_told() -> None:
-    assert Schema(triples(["ex:C owl:sameAs ex:D ."])).unfit is not None
-    assert Schema(triples(["owl:sameAs rdfs:domain ex:C ."])).unfit is not None
+    assert Schema(turtle("ex:C owl:sameAs ex:D .")).unfit is not None
+    assert Schema(turtle("owl:sameAs rdfs:domain ex:C .")).unfit is not None
     with pytest.raises(Equality):
-        FactsClosure(Schema(triples(["ex:p a owl:FunctionalProperty ."])), triples(["ex:a ex:p ex:b , ex:c ."]))
+        FactsClosure(Schema(turtle("ex:p a owl:FunctionalProperty .")), turtle("ex:a ex:p ex:b , ex:c ."))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Triple
-from tests.knowledge.test_owl_rl import triples
+from tests.knowledge.graphs import DRAWN, graph_of, turtle
 
 from irtwin.errors import InputError
 from irtwin.knowledge import engines, owl_dl
@@ -15,9 +15,9 @@ from irtwin.knowledge.owl_rl.closure import Contradiction
 from irtwin.knowledge.reasoning import asserted, engine_of, reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_OWL_RL, GRAPH_SOURCE, OWL, RDF, RDFS, XSD
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, GRAPH_ONTOLOGY, GRAPH_OWL_RL, OWL, RDF, RDFS, TYPE, XSD
 
-TYPE, SUBCLASS = NamedNode(RDF + "type"), NamedNode(RDFS + "subClassOf")
+SUBCLASS = NamedNode(RDFS + "subClassOf")
 # That ex:x belongs to ex:E needs an unnamed individual, of which OWL 2 RL knows nothing.
 DL = """
 ex:p a owl:ObjectProperty . ex:C a owl:Class . ex:D a owl:Class . ex:x a ex:C .
@@ -80,10 +80,8 @@ def test_hermit_alone_finds_every_type_that_the_native_engine_finds(graph: Knowl
 @pytest.mark.nightly
 @pytest.mark.system
 def test_hermit_finds_more_and_the_graph_says_who_did() -> None:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(in_graph(triples(DL), GRAPH_SOURCE + "drawn"), GRAPH_SOURCE)
-    (nearest, farther) = (next(iter(triples(f"ex:x a ex:{name} ."))) for name in "EF")
+    graph = graph_of(in_graph(turtle(DL), DRAWN))
+    (nearest, farther) = (next(iter(turtle(f"ex:x a ex:{name} ."))) for name in "EF")
     reason(graph)
     assert not graph.holds(nearest)
     reason(graph, HERMIT)
@@ -98,13 +96,13 @@ def test_hermit_finds_more_and_the_graph_says_who_did() -> None:
 
 def test_owlrl_finds_a_contradiction() -> None:
     with pytest.raises(Contradiction, match=r"owlrl finds: .*example.org/a"):
-        engines.inferred(OWLRL, triples("ex:C owl:disjointWith ex:D . ex:a a ex:C, ex:D ."))
+        engines.inferred(OWLRL, turtle("ex:C owl:disjointWith ex:D . ex:a a ex:C, ex:D ."))
 
 
 def test_owlrl_leaves_a_zero_as_it_is_written() -> None:
     zero = Literal("0", datatype=NamedNode(XSD + "double"))
     a, b, p = (NamedNode(f"https://example.org/{name}") for name in "abp")
-    same = triples("ex:a owl:sameAs ex:b .")
+    same = turtle("ex:a owl:sameAs ex:b .")
     assert Triple(b, p, zero) in engines.inferred(OWLRL, {Triple(a, p, zero), *same})
 
 
@@ -124,7 +122,7 @@ def test_hermit_says_what_memory_it_needs(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(owl_dl.owlready2, "sync_reasoner_hermit", die)
     with pytest.raises(InputError, match="HermiT needs more than the 2,000 MB"):
-        owl_dl.classify(triples("ex:a a owl:Class ."))
+        owl_dl.classify(turtle("ex:a a owl:Class ."))
 
 
 def test_without_java_hermit_is_refused_and_what_was_concluded_stays(graph: KnowledgeGraph, no_java: None) -> None:

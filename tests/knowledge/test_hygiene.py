@@ -6,15 +6,13 @@ from pathlib import Path
 
 import pytest
 from pyoxigraph import RdfFormat, Store
+from tests.knowledge.graphs import TURTLE
 
 from irtwin.resources import folder
 
 RULES = sorted((Path(folder("rules")) / "hygiene").glob("*.rq"))
-PREFIXES = """
-@prefix : <https://w3id.org/irtwin#> . @prefix v: <https://w3id.org/irtwin/verdict/> .
-@prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
-@prefix skos: <http://www.w3.org/2004/02/skos/core#> . @prefix qudt: <http://qudt.org/schema/qudt/> .
-@prefix dcterms: <http://purl.org/dc/terms/> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+PREFIXES = f"""{TURTLE}
+@prefix : <https://w3id.org/irtwin#> . @prefix dcterms: <http://purl.org/dc/terms/> .
 """
 MODULE = "<https://w3id.org/irtwin/x> a owl:Ontology ."
 BAD = {  # a small ontology in which :Bad, or :bad, is what the rule is there to find; :Good it must not find

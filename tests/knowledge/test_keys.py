@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from pyoxigraph import Quad, RdfFormat, parse
+from pyoxigraph import Quad
+from tests.knowledge.graphs import turtle
 
 from irtwin.knowledge.conclusions import infer
 from irtwin.knowledge.owl_rl.closure import Contradiction
@@ -11,17 +12,16 @@ from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import asserted, reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ID, IRT
+from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, ID
 
-PREFIXES = f"@prefix irt: <{IRT}> . @prefix run: <{ID}run/> . @prefix robot: <{ID}robot/> . @base <{ID}> .\n"
+HERE = f"@prefix run: <{ID}run/> . @prefix robot: <{ID}robot/> . @base <{ID}> .\n"
 AGAIN = 'run:again irt:run_of robot:Arm_A ; irt:Run_Name "fit_1" .'
 JOINT = '<joint/other> a irt:Robot_Joint ; irt:joint_of robot:Arm_A ; irt:Joint_Name "j2" .'
 
 
 def said(text: str) -> list[Quad]:
     """Return what a text in Turtle says, as quads that a user asserts."""
-    triples = (quad.triple for quad in parse(PREFIXES + text, format=RdfFormat.TURTLE))
-    return list(in_graph(triples, GRAPH_ASSERTED))
+    return list(in_graph(turtle(HERE + text), GRAPH_ASSERTED))
 
 
 @pytest.mark.parametrize(
@@ -49,6 +49,8 @@ def test_a_key_says_what_is_the_same(graph: KnowledgeGraph, text: str, same: str
         ("run:Arm_A.fit_1 irt:run_of robot:Arm_B .", "prp-fp, dt-diff"),
         ("run:plan a irt:Planned_Run ; irt:run_of robot:Arm_A ; irt:Measured_Energy 5.0e0 .", "cls-maxc1"),
         ('run:Arm_A.fit_1 irt:Run_Role "simulated" .', "prp-fp"),
+        ("run:Arm_A.fit_1 irt:Energy_Consumption 7.0e0 .", "prp-fp, dt-diff.*irt:Energy_Consumption"),
+        ("run:Arm_A.fit_1 a irt:Industrial_Robot .", r"cax-adc.*id:run/Arm_A\.fit_1"),
         ("run:replay a irt:Replayed_Run ; irt:run_of robot:Arm_A ; irt:Energy_Consumption 5.0e0 .", "cls-maxc1"),
     ],
 )

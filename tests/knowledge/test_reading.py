@@ -29,24 +29,27 @@ def quad(subject: str, number: int) -> Quad:
     return Quad(NamedNode(f"urn:{subject}"), NamedNode("urn:p"), Literal(number), NamedNode(GRAPH))
 
 
-def test_an_answer_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def holding(*quads: Quad) -> KnowledgeGraph:
     graph = KnowledgeGraph()
-    graph.replace([quad("a", 1)], GRAPH)
+    graph.replace(quads, GRAPH)
+    return graph
+
+
+def test_an_answer_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = holding(quad("a", 1))
     first = graph.query(ASK)
     monkeypatch.setattr(graph, "answer", None)
     assert graph.query(ASK) == first
 
 
 def test_what_a_caller_does_to_rows_is_its_own() -> None:
-    graph = KnowledgeGraph()
-    graph.replace([quad("a", 1)], GRAPH)
+    graph = holding(quad("a", 1))
     graph.query(ASK)[0]["n"] = 7
     assert graph.query(ASK)[0]["n"] == 1
 
 
 def test_bindings_ask_another_question() -> None:
-    graph = KnowledgeGraph()
-    graph.replace([quad("a", 1), quad("b", 2)], GRAPH)
+    graph = holding(quad("a", 1), quad("b", 2))
     assert [graph.query(ASK, {"s": f"urn:{name}"})[0]["n"] for name in "aba"] == [1, 2, 1]
 
 
@@ -95,8 +98,7 @@ TestWriting.settings = settings(max_examples=5, stateful_step_count=8)
 
 
 def test_an_update_that_fails_leaves_what_is_true() -> None:
-    graph = KnowledgeGraph()
-    graph.replace([quad("a", 1)], GRAPH)
+    graph = holding(quad("a", 1))
     before = graph.query(ASK)
     with pytest.raises(InputError, match="update"):
         graph.update("no update")
@@ -117,8 +119,7 @@ def test_a_view_follows_what_another_process_writes(tmp_path: Path) -> None:
 
 def test_an_answer_that_was_begun_before_a_change_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another thread writes while a question is answered."""
-    graph = KnowledgeGraph()
-    graph.replace([quad("a", 1)], GRAPH)
+    graph = holding(quad("a", 1))
     answer = graph.answer
 
     def slowly(*arguments: object, **named: object) -> object:

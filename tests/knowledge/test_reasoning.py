@@ -14,11 +14,9 @@ from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
-    GRAPH_INFERRED,
     GRAPH_ONTOLOGY,
     GRAPH_OWL_RL,
     GRAPH_SHACL,
-    GRAPH_SOURCE,
     RDF,
     shorten,
     term,
@@ -104,12 +102,6 @@ def test_closure_types_what_rules_concluded(reasoned: KnowledgeGraph) -> None:
     } <= closed
 
 
-def test_reasoning_again_changes_nothing(reasoned: KnowledgeGraph) -> None:
-    before = {name: reasoned.triples(name) for name in reasoned.graphs(GRAPH_INFERRED)}
-    reason(reasoned)
-    assert {name: reasoned.triples(name) for name in reasoned.graphs(GRAPH_INFERRED)} == before
-
-
 def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
     limit = NamedNode("https://w3id.org/irtwin/limit/idle_share")
     ontology = [
@@ -125,14 +117,6 @@ def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
     reason(graph)
     idle = {subject for subject, _, kind in short(graph.triples(GRAPH_OWL_RL)) if kind == "irt:Idle_Heavy_Run"}
     assert idle == {"id:run/Arm_A.idle_1", "id:run/Arm_A.check_1"}
-
-
-def test_conclusion_goes_with_its_premise(two_robots: list[Quad], graph: KnowledgeGraph) -> None:
-    reason(graph)
-    kept = [quad for quad in two_robots if quad.predicate.value != term("Idle_Share")]
-    graph.replace(kept, GRAPH_SOURCE, "https://w3id.org/irtwin/graph/activity/")
-    reason(graph)
-    assert "irt:Idle_Heavy_Run" not in {kind for _, _, kind in short(graph.triples(GRAPH_INFERRED))}
 
 
 def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
@@ -168,7 +152,7 @@ def test_hermit_finds_the_kr6_sheet_consistent(graph: KnowledgeGraph) -> None:
 @pytest.mark.parametrize(
     ("subject", "predicate", "value"),
     [
-        # test_keys and test_owl_rl hold these three by OWL 2 RL
+        # test_keys and test_owl_rl hold such by OWL 2 RL
         pytest.param(individual("run", RUN), TYPE, NamedNode(term("Industrial_Robot")), marks=pytest.mark.nightly),
         pytest.param(individual("run", RUN), term("Energy_Consumption"), Literal(7.0), marks=pytest.mark.nightly),
         pytest.param(individual("run", RUN), term("Run_Time"), Literal("long"), marks=pytest.mark.nightly),

@@ -9,6 +9,7 @@ import rdflib
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import RdfFormat, Triple, parse, serialize
+from tests.knowledge.graphs import TURTLE, turtle
 
 from irtwin.errors import InputError
 from irtwin.knowledge.owl_rl.closure import Closure
@@ -17,10 +18,7 @@ from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.rules.shacl import rules_of
 from irtwin.knowledge.shacl.shapes import Shapes
 
-PREFIXES = """
-@prefix ex: <https://example.org/> . @prefix sh: <http://www.w3.org/ns/shacl#> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
-@prefix owl: <http://www.w3.org/2002/07/owl#> .
+DECLARED = """
 <https://example.org> a owl:Ontology ; sh:declare [ sh:prefix "ex" ; sh:namespace "https://example.org/"^^xsd:anyURI ] .
 """
 DATA = """
@@ -32,13 +30,9 @@ FLAG = """sh:rule [ a sh:SPARQLRule ; sh:prefixes <https://example.org> ;
     sh:construct "CONSTRUCT { $this ex:is ex:flagged } WHERE { }\""""
 
 
-def turtle(text: str) -> set[Triple]:
-    return {quad.triple for quad in parse(PREFIXES + text, format=RdfFormat.TURTLE)}
-
-
 def by_pyshacl(data: set[Triple], shapes: str) -> set[Triple]:
     graph = rdflib.Graph().parse(data=serialize(data, format=RdfFormat.N_TRIPLES), format="nt")
-    shapes_graph = rdflib.Graph().parse(data=PREFIXES + shapes, format="turtle")
+    shapes_graph = rdflib.Graph().parse(data=TURTLE + DECLARED + shapes, format="turtle")
     pyshacl.validate(graph, shacl_graph=shapes_graph, advanced=True, inplace=True, iterate_rules=True)
     made = {quad.triple for quad in parse(graph.serialize(format="nt"), format=RdfFormat.N_TRIPLES)}
     return {triple for triple in made - data if "example.org/" in triple.predicate.value}
@@ -46,7 +40,7 @@ def by_pyshacl(data: set[Triple], shapes: str) -> set[Triple]:
 
 def by_us(data: set[Triple], shapes: str, folder: Path) -> set[Triple]:
     file = folder / "rules.ttl"
-    file.write_text(PREFIXES + shapes)
+    file.write_text(TURTLE + DECLARED + shapes)
     return set().union(*conclusions(data, read_rules(file)).values()) - data
 
 
@@ -97,7 +91,7 @@ def test_recursive_rules_agree_with_pyshacl_on_drawn_data(statements: list[tuple
         [ a sh:SPARQLRule ; sh:prefixes <https://example.org> ; sh:construct
           "CONSTRUCT { ?y ex:q $this } WHERE { $this ex:p ?y, ?z FILTER(?y != ?z) }" ] ."""
     data = turtle("ex:D rdfs:subClassOf ex:C . " + " ".join(f"{' '.join(it)} ." for it in statements))
-    rules = rules_of(Shapes(turtle(shapes), "drawn"))
+    rules = rules_of(Shapes(turtle(DECLARED + shapes), "drawn"))
     assert set().union(*conclusions(data, rules).values()) - data == by_pyshacl(data, shapes)
 
 
@@ -137,7 +131,7 @@ def test_rules_and_owl_go_on_in_turn_and_a_higher_order_waits_for_both() -> None
     model = "ex:Low rdfs:subClassOf ex:High . ex:q rdfs:domain ex:Reached . ex:a ex:p 1 ; ex:n 1 . ex:b ex:n 1 ."
     closure = Closure(turtle(model))
     found = conclusions(
-        turtle(model) | closure.worth_keeping(), rules_of(Shapes(turtle(rules), "drawn")), closing(closure)
+        turtle(model) | closure.worth_keeping(), rules_of(Shapes(turtle(DECLARED + rules), "drawn")), closing(closure)
     )
     said = {" ".join(str(one.value).rpartition("/")[2] for one in it) for it in set().union(*found.values())}
     assert said == {"a 22-rdf-syntax-ns#type Low", "a q found", "b 22-rdf-syntax-ns#type Left"}

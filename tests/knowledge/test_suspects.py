@@ -3,17 +3,14 @@
 import pyshacl
 import pytest
 import rdflib
-from pyoxigraph import Quad, RdfFormat, Store, parse
+from pyoxigraph import Quad, Store
+from tests.knowledge.graphs import TURTLE, turtle
+from tests.mapped import ontology_graph
 
 from irtwin.knowledge.shacl.of_ontology import with_ontology
 from irtwin.knowledge.shacl.suspects import any_suspect, queries
-from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.rdf_input import read_turtle
 
-PREFIXES = """
-@prefix ex: <https://example.org/> . @prefix sh: <http://www.w3.org/ns/shacl#> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
-"""
 SHAPES = {  # what a shape says of ex:C and the shapes it names
     "class": "sh:property [ sh:path ex:p ; sh:class ex:C ] .",
     "datatype": "sh:property [ sh:path ex:p ; sh:datatype xsd:integer ] .",
@@ -57,15 +54,15 @@ DATA = [
 
 @pytest.mark.parametrize("said", SHAPES.values(), ids=SHAPES)
 def test_what_breaks_a_constraint_is_suspected(said: str) -> None:
-    shapes = f"{PREFIXES} ex:shape a sh:NodeShape ; sh:targetClass ex:C ; {said}"
-    below = {quad.triple for quad in parse(f"{PREFIXES} ex:D rdfs:subClassOf ex:C .", format=RdfFormat.TURTLE)}
-    asked = list(queries((quad.triple for quad in parse(shapes, format=RdfFormat.TURTLE)), below))
+    shapes = f"ex:shape a sh:NodeShape ; sh:targetClass ex:C ; {said}"
+    asked = list(queries(turtle(shapes), turtle("ex:D rdfs:subClassOf ex:C .")))
     kept = 0
     for some in DATA:
-        data = f"{PREFIXES} ex:D rdfs:subClassOf ex:C . ex:x a ex:D . {some}"
+        data = f"ex:D rdfs:subClassOf ex:C . ex:x a ex:D . {some}"
         store = Store()
-        store.extend(Quad(*quad.triple) for quad in parse(data, format=RdfFormat.TURTLE))
-        conforms, *_ = pyshacl.validate(rdflib.Graph().parse(data=data), shacl_graph=rdflib.Graph().parse(data=shapes))
+        store.extend(Quad(*triple) for triple in turtle(data))
+        graph, shacl = (rdflib.Graph().parse(data=TURTLE + text) for text in (data, shapes))
+        conforms, *_ = pyshacl.validate(graph, shacl_graph=shacl)
         if not any_suspect(store, asked):
             assert conforms, some
             kept += 1
@@ -73,8 +70,7 @@ def test_what_breaks_a_constraint_is_suspected(said: str) -> None:
 
 
 def test_each_shape_that_ships_is_known():
-    graph = KnowledgeGraph()
-    graph.load_ontology()
+    graph = ontology_graph()
     by_hand = [triple for file in graph.resources.of("shapes") for triple in read_turtle(file.path)]
     asked = list(queries(with_ontology(by_hand, graph.triples()), ()))
     assert len(asked) > 200

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from pyoxigraph import NamedNode, RdfFormat, Triple, parse
+from pyoxigraph import NamedNode, Triple
+from tests.knowledge.graphs import EX, turtle
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.rules import premises
@@ -13,12 +14,7 @@ from irtwin.knowledge.rules.swrl import rules_of
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_SWRL, RDF
 
-EX = "https://example.org/"
-PREFIXES = f"""
-@prefix ex: <{EX}> . @prefix var: <urn:swrl:var#> . @prefix other: <urn:other#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
-@prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
-"""  # noqa: E501
+PREFIXES = "@prefix var: <urn:swrl:var#> . @prefix other: <urn:other#> .\n"
 VARIABLES = "var:x a swrl:Variable . var:y a swrl:Variable . var:n a swrl:Variable . other:n a swrl:Variable .\n"
 FACTS = """
 ex:a a ex:C ; ex:n 7.0e0 ; ex:m 2.0e0 ; ex:p ex:b . ex:b a ex:C ; ex:n 3.0e0 ; ex:m 2.0e0 ; ex:p ex:b .
@@ -38,18 +34,14 @@ def built_in(name: str, arguments: str) -> str:
     return f"[ a swrl:BuiltinAtom ; swrl:builtin {name} ; swrl:arguments ( {arguments} ) ]"
 
 
-def triples(text: str) -> set[Triple]:
-    return {quad.triple for quad in parse(PREFIXES + text, format=RdfFormat.TURTLE)}
-
-
 def rule(*body: str, head: str = MARKED, label: str = 'rdfs:label "odd" ;') -> Rule:
     text = f"{VARIABLES} [] a swrl:Imp ; {label} swrl:body ( {' '.join(body)} ) ; swrl:head ( {head} ) ."
-    (found,) = rules_of(triples(text), "my.swrl.ttl")
+    (found,) = rules_of(turtle(PREFIXES + text), "my.swrl.ttl")
     return found
 
 
 def marked(*body: str) -> str:
-    found = conclusions(triples(FACTS), [rule(*body)])
+    found = conclusions(turtle(FACTS), [rule(*body)])
     return "".join(sorted(triple.subject.value.removeprefix(EX) for triple in found[f"{GRAPH_SWRL}odd"]))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pyoxigraph import NamedNode, Triple
-from tests.knowledge.test_owl_rl import triples
+from tests.knowledge.graphs import turtle
 
 from irtwin.knowledge.engines import NATIVE, worth_keeping
 from irtwin.knowledge.rules.running import conclusions
@@ -31,7 +31,7 @@ ex:fourth a ex:Gear . ex:worn ex:by ex:wear . ex:loose ex:by ex:play . ex:fifth 
 
 def drawn(model: set[Triple]) -> set[Triple]:
     """Return what follows of the facts' individuals, by OWL 2 RL and SWRL in turn."""
-    rules, facts = list(rules_of(model, "the model")), triples(FACTS)
+    rules, facts = list(rules_of(model, "the model")), turtle(FACTS)
     known = model | facts
     while more := worth_keeping(NATIVE, known).union(*conclusions(known, rules).values()) - known:
         known |= more
@@ -39,20 +39,20 @@ def drawn(model: set[Triple]) -> set[Triple]:
 
 
 def test_rules_draw_what_the_axioms_do() -> None:
-    by_rules = drawn(values_as_rules(triples(MODEL)))
-    assert by_rules == drawn(triples(MODEL))
-    assert by_rules == triples("""ex:one a ex:Heavy . ex:third a ex:Run ; ex:exceeds ex:limit .
+    by_rules = drawn(values_as_rules(turtle(MODEL)))
+    assert by_rules == drawn(turtle(MODEL))
+    assert by_rules == turtle("""ex:one a ex:Heavy . ex:third a ex:Run ; ex:exceeds ex:limit .
         ex:fourth ex:sits_in ex:arm . ex:worn a ex:Overhaul . ex:loose a ex:Overhaul . ex:sixth ex:name "a" .""")
 
 
 def test_no_individual_is_left_in_a_class() -> None:
-    values = {one.object for one in values_as_rules(triples(MODEL)) if one.predicate == NamedNode(OWL + "hasValue")}
+    values = {one.object for one in values_as_rules(turtle(MODEL)) if one.predicate == NamedNode(OWL + "hasValue")}
     assert not any(isinstance(value, NamedNode) for value in values)
     assert len(values) == 1  # the name, which is no individual
 
 
 def test_rules_are_named_by_their_class() -> None:
-    labels = {rule.label for rule in rules_of(values_as_rules(triples(MODEL)), "the model")}
+    labels = {rule.label for rule in rules_of(values_as_rules(turtle(MODEL)), "the model")}
     assert labels == {
         f"definition of {name}" for name in ("heavy run", "https://example.org/Gear", "https://example.org/Overhaul")
     }
@@ -68,5 +68,5 @@ def test_rules_are_named_by_their_class() -> None:
     ],
 )
 def test_other_axioms_stay(axiom: str) -> None:
-    given = triples(axiom)
+    given = turtle(axiom)
     assert values_as_rules(given) == given
