@@ -12,6 +12,12 @@ from irtwin.resources import KINDS, resources_of, shipped
 from tests.trusting import trust_all
 
 
+def put(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+
+
 def test_every_kind_ships_something() -> None:
     assert all(shipped().of(kind) for kind in KINDS)
     assert not any(file.is_extension for file in shipped().files)
@@ -19,37 +25,23 @@ def test_every_kind_ships_something() -> None:
 
 
 def test_a_file_of_the_same_name_replaces_and_any_other_is_added(tmp_path: Path) -> None:
-    for name in ("shapes/shapes.ttl", "questions/mine.rq", "reports/energy/mine.rq"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("")
+    names = ["shapes/shapes.ttl", "questions/mine.rq", "reports/energy/mine.rq"]
+    put(tmp_path, *names)
     aside = resources_of(tmp_path)
     assert aside.files == resources_of().files
-    assert [file.asked for file in aside.left_aside] == [
-        "shapes/shapes.ttl",
-        "questions/mine.rq",
-        "reports/energy/mine.rq",
-    ]
+    assert [file.asked for file in aside.left_aside] == names
     found = resources_of(trust_all(tmp_path))
     assert not found.left_aside
     assert {str(file): file.replaces for file in found.extensions} == {
-        "shapes/shapes.ttl of workspace": True,
-        "questions/mine.rq of workspace": False,
-        "reports/energy/mine.rq of workspace": False,
+        f"{name} of workspace": name == "shapes/shapes.ttl" for name in names
     }
     assert found.path("shapes", "shapes.ttl") == tmp_path / "shapes" / "shapes.ttl"
     assert len(found.of("questions")) == len(shipped().of("questions")) + 1
 
 
 def test_pages_and_what_editors_leave_are_no_extensions(tmp_path: Path) -> None:
-    for name in (
-        "reports/KR6.html",
-        "rules/.x.swp",
-        "rules/a_rules.ttl~",
-        "ontology/catalog-v001.xml",
-        "rules/README.md",
-    ):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("")
+    put(tmp_path, "reports/KR6.html", "ontology/catalog-v001.xml")
+    put(tmp_path / "rules", ".x.swp", "a_rules.ttl~", "README.md")
     assert resources_of(tmp_path) == resources_of()
 
 
@@ -64,29 +56,22 @@ def test_pages_and_what_editors_leave_are_no_extensions(tmp_path: Path) -> None:
     ],
 )
 def test_a_file_that_no_folder_takes_is_refused(name: str, said: str, tmp_path: Path) -> None:
-    (tmp_path / name).parent.mkdir(parents=True)
-    (tmp_path / name).write_text("")
+    put(tmp_path, name)
     with pytest.raises(InputError, match=said):
         resources_of(tmp_path)
 
 
 def test_a_file_elsewhere_or_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    place = tmp_path / "place"
-    (place / "ontology").mkdir(parents=True)
-    (tmp_path / "outside.ttl").write_text("")
-    (place / "ontology" / "a.ttl").symlink_to(tmp_path / "outside.ttl")
-    with pytest.raises(InputError, match="leads outside"):
-        resources_of(place)
-    (place / "ontology" / "a.ttl").unlink()
-    (place / "ontology" / "a.ttl").symlink_to("a.ttl")
-    with pytest.raises(InputError, match="leads outside"):
-        resources_of(place)
-    (place / "ontology" / "a.ttl").unlink()
-    (place / "ontology" / "a.ttl").write_text("# more than four")
-    monkeypatch.setattr(resources, "MOST_BYTES", 4)
-    with pytest.raises(InputError, match="is larger than"):
-        resources_of(place)
-    monkeypatch.setattr(resources, "MOST_BYTES", 400)
-    monkeypatch.setattr(resources, "MOST_FILES", 0)
-    with pytest.raises(InputError, match="has more than 0 files"):
-        resources_of(place)
+    put(tmp_path, "outside.ttl", "place/ontology/a.ttl")
+    place, file = tmp_path / "place", tmp_path / "place/ontology/a.ttl"
+    for target in ("../../outside.ttl", "a.ttl"):
+        file.unlink()
+        file.symlink_to(target)
+        with pytest.raises(InputError, match="leads outside"):
+            resources_of(place)
+    file.unlink()
+    file.write_text("# more than four")
+    for bound, most, said in (("MOST_BYTES", 4, "is larger than"), ("MOST_FILES", 0, "has more than 0 files")):
+        with monkeypatch.context() as patch, pytest.raises(InputError, match=said):
+            patch.setattr(resources, bound, most)
+            resources_of(place)

@@ -39,13 +39,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return found
 
 
-def _batch(folder: Path, *names: str) -> Batch:
-    places = []
+def batch_of(folder: Path, *names: str) -> Batch:
     for name in names:
         (folder / name).mkdir()
         (folder / name / "dataset.toml").write_text(name)
-        places.append(str(folder / name))
-    return Batch.create(folder / "out" / "batch_0001", "diagnose", places)
+    return Batch.create(folder / "out" / "batch_0001", "diagnose", [str(folder / name) for name in names])
 
 
 def _states(batch: Batch) -> list[str]:
@@ -53,7 +51,7 @@ def _states(batch: Batch) -> list[str]:
 
 
 def test_a_data_set_that_is_refused_or_fails_costs_no_other(tmp_path: Path, asked: list[str]) -> None:
-    batch = _batch(tmp_path, "bad", "odd", "good")
+    batch = batch_of(tmp_path, "bad", "odd", "good")
     batch.work()
     assert _states(batch) == ["refused", "failed", "done"]
     refused, failed, _ = batch.records()
@@ -65,7 +63,7 @@ def test_a_data_set_that_is_refused_or_fails_costs_no_other(tmp_path: Path, aske
 
 
 def test_only_what_changed_or_failed_is_taken_again(tmp_path: Path, asked: list[str]) -> None:
-    batch = _batch(tmp_path, "bad", "odd", "good", "other")
+    batch = batch_of(tmp_path, "bad", "odd", "good", "other")
     batch.work()
     (tmp_path / "good" / "dataset.toml").write_text("changed")
     asked.clear()
@@ -74,7 +72,7 @@ def test_only_what_changed_or_failed_is_taken_again(tmp_path: Path, asked: list[
 
 
 def test_what_a_full_disk_hindered_is_taken_again(tmp_path: Path, asked: list[str]) -> None:
-    batch = _batch(tmp_path, "full", "good")
+    batch = batch_of(tmp_path, "full", "good")
     batch.work()
     assert _states(batch) == ["failed", "done"]
     assert next(it.said for it in batch.records() if it) == "workspace: the disk is full"
@@ -84,7 +82,7 @@ def test_what_a_full_disk_hindered_is_taken_again(tmp_path: Path, asked: list[st
 
 
 def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: list[str]) -> None:
-    batch = _batch(tmp_path, "large", "good")
+    batch = batch_of(tmp_path, "large", "good")
     batch.work()
     records = batch.folder / "records"
     for attempts, state in ((1, "done"), (2, "failed")):
@@ -100,7 +98,7 @@ def test_a_data_set_of_which_processes_die_is_set_aside(tmp_path: Path, asked: l
 
 @pytest.mark.parametrize("text", ['{"state"', "[" * 100_000, '{"data_set": "x", "state": "done", "seconds": []}'])
 def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str], text: str) -> None:
-    batch = _batch(tmp_path, "good")
+    batch = batch_of(tmp_path, "good")
     batch.work()
     (batch.folder / "records" / f"{key(batch.sets.data_sets[0])}.json").write_text(text)
     batch.work()
@@ -110,7 +108,7 @@ def test_a_damaged_record_is_as_none(tmp_path: Path, asked: list[str], text: str
 def test_a_disk_that_does_not_answer_fails_one_data_set(
     tmp_path: Path, asked: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    batch = _batch(tmp_path, "lost", "good")
+    batch = batch_of(tmp_path, "lost", "good")
 
     def answering(data_set: Path) -> str:
         if data_set.name == "lost":
@@ -136,7 +134,7 @@ def test_folders_of_one_name_have_files_of_their_own() -> None:
 
 def _leading_out(folder: Path, name: str) -> tuple[Batch, Path]:
     """A batch whose folder of a name is a link, and where that leads."""
-    batch, outside = _batch(folder, "good"), folder / "outside"
+    batch, outside = batch_of(folder, "good"), folder / "outside"
     outside.mkdir()
     (batch.folder / name).symlink_to(outside)
     return batch, outside

@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.providers import identification
+from irtwin.providers.provider import Made
 from irtwin.providers.records import ingest
+from irtwin.robot.description import Robot
 from irtwin.signals.log import DataSet
+from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.twin.files import from_json
@@ -19,14 +23,24 @@ from irtwin.twin.identify import identify
 from irtwin.twin.validate import validate
 
 
+def provided(folder: Path, robot: Robot, motions: list[Motion], roles: list[str] | None = None, **said: Any) -> Made:
+    """What is made of a robot's runs with these roles, whose data set says some more."""
+    roles = roles or ["observed"] * len(motions)
+    runs = tuple(replace(as_run(motion), role=role) for motion, role in zip(motions, roles, strict=True))
+    told = replace(DataSet(Path(), robot, runs, None, None, "mains", False, {}), **said)
+    with Workspace(folder) as workspace:
+        ingest(workspace, told)
+        return identification.provide(workspace, robot.name)
+
+
+def measured(robot: Robot, count: int) -> list[Motion]:
+    return [measure(robot, swing(robot, seed, seconds=6.0), noise=0.05) for seed in range(count)]
+
+
 def parts(folder: Path, roles: list[str]) -> dict[str, str]:
     """The part that each run takes in the twin of a robot whose runs have these roles."""
     robot = with_constants(arm(2))
-    runs = [as_run(measure(robot, swing(robot, seed, seconds=6.0), noise=0.05)) for seed in range(len(roles))]
-    told = tuple(replace(run, role=role) for run, role in zip(runs, roles, strict=True))
-    with Workspace(folder) as workspace:
-        ingest(workspace, DataSet(Path(), robot, told, None, None, "mains", True, {}))
-        made = identification.provide(workspace, "arm_2")
+    made = provided(folder, robot, measured(robot, len(roles)), roles, simulated=True)
     return {row.run_id[-1]: row.part for row in made.rows if isinstance(row, schema.TwinRun)}
 
 
@@ -49,10 +63,8 @@ def test_base_parameters_are_counted_that_the_bodies_have() -> None:
 def test_a_run_that_takes_no_energy_has_no_relative_error(tmp_path: Path) -> None:
     robot = with_constants(arm(1))
     dead = [replace(measure(robot, swing(robot, k, seconds=6.0)), power=np.zeros(600)) for k in range(2)]
-    with Workspace(tmp_path) as workspace:
-        ingest(workspace, DataSet(Path(), robot, tuple(map(as_run, dead)), None, None, "mains", True, {}))
-        made = identification.provide(workspace, "arm_1")
-        assert all(np.isfinite(row.value) for row in made.rows if isinstance(row, schema.ParameterRow))
+    made = provided(tmp_path, robot, dead, simulated=True)
+    assert all(np.isfinite(row.value) for row in made.rows if isinstance(row, schema.ParameterRow))
     (twin,) = made.documents.values()
     (fit,) = validate(from_json(twin.decode(), Path("twin.json")), dead[:1])
     assert fit.measured_energy == 0
@@ -62,11 +74,7 @@ def test_a_run_that_takes_no_energy_has_no_relative_error(tmp_path: Path) -> Non
 def weighed(folder: Path, **said: object) -> tuple[schema.TwinRow, list[schema.ParameterRow], dict[str, object]]:
     """The twin of a robot whose data set says some more: its row, its parameters and its file."""
     robot = with_constants(arm(1))
-    runs = tuple(as_run(measure(robot, swing(robot, k, seconds=6.0), noise=0.05)) for k in range(2))
-    told = replace(DataSet(Path(), robot, runs, None, None, "mains", False, {}), **said)
-    with Workspace(folder) as workspace:
-        ingest(workspace, told)
-        made = identification.provide(workspace, "arm_1")
+    made = provided(folder, robot, measured(robot, 2), **said)
     (row,) = (row for row in made.rows if isinstance(row, schema.TwinRow))
     (document,) = made.documents.values()
     return row, [row for row in made.rows if isinstance(row, schema.ParameterRow)], json.loads(document)
