@@ -14,20 +14,7 @@ from irtwin.resources import folder
 IRT = rdflib.Namespace("https://w3id.org/irtwin#")
 EFFECT = "https://w3id.org/irtwin/effect/"
 QUDT = rdflib.Namespace("http://qudt.org/schema/qudt/")
-MODULES = [
-    "irtwin",
-    "units",
-    "robot",
-    "structure",
-    "energy",
-    "effects",
-    "gap",
-    "providers",
-    "totals",
-    "tariff",
-    "live",
-    "alignment",
-]
+MODULES = sorted(file.stem for file in folder("ontology").glob("*.ttl"))
 KINDS = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.AnnotationProperty, OWL.NamedIndividual]
 SHARED = Path(__file__).parents[2] / "../shared"
 
@@ -138,16 +125,10 @@ def test_kr6_sheet_says_what_its_urdf_says() -> None:
     sheet = rdflib.Graph().parse(robots / "kuka_kr6_r700.ttl")
     robot = rdflib.URIRef("https://w3id.org/irtwin/id/robot/KUKA_KR6_R700")
     information = sheet.value(robot, IRT.has_Information)
-    said = {
-        name: sheet.value(information, IRT[name]).toPython()
-        for name in ("Controlled_Axes", "IR_Weight", "Rated_Payload")
-    }
-    assert said == {"Controlled_Axes": 6, "IR_Weight": 50.0, "Rated_Payload": 6.0}
-    joints = [
-        joint
-        for joint in ElementTree.parse(robots / "kuka_kr6_r700.urdf").iter("joint")
-        if joint.get("type") != "fixed"
-    ]
+    for name, value in {"Controlled_Axes": 6, "IR_Weight": 50.0, "Rated_Payload": 6.0}.items():
+        assert sheet.value(information, IRT[name]).toPython() == value
+    described = ElementTree.parse(robots / "kuka_kr6_r700.urdf").iter("joint")
+    joints = [joint for joint in described if joint.get("type") != "fixed"]
     assert len(joints) == len(list(sheet.objects(robot, IRT.has_Joint))) == 6
     for number, joint in enumerate(joints, start=1):
         individual = rdflib.URIRef(f"https://w3id.org/irtwin/id/joint/KUKA_KR6_R700/{joint.get('name')}")
@@ -162,14 +143,8 @@ def test_kr6_sheet_says_what_its_urdf_says() -> None:
 def test_kr6_sheet_says_what_the_shipped_data_set_says() -> None:
     sheet = rdflib.Graph().parse(folder("ontology") / "robots" / "kuka_kr6_r700.ttl")
     robot = tomllib.loads((folder("demo") / "kuka_kr6_r700" / "dataset.toml").read_text(encoding="utf-8"))["robot"]
-    keys = {
-        "IR_Name": "name",
-        "IR_Type": "type",
-        "Manufacturer": "manufacturer",
-        "IR_Weight": "weight",
-        "Rated_Payload": "rated_payload",
-    }
-    for name, key in keys.items():
+    keys = {"IR_Name": "name", "IR_Type": "type", "IR_Weight": "weight"}
+    for name, key in (keys | {"Manufacturer": "manufacturer", "Rated_Payload": "rated_payload"}).items():
         assert [value.toPython() for value in sheet.objects(None, IRT[name])] == [robot[key]]
 
 
