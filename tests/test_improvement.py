@@ -24,6 +24,7 @@ from irtwin.next_experiment import next_experiment
 from irtwin.providers.gap import record
 from irtwin.providers.improvement import _worst
 from irtwin.rewriting import rewriting
+from irtwin.robot.description import Robot
 from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
@@ -54,8 +55,8 @@ def write(folder: Path) -> Path:
     return data_sets.write(folder, ROBOT, runs, tail=f'[twin]\neffects = [{LACKING}, "standby_power"]')
 
 
-def new_log(folder: Path, run: Run) -> Path:
-    pq.write_table(data_sets.table(ROBOT, run), folder / f"{run.name}.parquet")
+def new_log(folder: Path, run: Run, robot: Robot = ROBOT) -> Path:
+    pq.write_table(data_sets.table(robot, run), folder / f"{run.name}.parquet")
     return folder / f"{run.name}.parquet"
 
 
@@ -226,9 +227,8 @@ def test_bad_logs_are_told_and_change_nothing(improved: tuple[Path, Said], tmp_p
     assert 'the robot has no planned run "reach"; it has none' in refused("arm_2", file, "--performs", "reach", *here)
     motion = replace(log(5, 1.0, "bare"), signals=log(5, 1.0).signals.motion)
     assert "has neither torque nor power" in refused("arm_2", new_log(tmp_path, motion), *here)
-    other = arm(3)
-    pq.write_table(data_sets.table(other, as_run(measure(other, swing(other, 1)))), tmp_path / "other.parquet")
-    assert 'no moving joint "joint_3"' in refused("arm_2", tmp_path / "other.parquet", *here)
+    other = new_log(tmp_path, as_run(measure(arm(3), swing(arm(3), 1))), arm(3))
+    assert 'no moving joint "joint_3"' in refused("arm_2", other, *here)
     assert list(asking.ask("energy_per_run", workspace)) == before
 
 
