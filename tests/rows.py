@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
@@ -119,6 +120,14 @@ def twin(twin_id: str) -> list[Base]:
         ),
         TwinRun(twin_id=twin_id, run_id=f"{ROBOT}.work", part="fit"),
     ]
+
+
+def identify(
+    workspace: Workspace, twin_id: str, used: Sequence[str] = (), parts: Sequence[Base] = (), name: str = "twin.1"
+) -> None:
+    """Keep a twin, its parts and its file, as its provider does."""
+    by, made = activity(name, "identification"), [*twin(twin_id), *parts]
+    workspace.replace_activity(by, list(used), made, documents={f"twins/{twin_id}.json": b"{}"})
 
 
 def run_state() -> list[Base]:

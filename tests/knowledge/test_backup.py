@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import subprocess
@@ -14,15 +15,14 @@ import pytest
 from pyoxigraph import NamedNode, Triple
 from sqlalchemy import func, select
 from tests import rows
+from tests.mapped import map_into
 
-from irtwin import resources
 from irtwin.errors import InputError
 from irtwin.input_file import checksum
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.backup import backup, restore
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE
 from irtwin.location import Location
 from irtwin.storage import database
 from irtwin.storage.database import Workspace
@@ -35,18 +35,14 @@ State = tuple[dict[str, list[tuple[object, ...]]], dict[str, str], int]
 
 def fill(place: Workspace) -> None:
     place.ingest(*rows.data_set())
-    made = [*rows.twin(f"{rows.ROBOT}.abc")]
-    place.replace_activity(
-        rows.activity("twin.1", "identification"), [], made, documents={f"twins/{rows.ROBOT}.abc.json": b"{}"}
-    )
+    rows.identify(place, f"{rows.ROBOT}.abc")
     report = place.report_path(rows.ROBOT)
     report.parent.mkdir()
     report.write_text("<html>")
     (place.folder / "plant.toml").write_text("co2_kg_per_kwh = 0.4\n")
     with KnowledgeGraph(place.graph_folder) as graph:
-        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
         graph.load_ontology()
-        graph.replace(map_database(place.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
+        map_into(graph, place)
 
 
 def state(place: Workspace) -> State:
@@ -75,10 +71,13 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
 
 @pytest.fixture(scope="module")
 def kept(filled: Workspace) -> bytes:
-    archive = filled.folder.with_name("kept.zip")
-    with KnowledgeGraph(filled.graph_folder) as graph:
-        backup(filled, graph, archive)
-    return archive.read_bytes()
+    return backed_up(filled, filled.folder.with_name("kept.zip")).read_bytes()
+
+
+def backed_up(place: Workspace, archive: Path) -> Path:
+    with KnowledgeGraph(place.graph_folder) as graph:
+        backup(place, graph, archive)
+    return archive
 
 
 @pytest.fixture
@@ -104,9 +103,9 @@ def test_into_postgresql_and_back(
 ) -> None:
     url = new_postgresql_database()
     restore(archive, Location(tmp_path / "after", url))
-    with Workspace(tmp_path / "after", url) as place, KnowledgeGraph(place.graph_folder) as graph:
+    with Workspace(tmp_path / "after", url) as place:
         assert not (tmp_path / "after" / "irtwin.db").exists()
-        backup(place, graph, tmp_path / "again.zip")
+        backed_up(place, tmp_path / "again.zip")
     with pytest.raises(InputError, match="holds rows already"):
         restore(archive, Location(tmp_path / "third", url))
     assert not (tmp_path / "third").exists()
@@ -160,10 +159,12 @@ def test_it_is_of_one_moment_while_another_process_writes(tmp_path: Path) -> Non
             assert session.scalar(select(func.count()).select_from(Base.metadata.tables["run"])) == 2
 
 
-def altered(archive: Path, change: Callable[[dict[str, bytes]], None], sums: bool = True) -> Path:
-    """Return the archive with other contents, its list made to agree with them if `sums`."""
-    import hashlib
+Contents = dict[str, bytes]
+Change = Callable[[Contents], object]
 
+
+def altered(archive: Path, change: Change, sums: bool = True) -> Path:
+    """Return the archive with other contents, its list made to agree with them if `sums`."""
     with zipfile.ZipFile(archive) as source:
         contents = {name: source.read(name) for name in source.namelist()}
     manifest = json.loads(contents.pop("manifest.json"))
@@ -187,11 +188,6 @@ def refuse(archive: Path, message: str) -> None:
     assert not folder.exists()
     assert not list(archive.parent.glob(".irtwin-restore-*"))
     assert not (archive.parent / "outside").exists()
-
-
-@pytest.mark.parametrize("name", ["../outside", "series/../../outside", "/tmp/outside", "irtwin.db", "graph/CURRENT"])
-def test_names_that_escape_are_refused(archive: Path, name: str) -> None:
-    refuse(altered(archive, lambda contents: contents.update({name: b"x"})), "does not belong in a workspace")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
@@ -219,70 +215,65 @@ def test_no_flipped_byte_is_restored(archive: Path, filled: Workspace) -> None:
     assert told > 8
 
 
-def test_contents_that_are_not_those_of_the_list(archive: Path) -> None:
-    def longer(contents: dict[str, bytes]) -> None:
-        contents["graph.nq"] += b"#"
-
-    def other(contents: dict[str, bytes]) -> None:
-        contents["graph.nq"] = b"#" + contents["graph.nq"][1:]
-
-    refuse(altered(archive, longer, sums=False), "do not match its list")
-    refuse(altered(archive, other, sums=False), r"graph\.nq is damaged, its checksum differs")
-    refuse(altered(archive, lambda contents: contents.update(more=b""), sums=False), "do not match its list")
-    refuse(altered(archive, lambda contents: contents.pop("graph.nq"), sums=False), "do not match its list")
+def put(name: str, data: bytes) -> Change:
+    return lambda contents: contents.update({name: data})
 
 
-@pytest.mark.parametrize(
-    ("name", "data", "message"),
-    [
-        ("graph.nq", b"<a", "its graph is damaged"),
-        ("graph.nq", b'<a:a> <a:b> "' + b"x" * (17 << 20), "its graph is damaged: Reached the buffer maximal size"),
-        ("rows/robot.jsonl", b"{}\n", "table robot was made by another irtwin version"),
-        ("rows/robot.jsonl", b"[\n", "rows of table robot do not fit"),
-        ("rows/joint.jsonl", None, "has no table joint"),
-        ("rows/robot.jsonl", b"", "do not fit"),
-    ],
-)
-def test_contents_that_are_no_workspace(archive: Path, name: str, data: bytes | None, message: str) -> None:
-    def change(contents: dict[str, bytes]) -> None:
-        contents.pop(name)
-        if data is not None:
-            contents[name] = data
-
-    refuse(altered(archive, change), message)
+def without(name: str) -> Change:
+    return lambda contents: contents.pop(name)
 
 
-def rename_robot(contents: dict[str, bytes], name: str) -> None:
-    for file in contents:
-        if file.startswith("rows/"):
-            contents[file] = contents[file].replace(rows.ROBOT.encode(), name.encode())
-
-
-@pytest.mark.parametrize("name", ["../../../outside", "/tmp/outside", "..", "a/b", "a\\u0000b"])
-def test_rows_that_would_lead_out_of_the_workspace_are_refused(archive: Path, name: str) -> None:
-    refuse(altered(archive, lambda contents: rename_robot(contents, name)), "robot_id .* is none that irtwin writes")
+def replaced(found: bytes, by: bytes, within: str = "rows/robot.jsonl") -> Change:
+    """Return a change of what stands in all files whose name begins so."""
+    return lambda contents: contents.update(
+        {name: data.replace(found, by) for name, data in contents.items() if name.startswith(within)}
+    )
 
 
 @pytest.mark.parametrize(
-    ("found", "put", "message"),
+    ("change", "message"),
     [
-        (b'"controlled_axes": 2', b'"controlled_axes": 1' + b"0" * 30, "controlled_axes .* is none that irtwin writes"),
-        (b'"weight_kg": 50.0', b'"weight_kg": ' + b"[" * 100_000 + b"]" * 100_000, "do not fit"),
-        (b'"weight_kg": 50.0', b'"weight_kg": ' + b"9" * 5000, "do not fit"),
-        (b'"weight_kg": 50.0', b'"weight_kg": NaN', "weight_kg .* is none that irtwin writes"),
-        (b'"name": "KUKA KR6 R700"', b'"name": "\\ud800"', "name .* is none that irtwin writes"),
+        (replaced(b"\n", b"\n#", "graph.nq"), "do not match its list"),
+        (replaced(b" ", b"#", "graph.nq"), r"graph\.nq is damaged, its checksum differs"),
+        (put("more", b""), "do not match its list"),
+        (without("graph.nq"), "do not match its list"),
     ],
 )
-def test_values_that_no_row_holds_are_refused(archive: Path, found: bytes, put: bytes, message: str) -> None:
-    def change(contents: dict[str, bytes]) -> None:
-        contents["rows/robot.jsonl"] = contents["rows/robot.jsonl"].replace(found, put)
+def test_contents_that_are_not_those_of_the_list(archive: Path, change: Change, message: str) -> None:
+    refuse(altered(archive, change, sums=False), message)
 
+
+ESCAPING = ("../outside", "series/../../outside", "/tmp/outside", "irtwin.db", "graph/CURRENT")
+NO_ROBOT = ("../../../outside", "/tmp/outside", "..", "a/b", "a\\u0000b")
+WEIGHT = b'"weight_kg": 50.0'
+NOT_OURS = "{} .* is none that irtwin writes"
+ALTERED = [
+    *((put(name, b"x"), "does not belong in a workspace") for name in ESCAPING),
+    (put("graph.nq", b"<a"), "its graph is damaged"),
+    (put("graph.nq", b'<a:a> <a:b> "' + b"x" * (17 << 20)), "its graph is damaged: Reached the buffer maximal size"),
+    (put("rows/robot.jsonl", b"{}\n"), "table robot was made by another irtwin version"),
+    (put("rows/robot.jsonl", b"[\n"), "rows of table robot do not fit"),
+    (put("rows/robot.jsonl", b""), "do not fit"),
+    (without("rows/joint.jsonl"), "has no table joint"),
+    (without("graph.nq"), "incomplete: it holds no graph"),
+    (put("graph.nq", b""), "incomplete: its graph knows no robot"),
+    *((replaced(rows.ROBOT.encode(), name.encode(), "rows/"), NOT_OURS.format("robot_id")) for name in NO_ROBOT),
+    (replaced(b'"controlled_axes": 2', b'"controlled_axes": 1' + b"0" * 30), NOT_OURS.format("controlled_axes")),
+    (replaced(WEIGHT, b'"weight_kg": ' + b"[" * 100_000 + b"]" * 100_000), "do not fit"),
+    (replaced(WEIGHT, b'"weight_kg": ' + b"9" * 5000), "do not fit"),
+    (replaced(WEIGHT, b'"weight_kg": NaN'), NOT_OURS.format("weight_kg")),
+    (replaced(b'"name": "KUKA KR6 R700"', b'"name": "\\ud800"'), NOT_OURS.format("name")),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), ALTERED)
+def test_contents_that_are_no_workspace_are_refused(archive: Path, change: Change, message: str) -> None:
     refuse(altered(archive, change), message)
 
 
 def test_a_row_beyond_all_bounds_is_refused(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("irtwin.knowledge.store.backup._LONGEST_ROW", 1 << 20)
-    refuse(altered(archive, lambda contents: contents.update({"rows/robot.jsonl": b" " * (2 << 20)})), "more than 1 MB")
+    refuse(altered(archive, put("rows/robot.jsonl", b" " * (2 << 20))), "more than 1 MB")
 
 
 def test_a_link_out_of_the_workspace_is_not_backed_up(tmp_path: Path) -> None:
@@ -290,8 +281,8 @@ def test_a_link_out_of_the_workspace_is_not_backed_up(tmp_path: Path) -> None:
     with Workspace(tmp_path / "place") as place:
         fill(place)
         (place.folder / "reports" / "x.html").symlink_to(tmp_path / "secret.html")
-        with KnowledgeGraph(place.graph_folder) as graph, pytest.raises(InputError, match="leads outside"):
-            backup(place, graph, tmp_path / "kept.zip")
+        with pytest.raises(InputError, match="leads outside"):
+            backed_up(place, tmp_path / "kept.zip")
     assert not (tmp_path / "kept.zip").exists()
 
 
@@ -328,25 +319,18 @@ def test_a_lost_or_altered_file_is_not_backed_up(tmp_path: Path) -> None:
                 file = next((place.folder / name).iterdir())
                 content = file.read_bytes()
                 damage(file)
-                with (
-                    KnowledgeGraph(place.graph_folder) as graph,
-                    pytest.raises(InputError, match=f"{file.name} (altered|missing); nothing was written"),
-                ):
-                    backup(place, graph, tmp_path / "kept.zip")
+                with pytest.raises(InputError, match=f"{file.name} (altered|missing); nothing was written"):
+                    backed_up(place, tmp_path / "kept.zip")
                 file.write_bytes(content)
         assert [path.name for path in tmp_path.iterdir()] == ["before"]
         assert not list(place.folder.glob(".*"))
 
 
-def test_an_incomplete_archive_of_an_earlier_version_is_told(archive: Path, filled: Workspace) -> None:
+def test_an_archive_of_an_earlier_version_whose_series_is_lost_is_told(archive: Path, filled: Workspace) -> None:
     with filled.reading() as session:
         path = session.scalars(select(Series.path)).first()
-    refuse(altered(archive, lambda contents: contents.pop(path)), f"{path} missing or altered; use another backup")
-    refuse(altered(archive, lambda contents: contents.update({path: b"PAR1"})), "missing or altered")
-    refuse(altered(archive, lambda contents: contents.pop("graph.nq")), "incomplete: it holds no graph")
-    refuse(
-        altered(archive, lambda contents: contents.update({"graph.nq": b""})), "incomplete: its graph knows no robot"
-    )
+    refuse(altered(archive, without(path)), f"{path} missing or altered; use another backup")
+    refuse(altered(archive, put(path, b"PAR1")), "missing or altered")
 
 
 def test_what_extends_a_workspace_goes_with_it(tmp_path: Path) -> None:
@@ -354,8 +338,8 @@ def test_what_extends_a_workspace_goes_with_it(tmp_path: Path) -> None:
     for name in names:
         (tmp_path / "before" / name).parent.mkdir(parents=True)
         (tmp_path / "before" / name).write_text(f"# {name}")
-    with Workspace(tmp_path / "before") as place, KnowledgeGraph(place.graph_folder) as graph:
-        backup(place, graph, tmp_path / "all.zip")
+    with Workspace(tmp_path / "before") as place:
+        backed_up(place, tmp_path / "all.zip")
     restore(tmp_path / "all.zip", tmp_path / "after")
     assert [(tmp_path / "after" / name).read_text() for name in names] == [f"# {name}" for name in names]
 

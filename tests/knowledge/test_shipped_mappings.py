@@ -10,23 +10,15 @@ import pytest
 from pyoxigraph import NamedNode, Quad, RdfFormat, parse
 from sqlalchemy import insert, select
 from tests import rows
+from tests.mapped import MAPPINGS
 
 from irtwin import resources
 from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.mapping.document import RR
 from irtwin.storage.database import Workspace
 from irtwin.storage.energy_schema import EnergyShare, JointEnergy
-from irtwin.storage.schema import (
-    Base,
-    BaseParameterRow,
-    JointState,
-    ParameterRow,
-    Series,
-    TorqueFit,
-    TwinEffect,
-)
+from irtwin.storage.schema import Base, BaseParameterRow, JointState, ParameterRow, Series, TorqueFit, TwinEffect
 
-MAPPINGS = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
 EXPECTED = Path(__file__).parent / "data" / "mapped_robot.trig"
 WORK = f"{rows.ROBOT}.work"
 TWIN = f"{rows.ROBOT}.abc"
@@ -42,21 +34,10 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
 
 def fill(workspace: Workspace) -> None:
     workspace.ingest(*rows.data_set())
-    state = JointState(
-        run_id=WORK,
-        **JOINT,
-        joint_position_rad=0.5,
-        joint_speed_rad_s=0.0,
-        joint_acc_rad_s2=-1e-9,
-        joint_torque_nm=12.5,
-    )
+    values = {"joint_position_rad": 0.5, "joint_speed_rad_s": 0.0, "joint_acc_rad_s2": -1e-9, "joint_torque_nm": 12.5}
+    state = JointState(run_id=WORK, **JOINT, **values)
     workspace.replace_activity(rows.activity("state.1", "run_state"), [], [*rows.run_state(), state])
-    workspace.replace_activity(
-        rows.activity("twin.1", "identification"),
-        [f"https://w3id.org/irtwin/id/run/{WORK}"],
-        [*rows.twin(TWIN), *twin_parts()],
-        documents={f"twins/{TWIN}.json": b"{}"},
-    )
+    rows.identify(workspace, TWIN, [f"https://w3id.org/irtwin/id/run/{WORK}"], twin_parts())
     workspace.replace_activity(
         rows.activity("energy.1", "energy"),
         [f"https://w3id.org/irtwin/id/twin/{TWIN}"],
@@ -66,37 +47,15 @@ def fill(workspace: Workspace) -> None:
 
 
 def twin_parts() -> list[Base]:
-    friction = {"twin_id": TWIN, "effect": "coulomb_friction"}
+    friction = {"twin_id": TWIN, "effect": "coulomb_friction", "name": "Fc", "unit": "N m"}
+    standby = {"twin_id": TWIN, "effect": "standby_power", "name": "P0", "unit": "W", "robot_id": rows.ROBOT}
+    base = {"twin_id": TWIN, "number": 1, "combination": "Ia joint_a1 + Izz link_1", "unit": "kg m^2"}
+    of_joint = f"{TWIN}.coulomb_friction.joint_a1.Fc"
     return [
-        TwinEffect(**friction),
-        ParameterRow(
-            parameter_id=f"{TWIN}.coulomb_friction.joint_a1.Fc",
-            **friction,
-            **JOINT,
-            name="Fc",
-            value=7.25,
-            unit="N m",
-            lower=7.0,
-            upper=7.5,
-        ),
-        BaseParameterRow(
-            twin_id=TWIN,
-            number=1,
-            combination="Ia joint_a1 + Izz link_1",
-            value=1.5,
-            unit="kg m^2",
-            lower=1.0,
-            upper=2.0,
-        ),
-        ParameterRow(
-            parameter_id=f"{TWIN}.standby_power.robot.P0",
-            twin_id=TWIN,
-            robot_id=rows.ROBOT,
-            effect="standby_power",
-            name="P0",
-            value=80.0,
-            unit="W",
-        ),
+        TwinEffect(twin_id=TWIN, effect="coulomb_friction"),
+        ParameterRow(parameter_id=of_joint, **friction, **JOINT, value=7.25, lower=7.0, upper=7.5),
+        BaseParameterRow(**base, value=1.5, lower=1.0, upper=2.0),
+        ParameterRow(parameter_id=f"{TWIN}.standby_power.robot.P0", **standby, value=80.0),
         TorqueFit(twin_id=TWIN, run_id=WORK, part="fit", **JOINT, rmse_nm=1.5, r_squared=0.98),
     ]
 

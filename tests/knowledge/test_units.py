@@ -9,12 +9,11 @@ from pyoxigraph import RdfFormat, Store
 from sqlalchemy.orm import Session
 from tests import rows
 from tests.effects.test_effect import units as of_parameters
+from tests.mapped import map_into, ontology_graph
 from tests.synthetic import arm, with_constants
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.resources import folder
 from irtwin.signals.channels import CHANNELS
 from irtwin.storage import structure_schema as structure
@@ -38,21 +37,13 @@ def known() -> dict[str, str]:
 
 def mapped(folder_: Path, symbols: list[str]) -> KnowledgeGraph:
     """Return the graph of a robot with a channel and a parameter of each unit."""
-    graph = KnowledgeGraph()
-    graph.load_ontology()
     with Workspace(folder_) as workspace:
         workspace.ingest(*rows.data_set())
         with Session(workspace.engine) as session, session.begin():
             session.add_all(channel(number, unit) for number, unit in enumerate(symbols))
-        workspace.replace_activity(
-            rows.activity("twin.1", "identification"),
-            [],
-            [*rows.twin(TWIN), *(parameter(number, unit) for number, unit in enumerate(symbols))],
-            documents={f"twins/{TWIN}.json": b"{}"},
-        )
+        rows.identify(workspace, TWIN, parts=[parameter(number, unit) for number, unit in enumerate(symbols)])
         documents = [folder("mappings") / f"{name}.r2rml.ttl" for name in ("units", "twin", "robot_structure")]
-        graph.replace(map_database(workspace.engine, documents), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    return graph
+        return map_into(ontology_graph(), workspace, documents)
 
 
 def channel(number: int, unit: str) -> structure.DeviceChannel:

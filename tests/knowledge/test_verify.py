@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from tests import rows
+from tests.mapped import MAPPINGS
 
-from irtwin import resources
 from irtwin.cli.graph import explain
 from irtwin.knowledge.explain.provenance import told_in
 from irtwin.knowledge.mapping import refresh
@@ -47,14 +47,12 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with Workspace(place / "w") as workspace, KnowledgeGraph(workspace.graph_folder) as graph:
         workspace.ingest(robot, [*joints, *files], runs, series)
         read = inputs(workspace, rows.ROBOT, [RUN])
-        made = rows.activity("identification.1", "identification")
-        workspace.replace_activity(made, read, rows.twin(TWIN), documents={f"twins/{TWIN}.json": b"{}"})
+        rows.identify(workspace, TWIN, read)
         energy = rows.activity("energy.1", "energy", run_iri(RUN))
         meter = rows.activity("meter.1", "meter", run_iri(RUN)), [one for one in read if one.startswith("series/")]
         workspace.replace_activity(energy, [*read, twin_iri(TWIN)], rows.run_energy(TWIN), metered=meter)
         graph.load_ontology()
-        documents = sorted(resources.folder("mappings").glob("*.r2rml.ttl"))
-        refresh(graph, workspace.engine, documents, workspace.mapped_rows)
+        refresh(graph, workspace.engine, MAPPINGS, workspace.mapped_rows)
     return place
 
 

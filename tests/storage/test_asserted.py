@@ -48,10 +48,7 @@ def test_a_kept_fact_changes_its_row_and_makes_the_data_set_one_to_fit_anew(tmp_
     robot, parts, runs, series = rows.data_set()
     with Workspace(tmp_path) as place:
         place.ingest(robot, parts, runs, series)
-        place.replace_activity(
-            rows.activity("t.1", "identification"), [], rows.twin(f"{rows.ROBOT}.t"),
-            documents={f"twins/{rows.ROBOT}.t.json": b"{}"},
-        )  # fmt: skip
+        rows.identify(place, f"{rows.ROBOT}.t")
         before = next(run for run in runs if run.run_id == WORK).payload_kg
         place.keep_facts([fact("5.5", str(before))], [])
         with place.reading() as session:

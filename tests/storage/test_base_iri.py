@@ -19,11 +19,6 @@ from irtwin.storage.database import Workspace
 PLANT = "https://plant.example/energy/"
 
 
-def fill(place: Workspace) -> None:
-    robot, joints, runs, series = data_set()
-    place.ingest(robot, joints, runs, series)
-
-
 @pytest.mark.parametrize("base", [PLANT, ID, f"{ID}hall_1/", "http://127.0.0.1:7878/käfer/"])
 def test_a_base(base: str) -> None:
     assert base_iri.checked(base, "x") == base
@@ -59,7 +54,7 @@ def test_no_individual_lies_at_a_path_that_serve_has_for_itself(tmp_path: Path) 
 
 def test_it_is_kept(tmp_path: Path, database_url: str | None) -> None:
     with Workspace(tmp_path, database_url, base=PLANT) as place:
-        fill(place)
+        place.ingest(*data_set())
     with Workspace(tmp_path, database_url) as place:
         assert place.base == PLANT
     with Workspace(tmp_path, database_url, base=PLANT) as place:
@@ -78,7 +73,7 @@ def test_it_may_change_until_a_robot_is_there(tmp_path: Path, database_url: str 
     with Workspace(tmp_path, database_url) as place:
         assert place.base == ID
     with Workspace(tmp_path, database_url, base=PLANT) as place:
-        fill(place)
+        place.ingest(*data_set())
     for base in (ID, "https://plant.example/other/"):
         with pytest.raises(InputError, match=f"lie below {PLANT}.* cannot move to {base}"):
             Workspace(tmp_path, database_url, base=base)

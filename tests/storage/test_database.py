@@ -39,15 +39,10 @@ def state(workspace: Workspace) -> dict[str, object]:
 def populate(workspace: Workspace) -> None:
     workspace.ingest(*rows.data_set())
     workspace.replace_activity(rows.activity("state.1", "run_state", "run"), ["series"], rows.run_state())
-    identify(workspace, "twin.1", TWIN)
+    rows.identify(workspace, TWIN, ["runs"])
     workspace.replace_activity(
         rows.activity("energy.1", "energy"), ["twin"], rows.run_energy(TWIN), series={WORK: rows.samples(9)}
     )
-
-
-def identify(workspace: Workspace, activity: str, twin: str) -> None:
-    by = rows.activity(activity, "identification")
-    workspace.replace_activity(by, ["runs"], rows.twin(twin), documents={f"twins/{twin}.json": b"{}"})
 
 
 def another_robot() -> rows.DataSet:
@@ -157,7 +152,7 @@ def test_what_an_activity_read_is_named_below_the_base_and_a_run_informed_it(wor
 def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace) -> None:
     populate(workspace)
     assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))
-    identify(workspace, "twin.2", OTHER)
+    rows.identify(workspace, OTHER, name="twin.2")
     with workspace.reading() as session:
         assert session.scalars(select(TwinRow.twin_id)).all() == [OTHER]
         assert session.scalars(select(RunEnergy)).all() == []

@@ -73,8 +73,7 @@ def digest() -> str:
 
 def older(place: Workspace) -> None:
     """Ingest a data set, and make the tables those before LATER."""
-    robot, joints, runs, series = data_set()
-    place.ingest(robot, joints, runs, series)
+    place.ingest(*data_set())
     recreate = "always" if place.engine.dialect.name == "sqlite" else "never"
     with engines.writing(place.engine, restructuring=True) as session:
         connection = session.connection()
