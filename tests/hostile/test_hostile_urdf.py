@@ -1,4 +1,4 @@
-"""Robots' descriptions that are broken, too large, or meant to do harm."""
+"""Robots' descriptions that are broken, too large, or meant to do harm; other faults are in robot/test_urdf."""
 
 from __future__ import annotations
 
@@ -50,32 +50,20 @@ MALFORMED = {
     "attribute twice": ('<robot name="r" name="s"/>', "not well-formed XML"),
     "unknown prefix": ("<x:robot/>", "not well-formed XML"),
     "strange encoding": (f'<?xml version="1.0" encoding="utf-7"?>{GOOD}', "XML"),
-    "other root": ("<xacro/>", "not <robot>"),
-    "sdf": ("<sdf><model/></sdf>", "not <robot>"),
     "deep nesting": ("<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>", "has no link"),
     "deeper nesting": ("<robot>" + "<a>" * 500_000 + "</a>" * 500_000 + "</robot>", "has no link"),
     "a million attributes": ("<robot " + " ".join(f'a{n}=""' for n in range(300_000)) + "/>", "has no link"),
-    "no link": ('<robot name="r"/>', "has no link"),
     "link without a name": ("<robot><link/></robot>", 'a link has no "name"'),
-    "link twice": (GOOD.replace("<joint", LINK.format("a") + "<joint"), "two links are named"),
-    "no moving joint": (GOOD.replace("revolute", "fixed"), "no joint moves"),
     "joint without a name": (GOOD.replace('name="j"', ""), 'a joint has no "name"'),
-    "joint twice": (GOOD.replace("</robot>", f"{JOINT}</robot>"), "is defined twice"),
-    "unknown parent": (GOOD.replace('parent link="a"', 'parent link="x"'), "parent link .* is not defined"),
     "unknown child": (GOOD.replace('child link="b"', 'child link="x"'), "child link .* is not defined"),
     "loop": (GOOD.replace('child link="b"', 'child link="a"'), "loop|several bases"),
     "unknown type": (GOOD.replace("revolute", "teleport"), "cannot be modelled"),
-    "free joint": (GOOD.replace("revolute", "floating"), "cannot be modelled"),
-    "mimic": (GOOD.replace("</joint>", '<mimic joint="j"/></joint>'), 'mimics "j", which is no other joint'),
-    "no axis": (GOOD.replace("0 0 1", "0 0 0"), "axis is zero"),
     "short axis": (GOOD.replace("0 0 1", "0 1"), "3 finite numbers"),
-    "limits swapped": (GOOD.replace('lower="-1"', 'lower="3"'), "lies above"),
     "not a number": (GOOD.replace('lower="-1"', 'lower="nan"'), "finite number"),
     "infinite": (GOOD.replace('velocity="1"', 'velocity="inf"'), "finite number"),
     "beyond a double": (GOOD.replace('effort="1"', 'effort="1e999"'), "finite number"),
     "code for a number": (GOOD.replace('mass value="1"', 'mass value="__import__(1)"'), "finite number"),
     "no mass": (GOOD.replace('mass value="1"', "mass"), "finite number"),
-    "negative mass": (GOOD.replace('mass value="1"', 'mass value="-1"'), "negative mass"),
     "mass beyond a double": (GOOD.replace('mass value="1"', 'mass value="1e999"'), "finite number"),
     "negative inertia": (GOOD.replace('ixx="1"', 'ixx="-5"'), "inertia"),
     "inertia that is no number": (GOOD.replace('ixx="1"', 'ixx="x"'), "inertia"),
@@ -116,13 +104,12 @@ def test_what_is_no_file(refused: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "latin").write_bytes('<robot name="é"/>'.encode("latin-1"))
     (tmp_path / "wide").write_bytes(GOOD.encode("utf-16"))
     (tmp_path / "round").symlink_to(tmp_path / "round")
-    assert "is not a file" in refused("urdf", str(tmp_path), "pipe")
-    assert "is not a file" in refused("urdf", str(tmp_path), "/dev/zero")
-    assert "is not a file" in refused("urdf", str(tmp_path), ".")
-    assert "is larger than" in refused("urdf", str(tmp_path), "large")
-    assert "not UTF-8 text" in refused("urdf", str(tmp_path), "bytes")
-    assert "not UTF-8 text" in refused("urdf", str(tmp_path), "latin")
-    assert "not UTF-8 text" in refused("urdf", str(tmp_path), "wide")
-    assert "cannot be read" in refused("urdf", str(tmp_path), "round")
-    assert "cannot be read" in refused("urdf", str(tmp_path), "none")
-    assert "is not a file name" in refused("urdf", str(tmp_path), "no\0ne")
+    for said, names in {
+        "is not a file": ("pipe", "/dev/zero", "."),
+        "is larger than": ("large",),
+        "not UTF-8 text": ("bytes", "latin", "wide"),
+        "cannot be read": ("round", "none"),
+        "is not a file name": ("no\0ne",),
+    }.items():
+        for name in names:
+            assert said in refused("urdf", str(tmp_path), name)
