@@ -31,13 +31,18 @@ def person(objects: str, subject: str = SUBJECT, table: str = 'rr:tableName "per
     return f"<#P> rr:logicalTable [ {table} ] ; {subject} ; rr:predicateObjectMap [ rr:predicate ex:p ; {objects} ] ."
 
 
-def mapped(folder: Path, mapping: str, sql: str = PEOPLE, base_iri: str | None = None) -> set[str]:
+def written(folder: Path, mapping: str, sql: str = PEOPLE) -> tuple[str, Path]:
+    """Write a database and a mapping document; return the URL of the one and the other."""
     with sqlite3.connect(folder / "a.db") as connection:
         connection.executescript(sql)
     document = folder / "a.r2rml.ttl"
     document.write_text(PREFIXES + mapping)
-    engine = open_engine(f"sqlite:///{folder}/a.db")
-    return {str(quad) for quad in map_database(engine, [document], base_iri)}
+    return f"sqlite:///{folder}/a.db", document
+
+
+def mapped(folder: Path, mapping: str, sql: str = PEOPLE, base_iri: str | None = None) -> set[str]:
+    url, document = written(folder, mapping, sql)
+    return {str(quad) for quad in map_database(open_engine(url), [document], base_iri)}
 
 
 def objects(folder: Path, object_map: str, sql: str = PEOPLE) -> set[str]:
@@ -116,18 +121,16 @@ def test_declared_types_reach_through_a_query(tmp_path: Path) -> None:
 def test_a_table_that_changed_is_looked_at_again(tmp_path: Path) -> None:
     mapping = person('rr:objectMap [ rr:column "v" ]')
     for declared, expected in (("INTEGER", '"1"^^<http://www.w3.org/2001/XMLSchema#integer>'), ("TEXT", '"1"')):
-        sql = (
-            f"DROP TABLE IF EXISTS person; CREATE TABLE person (id, v {declared}); INSERT INTO person VALUES (1, '1');"
-        )
-        (quad,) = mapped(tmp_path, mapping, sql)
+        made = f"CREATE TABLE person (id, v {declared}); INSERT INTO person VALUES (1, '1');"
+        (quad,) = mapped(tmp_path, mapping, f"DROP TABLE IF EXISTS person; {made}")
         assert quad.endswith(expected)
 
 
 def test_a_document_that_is_gone_is_missed(tmp_path: Path) -> None:
-    mapped(tmp_path, person("rr:object ex:o"))
-    (tmp_path / "a.r2rml.ttl").unlink()
+    url, document = written(tmp_path, person("rr:object ex:o"))
+    document.unlink()
     with pytest.raises(InputError, match=r"a\.r2rml\.ttl"):
-        list(map_database(open_engine(f"sqlite:///{tmp_path}/a.db"), [tmp_path / "a.r2rml.ttl"]))
+        list(map_database(open_engine(url), [document]))
 
 
 def test_a_query_may_hold_percent_colon_and_semicolon(tmp_path: Path) -> None:
@@ -177,29 +180,23 @@ def test_relative_iris_lie_below_the_base(tmp_path: Path) -> None:
 def test_rows_are_read_as_they_are_needed(tmp_path: Path) -> None:
     """A million rows behind the first few quads cost nothing."""
     sql = "CREATE VIEW many AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id FROM n;"
-    with sqlite3.connect(tmp_path / "a.db") as connection:
-        connection.executescript(sql)
-    document = tmp_path / "a.ttl"
-    document.write_text(PREFIXES + person('rr:objectMap [ rr:column "id" ]', table='rr:tableName "many"'))
-    engine = open_engine(f"sqlite:///{tmp_path}/a.db")
+    url, document = written(tmp_path, person('rr:objectMap [ rr:column "id" ]', table='rr:tableName "many"'), sql)
+    engine = open_engine(url)
     first: list[Quad] = list(itertools.islice(map_database(engine, [document]), 12_000))
     assert first[-1].object.value == "12000"  # type: ignore[union-attr]
     engine.dispose()
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
-    with sqlite3.connect(tmp_path / "a.db") as connection:
-        connection.executescript(PEOPLE)
-    document, out = tmp_path / "a.ttl", tmp_path / "out.nq"
-    document.write_text(PREFIXES + person('rr:objectMap [ rr:column "name" ]'))
-    map_to_file(document, f"sqlite:///{tmp_path}/a.db", out)
+    (url, document), out = written(tmp_path, person('rr:objectMap [ rr:column "name" ]')), tmp_path / "out.nq"
+    map_to_file(document, url, out)
     assert len(list(parse(out.read_bytes(), RdfFormat.N_QUADS))) == 2
     before = out.read_bytes()
     document.write_text(PREFIXES + person('rr:objectMap [ rr:column "name" ; rr:termType rr:IRI ]'))
     with pytest.raises(InputError, match="makes no valid IRI"):
-        map_to_file(document, f"sqlite:///{tmp_path}/a.db", out)
+        map_to_file(document, url, out)
     assert out.read_bytes() == before
-    assert {file.name for file in tmp_path.iterdir()} == {"a.db", "a.ttl", "out.nq"}
+    assert {file.name for file in tmp_path.iterdir()} == {"a.db", document.name, out.name}
 
 
 def test_where_to_write_must_exist(tmp_path: Path) -> None:
