@@ -39,6 +39,14 @@ def irtwin(*arguments: object) -> Said:
     return Said(status, out.getvalue(), err.getvalue())
 
 
+def refused(*arguments: object) -> str:
+    """Call the command line, which refuses, and return the one line that it says."""
+    said = irtwin(*arguments)
+    assert (said.status, said.out) == (2, ""), said
+    (line,) = said.err.splitlines()
+    return line
+
+
 def write(folder: Path, robot: Robot, runs: Iterable[Run], head: str = "", tail: str = "") -> Path:
     """Write runs as a data set; `head` goes into [robot], `tail` to the end of dataset.toml."""
     (folder / "runs").mkdir(parents=True)

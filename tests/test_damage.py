@@ -20,12 +20,12 @@ from irtwin.knowledge.mapping import refresh
 from irtwin.knowledge.store import snapshot
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.providers.records import ingest
-from irtwin.resources import folder as resource
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
 from irtwin.storage.schema import LIVE, Base
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, refused
+from tests.mapped import MAPPINGS
 from tests.small_robots import data_set
 from tests.trusting import trust_all
 
@@ -61,7 +61,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ingest(place, read_data_set(data_set(folder / name, name, seed=seed)))
         with KnowledgeGraph(place.graph_folder) as graph:
             graph.load_ontology()
-            refresh(graph, place.engine, sorted(resource("mappings").glob("*.r2rml.ttl")), place.mapped_rows)
+            refresh(graph, place.engine, MAPPINGS, place.mapped_rows)
     return folder / "workspace"
 
 
@@ -83,10 +83,7 @@ def asked(workspace: Path, question: str) -> str:
 
 
 def one_line(workspace: Path, *arguments: object) -> str:
-    said = irtwin(*arguments, "--workspace", workspace)
-    assert said.status == 2, said.out
-    (line,) = said.err.splitlines()
-    return line
+    return refused(*arguments, "--workspace", workspace)
 
 
 def tables(workspace: Path) -> list[Path]:
@@ -108,11 +105,8 @@ def test_a_damaged_table_of_the_graph_is_told_before_it_is_read(workspace: Path,
 def test_the_files_that_a_graph_begins_with(workspace: Path, pattern: str, damage: str) -> None:
     (file,) = (workspace / "graph").glob(pattern)
     DAMAGES[damage](file)
-    for command in (
-        ("query", COUNT),
-        ("workspace", "backup", workspace / "kept.zip"),
-        ("export", "--owl", workspace / "x.owl"),
-    ):
+    backup, export = ("workspace", "backup", workspace / "kept.zip"), ("export", "--owl", workspace / "x.owl")
+    for command in (("query", COUNT), backup, export):
         assert "`irtwin workspace repair --workspace" in one_line(workspace, *command)
 
 
@@ -134,12 +128,8 @@ def test_a_lost_graph_is_not_begun_anew_in_silence(workspace: Path) -> None:
 @pytest.mark.parametrize("damage", [each for each in DAMAGES if each != "flipped"])  # SQLite sums no contents
 def test_a_damaged_database_is_told(workspace: Path, damage: str) -> None:
     DAMAGES[damage](workspace / "irtwin.db")
-    for command in (
-        ("workspace", "repair"),
-        ("workspace", "backup", workspace / "kept.zip"),
-        ("workspace", "drop", "First"),
-    ):
-        assert "`irtwin workspace restore ARCHIVE --workspace NEW`" in one_line(workspace, *command)
+    for command in (("repair",), ("backup", workspace / "kept.zip"), ("drop", "First")):
+        assert "`irtwin workspace restore ARCHIVE --workspace NEW`" in one_line(workspace, "workspace", *command)
     assert asked(workspace, NAMES)  # the graph is whole
 
 
@@ -156,7 +146,7 @@ def test_damaged_remembered_rows_are_made_anew(made: Path, workspace: Path, dama
     with Workspace(workspace) as place:
         place.drop_robot("First")
         with KnowledgeGraph.of_workspace(place) as graph:
-            refresh(graph, place.engine, sorted(resource("mappings").glob("*.r2rml.ttl")), place.mapped_rows)
+            refresh(graph, place.engine, MAPPINGS, place.mapped_rows)
     assert asked(workspace, NAMES).split() == ["name", "Second", "arm"]
 
 
@@ -250,7 +240,6 @@ def test_a_row_that_leads_outside_removes_nothing_there(workspace: Path, tmp_pat
             if "robot_id" in table.columns:
                 database.execute(f"UPDATE {table.name} SET robot_id = '../../mine' WHERE robot_id = 'First'")
         database.commit()
-    said = irtwin("workspace", "drop", "First", "--workspace", workspace)
-    assert said.status == 2
-    assert "a row of table robot was changed by another program: robot_id '../../mine'" in said.err
+    changed = "a row of table robot was changed by another program: robot_id '../../mine'"
+    assert changed in one_line(workspace, "workspace", "drop", "First")
     assert (tmp_path / "mine.html").read_text() == (tmp_path / "mine.run.journal").read_text() == "mine"

@@ -20,14 +20,14 @@ from irtwin.location import Location
 from irtwin.planning.plan import Task
 from irtwin.providers.records import ingest
 from irtwin.rewriting import rewriting
-from irtwin.signals.channels import from_columns
+from irtwin.signals.channels import Signals, csv_text, from_columns
 from irtwin.signals.log import Run, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
 from tests import data_sets
-from tests.data_sets import Said, irtwin
+from tests.data_sets import Said, irtwin, refused
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 pytestmark = pytest.mark.slow
@@ -44,7 +44,8 @@ def recorded() -> list[Run]:
 
 def carried_out(file: Path) -> Run:
     """The run of a robot that does what a planned motion's file says, and stands for a second before and after."""
-    signals = from_columns({name: column.to_numpy() for name, column in _columns(file)}, ROBOT.joint_names)
+    table = pq.read_table(file)
+    signals = from_columns({name: table[name].to_numpy() for name in table.column_names}, ROBOT.joint_names)
     step = signals.time[1] - signals.time[0]
     still = round(1.0 / step)
     q = np.concatenate([np.repeat(signals.q[:1], still, 0), signals.q, np.repeat(signals.q[-1:], still, 0)])
@@ -54,13 +55,15 @@ def carried_out(file: Path) -> Run:
     return as_run(measure(ROBOT, done, noise=0.02))
 
 
-def _columns(file: Path):
-    table = pq.read_table(file)
-    return zip(table.column_names, table.columns, strict=True)
-
-
-def write(folder: Path, runs: list[Run], more: str = "") -> Path:
-    return data_sets.write(folder, ROBOT, runs, tail=f"{more}\n{EFFECTS}")
+def write(folder: Path, runs: list[Run], changes: dict[str, str] | None = None) -> Path:
+    """Write a data set in whose text, but for its twin, some is said otherwise."""
+    logs = data_sets.write(folder, ROBOT, runs, tail=EFFECTS)
+    toml = (logs / "dataset.toml").read_text()
+    for before, after in (changes or {}).items():
+        assert before in toml
+        toml = toml.replace(before, after, 1)
+    (logs / "dataset.toml").write_text(toml)
+    return logs
 
 
 @pytest.fixture(scope="module")
@@ -76,12 +79,12 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Said]:
 def performed(kept: tuple[Path, Said]) -> Path:
     """The workspace after the robot carried the plan out; its data set has a plan of its own."""
     folder, _ = kept
-    logs = write(folder / "logs_2", [*recorded(), carried_out(folder / "reach.parquet")])
-    toml = (logs / "dataset.toml").read_text()
-    toml = toml.replace('file = "runs/done.parquet"', 'file = "runs/done.parquet"\nperforms = "reach"')
-    (logs / "runs" / "later.parquet").write_bytes((folder / "reach.parquet").read_bytes())
-    toml = toml.replace("[twin]", '[[run]]\nfile = "runs/later.parquet"\nrole = "planned"\n\n[twin]')
-    (logs / "dataset.toml").write_text(toml)
+    changes = {
+        'file = "runs/done.parquet"': 'file = "runs/done.parquet"\nperforms = "reach"',
+        "[twin]": '[[run]]\nfile = "runs/later.parquet"\nrole = "planned"\n\n[twin]',
+    }
+    logs = write(folder / "logs_2", [*recorded(), carried_out(folder / "reach.parquet")], changes)
+    shutil.copy(folder / "reach.parquet", logs / "runs" / "later.parquet")
     workflow.run(logs, folder / "workspace")
     return folder / "workspace"
 
@@ -138,14 +141,9 @@ def test_what_is_planned_is_in_no_sum(performed: Path) -> None:
     assert total["runs"] == len(measured) == 4
     assert total["energy"] == pytest.approx(sum(row["energy_Wh"] for row in measured) * 3600)
     assert total["time"] == pytest.approx(sum(row["time_s"] for row in measured))
-    assert not list(
-        asking.ask(
-            """SELECT * { ?run a irt:Planned_Run { ?run irt:Energy_Consumption ?x } UNION { ?run irt:Idle_Share ?x }
-            UNION { ?of irt:of_Run ?run } UNION { ?twin irt:fitted_on ?run } UNION { ?twin irt:fails_on ?run } UNION
-            { ?total irt:last_Run ?run } UNION { ?run irt:Start_Time ?x } }""",
-            performed,
-        )
-    )
+    summed = """SELECT * { ?run a irt:Planned_Run { ?run irt:Energy_Consumption|irt:Idle_Share|irt:Start_Time ?x } UNION
+        { ?x irt:of_Run|irt:fitted_on|irt:fails_on|irt:last_Run ?run } }"""
+    assert not list(asking.ask(summed, performed))
 
 
 def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
@@ -159,41 +157,26 @@ def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
     assert '"name":"reach","part":"planned"' in page
 
 
-def refused(said: Said) -> str:
-    assert said.status == 2
-    assert said.out == ""
-    (line,) = said.err.splitlines()
-    return line
-
-
 def test_bad_plans_are_told_and_nothing_is_kept(performed: Path, tmp_path: Path) -> None:
     before = list(asking.ask("planned_runs", performed))
     here = ("--workspace", performed)
-    assert 'no robot "arm_3" here; the nearest is "arm_2"' in refused(irtwin("plan", "arm_3", *GOAL, *here))
-    taken = refused(irtwin("plan", "arm_2", *GOAL, *here, "--run", "Reach"))
+    assert 'no robot "arm_3" here; the nearest is "arm_2"' in refused("plan", "arm_3", *GOAL, *here)
+    taken = refused("plan", "arm_2", *GOAL, *here, "--run", "Reach")
     assert taken.endswith('the robot has a run "reach" already; choose another name')
-    assert "outside its limits" in refused(irtwin("plan", "arm_2", "--from", "0,0", "--to", "3,0", *here))
-    assert "give 2 joint positions" in refused(irtwin("plan", "arm_2", "--from", "0,0,0", "--to", "1,0,0", *here))
-    other = swing(arm(3), 1, seconds=2.0)
-    file = tmp_path / "other.csv"
-    names = ["time", *(f"q_joint_{k}" for k in (1, 2, 3))]
-    np.savetxt(file, np.column_stack([other.time, other.q]), delimiter=",", header=",".join(names), comments="")
-    assert 'no moving joint "joint_3"' in refused(irtwin("predict", "arm_2", file, *here))
-    fast = replace(other, time=other.time / 8)
-    np.savetxt(
-        file, np.column_stack([fast.time, fast.q[:, :2]]), delimiter=",", header=",".join(names[:3]), comments=""
-    )
-    assert "above its limit" in refused(irtwin("predict", "arm_2", file, *here))
-    torn = np.flatnonzero((other.time < 0.5) | (other.time > 1.5))
-    rows = np.column_stack([other.time, other.q[:, :2]])[torn]
-    np.savetxt(file, rows, delimiter=",", header=",".join(names[:3]), comments="")
-    out = tmp_path / "torn.parquet"
-    assert "has a hole in time" in refused(irtwin("predict", "arm_2", file, *here, "--out", out))
+    assert "outside its limits" in refused("plan", "arm_2", "--from", "0,0", "--to", "3,0", *here)
+    assert "give 2 joint positions" in refused("plan", "arm_2", "--from", "0,0,0", "--to", "1,0,0", *here)
+    other, file, out = swing(arm(3), 1, seconds=2.0), tmp_path / "other.csv", tmp_path / "torn.parquet"
+    predict = ("predict", "arm_2", file)
+    file.write_text(csv_text(Signals(other.time, other.q), ("joint_1", "joint_2", "joint_3")))
+    assert 'no moving joint "joint_3"' in refused(*predict, *here)
+    file.write_text(csv_text(Signals(other.time / 8, other.q[:, :2]), ROBOT.joint_names))
+    assert "above its limit" in refused(*predict, *here)
+    torn = Signals(other.time, other.q[:, :2]).rows(np.flatnonzero((other.time < 0.5) | (other.time > 1.5)))
+    file.write_text(csv_text(torn, ROBOT.joint_names))
+    assert "has a hole in time" in refused(*predict, *here, "--out", out)
     assert not out.exists()
-    assert "--workspace FOLDER" in refused(irtwin("predict", "arm_2", file))
-    assert "give --workspace FOLDER too" in refused(
-        irtwin("predict", "arm_2", file, "--run", "x", "--out", tmp_path / "x")
-    )
+    assert "--workspace FOLDER" in refused(*predict)
+    assert "give --workspace FOLDER too" in refused(*predict, "--run", "x", "--out", tmp_path / "x")
     assert list(asking.ask("planned_runs", performed)) == before
 
 
@@ -205,7 +188,7 @@ def also_priced(performed: Path, tmp_path_factory: pytest.TempPathFactory) -> tu
     log = performed.parent / "logs_2" / "runs" / "done.parquet"
     live = ("live", "--replay", log, "--robot", "arm_2", "--speed", 1000, "--workspace", workspace)
     for plan, said in (("reech", 'no planned run "reech"; the nearest is "reach"'), ("done", 'no planned run "done"')):
-        assert said in refused(irtwin(*live, "--performs", plan))
+        assert said in refused(*live, "--performs", plan)
     ended = irtwin(*live, "--performs", "reach")
     assert ended.status == 0, ended.err
     reach = performed.parent / "reach.parquet"
@@ -261,7 +244,7 @@ def test_one_run_is_dropped_and_the_others_stay(watched: Path) -> None:
         ("reach", 'carried out "reach"'),
         ("rech", 'the robot has no run "rech"; the nearest is "reach"'),
     ):
-        assert said in refused(irtwin(*here, name))
+        assert said in refused(*here, name)
     before, files = told(watched), len(list((watched / "series").iterdir()))
     for name in ("laden", live):
         gone = irtwin(*here, name)
@@ -286,46 +269,33 @@ def told(workspace: Path) -> set[str]:
 
 
 def test_a_robot_without_a_twin_prices_nothing(tmp_path: Path) -> None:
-    with Workspace(tmp_path):
-        pass
+    Workspace(tmp_path).close()
     with pytest.raises(InputError, match='no robot "arm_2" here'):
         plans.plan("arm_2", Task(np.zeros(2), np.ones(2)), Location(tmp_path), name="x")
 
 
-def toml_with(folder: Path, text: str) -> Path:
-    logs = write(folder / "logs", recorded())
-    toml = (logs / "dataset.toml").read_text()
-    (logs / "dataset.toml").write_text(toml.replace("[[run]]\n", f"[[run]]\n{text}\n", 1))
-    return logs
-
-
-def test_a_plan_that_nobody_made_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r'run "swing_1" performs = "nothing", which is no planned run, here or in'):
-        workflow.run(toml_with(tmp_path, 'performs = "nothing"'), tmp_path / "workspace")
-
-
-def test_performs_names_a_plan_not_another_run(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r'run "swing_1" performs = "swing_2", which is not a planned run'):
-        read_data_set(toml_with(tmp_path, 'performs = "swing_2"'))
+def role(run: str, said: str) -> dict[str, str]:
+    file = f'file = "runs/{run}.parquet"\nrole = '
+    return {f'{file}"observed"': f'{file}"{said}"'}
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"swing_1": "planned", "swing_2": "planned", "swing_3": "planned"}, "every run is planned"),
-        ({"swing_1": "plan"}, 'role = "plan"; use observed, reference, simulated, planned'),
+        ({"[[run]]": '[[run]]\nperforms = "swing_2"'}, '"swing_1" performs = "swing_2", which is not a planned run'),
+        (role("swing_1", "planned") | role("swing_2", "planned") | role("swing_3", "planned"), "every run is planned"),
+        (role("swing_1", "plan"), 'role = "plan"; use observed, reference, simulated, planned'),
     ],
 )
-def test_roles_of_plans_are_checked(tmp_path: Path, changes: dict[str, str], said: str) -> None:
-    logs = write(tmp_path / "logs", recorded())
-    toml = (logs / "dataset.toml").read_text()
-    for name, role in changes.items():
-        before = f'file = "runs/{name}.parquet"\nrole = "observed"'
-        assert before in toml
-        toml = toml.replace(before, f'file = "runs/{name}.parquet"\nrole = "{role}"')
-    (logs / "dataset.toml").write_text(toml)
+def test_what_a_data_set_says_of_plans_is_checked(tmp_path: Path, changes: dict[str, str], said: str) -> None:
     with pytest.raises(InputError, match=re.escape(said)):
-        read_data_set(logs)
+        read_data_set(write(tmp_path / "logs", recorded(), changes))
+
+
+def test_a_plan_that_nobody_made_is_told(tmp_path: Path) -> None:
+    logs = write(tmp_path / "logs", recorded(), {"[[run]]": '[[run]]\nperforms = "nothing"'})
+    with pytest.raises(InputError, match=r'run "swing_1" performs = "nothing", which is no planned run, here or in'):
+        workflow.run(logs, tmp_path / "workspace")
 
 
 def test_a_plan_has_no_hole_and_is_repeated_by_nobody(tmp_path: Path) -> None:
@@ -353,9 +323,8 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
     here = ("--workspace", performed, "--out", out, "--run", "slower")
     said = irtwin("optimise", "arm_2", "done", "--cycle", 6, "--base", *here)
     assert said.status == 0, said.err
-    assert (
-        "no place of the base up to 0.3 m beside saves anything" in said.out
-    )  # two joints cannot follow from elsewhere
+    # two joints cannot follow from elsewhere
+    assert "no place of the base up to 0.3 m beside saves anything" in said.out
     *others, last = said.out.splitlines()
     (row,) = asking.ask("retimed_motions", performed)
     assert (row["run"], row["plan"]) == ("done", "slower")
@@ -367,15 +336,8 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
     assert any(line.startswith("move from ") and line.endswith(" times as long") for line in others)
     times = np.loadtxt(out, delimiter=",", skiprows=1)[:, 0]
     assert times[-1] - times[0] == pytest.approx(6.0, abs=0.01)
-    energies = {
-        one["run"]: one
-        for one in asking.ask(
-            "SELECT ?run ?j ?s { ?any irt:Run_Name ?run ; irt:Run_Time ?s "
-            "OPTIONAL { ?any irt:Planned_Energy ?p } OPTIONAL { ?any irt:Modelled_Energy ?m } "
-            "BIND(COALESCE(?p, ?m) AS ?j) }",
-            performed,
-        )
-    }
+    asked = "SELECT ?run ?j ?s { ?any irt:Run_Name ?run ; irt:Run_Time ?s ; irt:Planned_Energy|irt:Modelled_Energy ?j }"
+    energies = {one["run"]: one for one in asking.ask(asked, performed)}
     quick, slower = energies["done"], energies["slower"]
     assert row["times_longer"] == pytest.approx(slower["s"] / quick["s"], rel=1e-3)
     twin = plans.robot_twin("arm_2", Location(performed))

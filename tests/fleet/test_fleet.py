@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from tests import data_sets, small_robots
+from tests.fleet.test_batch import batch_of
 
 from irtwin.errors import InputError
 from irtwin.fleet import fleet
-from irtwin.fleet.batch import Batch, key
+from irtwin.fleet.batch import key
 from irtwin.fleet.fleet import batches_of
 
 pytestmark = pytest.mark.slow
@@ -77,12 +78,9 @@ def test_a_fleet_has_one_base_of_iris(robots: Path, out: Path) -> None:
     places = [batch.folder / "workspace" for batch in batches_of(out)]
     said = [data_sets.irtwin("query", asked, "--workspace", place).out for place in places if place.is_dir()]
     assert said and all(lines.count(f"{BASE}robot/") == 2 for lines in said)
-    other = data_sets.irtwin("run", robots, "--out", out)
-    assert other.status == 2
-    assert f"the IRIs of this fleet begin with {BASE}; give --base {BASE}, or another --out" in other.err
-    none = data_sets.irtwin("run", robots, "--out", out, "--base", "plant")
-    assert none.status == 2
-    assert none.err.startswith("irtwin: --base: ")
+    other = f"the IRIs of this fleet begin with {BASE}; give --base {BASE}, or another --out"
+    assert other in data_sets.refused("run", robots, "--out", out)
+    assert data_sets.refused("run", robots, "--out", out, "--base", "plant").startswith("irtwin: --base: ")
 
 
 def test_status_says_what_became_of_each(out: Path) -> None:
@@ -92,45 +90,31 @@ def test_status_says_what_became_of_each(out: Path) -> None:
 
 
 def test_a_folder_is_of_one_kind(robots: Path, out: Path) -> None:
-    said = data_sets.irtwin("diagnose", robots, "--out", out)
-    assert said.status == 2
-    assert "holds a fleet of `run`; give `diagnose` a folder of its own" in said.err
+    said = data_sets.refused("diagnose", robots, "--out", out)
+    assert "holds a fleet of `run`; give `diagnose` a folder of its own" in said
 
 
 def test_a_folder_of_data_sets_alone_is_told_how_all_are_taken(robots: Path) -> None:
     said = data_sets.irtwin("run", robots)
-    assert (
-        said.status == 2
-        and f"{robots}: holds data sets, and is none itself; name one, or take all by --out" in said.err
-    )
-
-
-def batches(folder: Path, *members: tuple[str, ...]) -> list[Batch]:
-    for name in (name for names in members for name in names):
-        (folder / name).mkdir()
-        (folder / name / "dataset.toml").write_text(name)
-    return [
-        Batch.create(folder / "out" / f"b{k}", "diagnose", [str(folder / name) for name in names])
-        for k, names in enumerate(members)
-    ]
+    assert said.status == 2
+    assert f"{robots}: holds data sets, and is none itself; name one, or take all by --out" in said.err
 
 
 def test_a_process_that_dies_costs_the_data_set_that_it_died_of(tmp_path: Path) -> None:
-    (batch,) = batches(tmp_path, ("a", "large", "b"))
+    batch = batch_of(tmp_path, "a", "large", "b")
     fleet.work_through([batch], 2, lambda batch: None, DIES)
     assert [record.state if record else "" for record in batch.records()] == ["done", "failed", "done"]
 
 
 def test_a_process_that_never_begins_is_not_tried_for_ever(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="its process ended with status 7 and left no record"):
-        fleet.work_through(
-            batches(tmp_path, ("a",)), 1, lambda batch: None, (sys.executable, "-c", "raise SystemExit(7)")
-        )
+        never = (sys.executable, "-c", "raise SystemExit(7)")
+        fleet.work_through([batch_of(tmp_path, "a")], 1, lambda batch: None, never)
 
 
 @pytest.mark.parametrize("name", ["records", "records/a"])
 def test_a_folder_that_cannot_be_written_is_told_in_one_line(name: str, tmp_path: Path, capfd) -> None:
-    (batch,) = batches(tmp_path, ("a",))
+    batch = batch_of(tmp_path, "a")
     place = batch.folder / name.replace("/a", f"/{key(batch.sets.data_sets[0])}.json/x")
     if name == "records":
         place.write_text("a file in its place")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, refused
 from tests.trusting import trust_all
 
 from irtwin.errors import InputError
@@ -149,10 +149,8 @@ def test_what_is_sound_holds_beside_what_ships(tmp_path: Path) -> None:
 def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     put(tmp_path / "irtwin-workspace", "rules/my_rules.ttl", NO_QUERY)
-    done = irtwin(*command)
-    assert done.status == 2
-    assert done.err.startswith("irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL")
-    assert done.err.count("\n") == 1
+    said = "irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL"
+    assert refused(*command).startswith(said)
 
 
 @pytest.mark.parametrize(
@@ -166,9 +164,7 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
 def test_live_stops_at_a_fault_before_a_sample_is_read(name: str, text: str, tmp_path: Path) -> None:
     Workspace(tmp_path).close()
     file = put(tmp_path, name, text)
-    done = irtwin("live", "--workspace", tmp_path)
-    assert done.status == 2
-    assert done.err.startswith(f"irtwin: {file}, line ")
+    assert refused("live", "--workspace", tmp_path).startswith(f"irtwin: {file}, line ")
     assert not (tmp_path / "graph").exists()
 
 
