@@ -53,46 +53,41 @@ READERS: dict[str, Reader] = {
 }
 
 
-@pytest.fixture
-def put(tmp_path: Path) -> Callable[[str, bytes], Path]:
-    def put(name: str, content: bytes) -> Path:
-        file = tmp_path / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(content)
-        return file
-
-    return put
+def put(file: Path, content: bytes) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(content)
+    return file
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_text_that_is_not_utf8_is_said_with_line_and_byte(name: str, put: Callable[[str, bytes], Path]) -> None:
-    file = put(name, LATIN)
+def test_text_that_is_not_utf8_is_said_with_line_and_byte(name: str, tmp_path: Path) -> None:
+    file = put(tmp_path / name, LATIN)
     with pytest.raises(InputError) as refused:
         READERS[name](file)
     remedy = "name a twin that irtwin saved" if name == "twin.json" else "save it as UTF-8"
     assert str(refused.value) == f"{file}, line 2: not UTF-8 text (byte 9); {remedy}"
 
 
-def test_a_module_of_the_ontology_is_said_by_its_parser(put: Callable[[str, bytes], Path]) -> None:
-    file = put("ontology/mine.ttl", b"<urn:a> <urn:b>\n <urn:c\xe9> .\n")
+def test_a_module_of_the_ontology_is_said_by_its_parser(tmp_path: Path) -> None:
+    file = put(tmp_path / "ontology/mine.ttl", b"<urn:a> <urn:b>\n <urn:c\xe9> .\n")
     with pytest.raises(InputError, match=r"mine\.ttl, line 2: .*[Ii]nvalid UTF-8"):
         list(read_turtle(file))
 
 
-def test_a_command_ends_in_one_line(put: Callable[[str, bytes], Path]) -> None:
-    file = put("listed.txt", LATIN)
+def test_a_command_ends_in_one_line(tmp_path: Path) -> None:
+    file = put(tmp_path / "listed.txt", LATIN)
     done = irtwin("run", file, "--out", file.parent / "out")
     assert done.status == 2
     assert f"{file}, line 2: not UTF-8 text" in done.err
 
 
-def test_a_byte_order_mark_is_no_part_of_the_text(put: Callable[[str, bytes], Path]) -> None:
-    assert read_text(put("a", b"\xef\xbb\xbfa = 1"), 9) == "a = 1"
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
+    assert read_text(put(tmp_path / "a", b"\xef\xbb\xbfa = 1"), 9) == "a = 1"
 
 
-def test_what_is_too_large_or_no_file_is_not_read(put: Callable[[str, bytes], Path], tmp_path: Path) -> None:
+def test_what_is_too_large_or_no_file_is_not_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="larger than the 0 MB limit"):
-        read_text(put("a", b"12345"), 4)
+        read_text(put(tmp_path / "a", b"12345"), 4)
     os.mkfifo(tmp_path / "pipe")
     for name, said in (("pipe", "is not a file"), (".", "is not a file"), ("none", "cannot be read")):
         with pytest.raises(InputError, match=said):
