@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests import small_fleet
 from tests.individuals import individual
-from tests.knowledge.graphs import DRAWN, inferred, quad
+from tests.knowledge.graphs import DRAWN, inferred, quad, turtle
+from tests.mapped import ontology_graph
 
 from irtwin import rewriting
 from irtwin.alarms.alarm import alarms
@@ -20,7 +21,6 @@ from irtwin.knowledge.owl_rl.schema import Schema
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.vocabulary import (
     GRAPH_ACTIVITY,
     GRAPH_CHANGED,
@@ -35,7 +35,6 @@ from irtwin.knowledge.vocabulary import (
     XSD,
     term,
 )
-from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 
 TYPE = RDF + "type"
@@ -44,27 +43,19 @@ ROBOTS = ("r", "s")
 
 LIMIT = "https://w3id.org/irtwin/limit/idle_share"
 EFFECT = "https://w3id.org/irtwin/effect/copper_loss"
-ONTOLOGY = [
-    quad(subject, predicate, value, GRAPH_ONTOLOGY)
-    for subject, predicate, value in [
-        (term("IR_RunProcess"), TYPE, OWL + "Class"),
-        (term("exceeds"), RDFS + "domain", term("IR_RunProcess")),
-        (term("IR_RunProcess"), RDFS + "subClassOf", term("Process")),
-        (term("Joint_Energy"), TYPE, OWL + "Class"),
-        (term("has_RunProcess"), OWL + "inverseOf", term("run_of")),
-        (term("has_RunProcess"), TYPE, OWL + "InverseFunctionalProperty"),
-        (term("has_Joint"), TYPE, OWL + "InverseFunctionalProperty"),
-        (term("run_of"), TYPE, OWL + "FunctionalProperty"),
-        (term("Idle_Share"), RDFS + "range", XSD + "double"),
-        (term("Run_Name"), RDFS + "range", XSD + "string"),
-        (term("of_Run"), TYPE, OWL + "ObjectProperty"),
-        (term("Joint_Number"), RDFS + "range", XSD + "integer"),
-        (term("of_Effect"), RDFS + "range", term("Effect")),
-        (term("before"), TYPE, OWL + "TransitiveProperty"),
-        (EFFECT, TYPE, term("Effect")),
-        (LIMIT, term("Limit_Value"), Literal(0.5)),
-    ]
-]
+ONTOLOGY = list(
+    in_graph(
+        turtle(f"""
+        irt:IR_RunProcess a owl:Class ; rdfs:subClassOf irt:Process . irt:Joint_Energy a owl:Class .
+        irt:exceeds rdfs:domain irt:IR_RunProcess . irt:of_Effect rdfs:range irt:Effect . <{EFFECT}> a irt:Effect .
+        irt:has_RunProcess owl:inverseOf irt:run_of ; a owl:InverseFunctionalProperty .
+        irt:has_Joint a owl:InverseFunctionalProperty . irt:run_of a owl:FunctionalProperty .
+        irt:of_Run a owl:ObjectProperty . irt:before a owl:TransitiveProperty . irt:Idle_Share rdfs:range xsd:double .
+        irt:Run_Name rdfs:range xsd:string . irt:Joint_Number rdfs:range xsd:integer .
+        <{LIMIT}> irt:Limit_Value "0.5"^^xsd:double ."""),
+        GRAPH_ONTOLOGY,
+    )
+)
 
 
 def of_robot(robot: str) -> list[Quad]:
@@ -291,38 +282,17 @@ def test_nothing_is_noted_of_a_graph_that_was_never_reasoned_over() -> None:
     assert graph.graphs(GRAPH_CHANGED) == []
 
 
-def one_by_one(quads: list[Quad], ontology: list[Quad]) -> KnowledgeGraph:
-    """Return a graph that took in the quads in three goes, reasoned over after each."""
-    graph = KnowledgeGraph()
-    graph.replace(ontology, GRAPH_ONTOLOGY)
+@pytest.mark.slow
+def test_a_fleet_one_by_one(tmp_path: Path) -> None:
+    with Workspace(tmp_path) as place, KnowledgeGraph() as mapped:
+        small_fleet.fill(place)
+        rewriting.map_rows(place, mapped)
+        left = {one for one in mapped.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))}
+    graph = ontology_graph()
     reason(graph)
-    robots = sorted({one.subject.value for one in quads if one.object == NamedNode(term("Industrial_Robot"))})
-    left = set(quads)
-    for robot in [*(robot.rpartition("/")[2] for robot in robots), ""]:
+    for robot in (*small_fleet.JOINTS, ""):
         some = {one for one in left if robot in one.subject.value or robot in str(one.object)}
         graph.change((), some)
         left -= some
         assert reason(graph).joined_by is None
-    return graph
-
-
-@pytest.fixture(scope="module")
-def ontology() -> list[Quad]:
-    modules = sorted(folder("ontology").glob("*.ttl"))
-    return list(in_graph((triple for module in modules for triple in read_turtle(module)), GRAPH_ONTOLOGY))
-
-
-@pytest.mark.slow
-def test_two_robots_one_by_one(two_robots: list[Quad], ontology: list[Quad]) -> None:
-    graph = one_by_one(two_robots, ontology)
-    assert conclusions(graph) == as_one_part(graph)
-
-
-@pytest.mark.slow
-def test_a_fleet_one_by_one(tmp_path: Path, ontology: list[Quad]) -> None:
-    with Workspace(tmp_path) as place, KnowledgeGraph() as mapped:
-        small_fleet.fill(place)
-        rewriting.map_rows(place, mapped)
-        quads = [one for one in mapped.quads() if one.graph_name.value.startswith((GRAPH_SOURCE, GRAPH_ACTIVITY))]
-    graph = one_by_one(quads, ontology)
     assert conclusions(graph) == as_one_part(graph)

@@ -6,15 +6,15 @@ import random
 from pathlib import Path
 
 import pytest
-from pyoxigraph import Literal, NamedNode, Triple
 from tests import plants
+from tests.knowledge.graphs import turtle
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import ONTOLOGY, QUDT, RDF, UNIT, term
+from irtwin.knowledge.vocabulary import term
 from irtwin.resources import shipped
 
 KWH = 3.6e6
@@ -85,28 +85,14 @@ def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:
 
 
 def test_what_a_robot_takes_while_it_waits_has_one_last_digit_in_whatever_order_its_runs_come() -> None:
-    def irt(name: str) -> NamedNode:
-        return NamedNode(term(name))
-
-    robot, twin, parameter, effect = (
-        NamedNode(f"http://x/{name}") for name in ("robot", "twin", "parameter", "effect")
-    )
-    triples = [
-        Triple(robot, NamedNode(f"{RDF}type"), irt("Industrial_Robot")),
-        Triple(parameter, irt("parameter_of"), twin),
-        Triple(parameter, irt("of_Effect"), effect),
-        Triple(parameter, NamedNode(f"{QUDT}hasUnit"), NamedNode(f"{UNIT}W")),
-        Triple(parameter, irt("Parameter_Value"), Literal(50.3)),
-        Triple(effect, irt("has_Channel"), NamedNode(f"{ONTOLOGY}/channel/power")),
-        Triple(effect, irt("Acts_Per"), Literal("robot")),
-        Triple(effect, irt("Baseline"), Literal(True)),
-    ]
-    rng = random.Random(0)
-    for number in range(40):
-        run = NamedNode(f"http://x/run{number}")
-        triples += [Triple(run, irt("run_of"), robot), Triple(run, irt("modelled_by"), twin)]
-        names = ("Energy_Consumption", "Run_Time", "Idle_Share", "Standby_Energy")
-        triples += [Triple(run, irt(name), Literal(rng.random())) for name in names]
+    rng, numbers = random.Random(0), ("Energy_Consumption", "Run_Time", "Idle_Share", "Standby_Energy")
+    said = """<robot> a irt:Industrial_Robot . <parameter> irt:parameter_of <twin> ; irt:of_Effect <effect> ;
+        qudt:hasUnit unit:W ; irt:Parameter_Value 50.3e0 .
+        <effect> irt:has_Channel <https://w3id.org/irtwin/channel/power> ; irt:Acts_Per "robot" ; irt:Baseline true ."""
+    for run in range(40):
+        drawn = " ; ".join(f"irt:{name} {rng.random():.16f}e0" for name in numbers)
+        said += f"<run{run}> irt:run_of <robot> ; irt:modelled_by <twin> ; {drawn} .\n"
+    triples = sorted(turtle(f"@base <http://x/> . {said}"), key=str)
     rules = read_rules(shipped().path("rules", "tariff_rules.ttl"))
     found = set()
     for _ in range(5):

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from sqlalchemy import select
+from tests.gap_cases import findings_of
 from tests.rows import keep
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
@@ -35,58 +36,35 @@ NOTHING = Curves(follows=(), runs=(), experiment=None)
 
 def diagnosis(**changes: Any) -> Document:
     evidence = {
-        "channel": "torque",
-        "share_of_what_is_closed": 1.0,
-        "closed_where_it_acts": 0.9,
-        "gain": 4.0,
-        "log_odds": 7.0,
-        "probability_of_rivals": {"stribeck_friction": 0.12, "payload": 0.01},
-        "runs": ["swing_3"],
+        "channel": "torque", "share_of_what_is_closed": 1.0, "closed_where_it_acts": 0.9, "gain": 4.0, "log_odds": 7.0,
+        "probability_of_rivals": {"stribeck_friction": 0.12, "payload": 0.01}, "runs": ["swing_3"],
         "window": [1.5, 2.5],
-    }
+    }  # fmt: skip
+    friction = {"name": "Fc", "joint": "joint_1", "value": 6.0, "unit": "Nm", "interval95": [5.9, 6.1]}
     cause = {
-        "id": "coulomb_friction@all",
-        "effect": "coulomb_friction",
-        "joints": ["joint_1", "joint_2"],
-        "scope": "missing",
-        "confidence": 0.97,
-        "parameters": [{"name": "Fc", "joint": "joint_1", "value": 6.0, "unit": "Nm", "interval95": [5.9, 6.1]}],
-        "indistinguishable_from": ["stribeck_friction"],
-        "evidence": evidence,
-    }
-    finding = {
-        "id": "friction@all",
-        "family": "friction",
-        "joints": ["joint_1", "joint_2"],
-        "scope": "missing",
-        "channel": "torque",
-        "confidence": 0.98,
-        "share": 0.9,
-        "share_interval95": [0.8, 1.0],
-        "share_of": "the gap above the floor",
-        "matters": True,
-        "members": [
-            {"cause": cause["id"], "effect": "coulomb_friction", "family": "friction", "confidence": 0.97},
-            {"cause": cause["id"], "effect": "stribeck_friction", "family": "friction", "confidence": 0.01},
-        ],
-    }
+        "id": "coulomb_friction@all", "effect": "coulomb_friction", "joints": ["joint_1", "joint_2"],
+        "scope": "missing", "confidence": 0.9, "parameters": [friction],
+        "indistinguishable_from": ["stribeck_friction"], "evidence": evidence,
+    }  # fmt: skip
     location = {"channel": "torque", "joint": "joint_1", "regime": None, "follows": None, "runs": ["swing_3"]}
     location |= {"share": 0.8, "share_interval95": [0.7, 0.9], "excess": 5.0, "excess_interval95": [4.0, 6.0]}
     said = {
         "verdict": "attributed",
         "robot": ROBOT,
-        "gap": {
-            "energy_error_percent": None,
-            "torque": {"joint_1": {"rmse": 3.0, "noise_floor": None, "excess": None}},
-        },
+        "gap": gap_of("joint_1"),
         "locations": [location | {"concentration": 1.0, "false_discovery_rate": 0.01}],
-        "findings": [finding],
+        "findings": findings_of([cause]),
         "causes": [cause],
         "not_testable": [{"effect": "payload", "why": "one payload only"}, {"effect": "payload", "why": "too short"}],
         "shrink": shrink(),
         "next_experiment": None,
     }
     return Document.from_json(said | changes)
+
+
+def gap_of(joint: str) -> dict[str, Any]:
+    size = {"rmse": 3.0, "noise_floor": None, "excess": None}
+    return {"energy_error_percent": None, "torque": {joint: size}}
 
 
 def shrink(run: str = "swing_3") -> dict[str, Any]:
@@ -152,12 +130,14 @@ def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> 
         finding = session.scalars(select(CLASSES["gap_finding"])).one()
         joints = set(session.scalars(select(CLASSES["gap_finding_joint"].joint)))
         members = session.scalars(select(CLASSES["gap_finding_member"])).all()
-    assert (finding.finding_id, finding.family, finding.rank, finding.matters) == ("friction@all", "friction", 1, True)
-    assert (finding.share, finding.share_lower, finding.share_upper, finding.confidence) == (0.9, 0.8, 1.0, 0.98)
+    (said,) = diagnosis().findings
+    assert (finding.finding_id, finding.family, finding.rank, finding.matters) == (said.id, "friction", 1, True)
+    assert (finding.share, finding.confidence) == (said.share, 0.9)
+    assert (finding.share_lower, finding.share_upper) == said.share_interval95
     assert joints == {"joint_1", "joint_2"}
     assert {(one.effect, one.cause_id, one.confidence) for one in members} == {
-        ("coulomb_friction", "coulomb_friction@all", 0.97),
-        ("stribeck_friction", "coulomb_friction@all", 0.01),
+        ("coulomb_friction", "coulomb_friction@all", 0.9),
+        ("stribeck_friction", "coulomb_friction@all", 0.3 * 0.9),
     }
 
 
@@ -216,9 +196,8 @@ def test_what_the_workspace_lacks_is_named(workspace: Workspace) -> None:
         record(workspace, "other", diagnosis(), NOTHING)
     with pytest.raises(InputError, match='run "swing_9"'):
         record(workspace, ROBOT, diagnosis(shrink=shrink("swing_9")), NOTHING)
-    size = {"rmse": 1.0, "noise_floor": None, "excess": None}
     with pytest.raises(InputError, match="no joint joint_9"):
-        record(workspace, ROBOT, diagnosis(gap={"energy_error_percent": None, "torque": {"joint_9": size}}), NOTHING)
+        record(workspace, ROBOT, diagnosis(gap=gap_of("joint_9")), NOTHING)
     assert count(workspace, GapDiagnosis) == 0
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from sqlalchemy import delete
 from sqlalchemy.orm import Session
-from tests import small_fleet
+from tests import rows, small_fleet
 
 from irtwin.asserting import follow
 from irtwin.knowledge.asserted.statements import read
@@ -113,23 +113,18 @@ OURS = "INSERT DATA { <urn:ours> a irt:Saving_Action ; irt:saves_at id:robot\\/A
 def take(place: Workspace, name: str, day: str, energy_j: float) -> None:
     """Keep a run of Arm_B of an hour with its measured energy, as `irtwin live` does."""
     run_id, start = f"Arm_B.{name}", datetime.fromisoformat(day)
-    row = schema.RunRow(
-        run_id=run_id, robot_id="Arm_B", name=name, kind="Live_Run", payload_kg=0.0, payload_com_x_m=0.0,
-        payload_com_y_m=0.0, payload_com_z_m=0.0, product="bolts", start_time=start, start_time_from="log",
-        started=start, ended=start + timedelta(hours=1), run_time_s=3600.0, sample_count=2, sample_rate_hz=1.0,
-        file="", sha256=run_id,
+    row = rows.run(
+        name, run_id=run_id, robot_id="Arm_B", kind=schema.LIVE_RUN, role=None, product="bolts", start_time=start,
+        started=start, ended=start + timedelta(hours=1), run_time_s=3600.0, file="", sha256=run_id,
     )  # fmt: skip
-    about = {"activity_id": f"live.{run_id}", "robot_id": "Arm_B", "provider": "live", "subject": f"run/{run_id}"}
+    by = rows.activity(f"live.{run_id}", "live", f"run/{run_id}", "Arm_B")
+    energy = schema.RunEnergy(
+        run_id=run_id, energy_consumption_j=energy_j, energy_from="measured", run_power_w=1.0, peak_power_w=1.0,
+        measured_energy_j=energy_j, activity_id=by.activity_id,
+    )  # fmt: skip
+    used = schema.ActivityUse(activity_id=by.activity_id, entity=f"run/{run_id}", relation="wasInformedBy")
     with Session(place.engine) as session, session.begin():
-        for one in (
-            row,
-            schema.Activity(**about, started=start, ended=start, software="irtwin"),
-            schema.RunEnergy(
-                run_id=run_id, energy_consumption_j=energy_j, energy_from="measured", run_power_w=1.0,
-                peak_power_w=1.0, measured_energy_j=energy_j, activity_id=about["activity_id"],
-            ),
-            schema.ActivityUse(activity_id=about["activity_id"], entity=f"run/{run_id}", relation="wasInformedBy"),
-        ):  # fmt: skip
+        for one in (row, by, energy, used):
             session.add(one)
             session.flush()
 
