@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -162,6 +163,7 @@ def test_rows_hold_python_values(graph: KnowledgeGraph) -> None:
     (row,) = table
     assert (row["run"], row["name"], row["time"], row["count"], row["nothing"]) == (run, "fit_1", 10.0, 1000, None)
     assert row["start"].isoformat() == "2026-03-02T08:00:00+00:00"
+    assert graph.query("SELECT ('2026-03-02'^^xsd:date AS ?day) {}")[0] == {"day": date(2026, 3, 2)}
 
 
 def test_ask_and_construct(graph: KnowledgeGraph) -> None:
