@@ -39,6 +39,13 @@ def irtwin(*arguments: object) -> Said:
     return Said(status, out.getvalue(), err.getvalue())
 
 
+def done(*arguments: object) -> str:
+    """Call the command line, which does as told; return what it printed."""
+    said = irtwin(*arguments)
+    assert said.status == 0, said.err
+    return said.out
+
+
 def refused(*arguments: object) -> str:
     """Call the command line, which refuses, and return the one line that it says."""
     said = irtwin(*arguments)
