@@ -93,17 +93,10 @@ def _friction(joint: str, role: str, size: float) -> dict[str, Any]:
 
 
 def _gap(verdict: str) -> dict[str, Any]:
-    torque = {
-        joint: {
-            "rmse": 1.4 if joint == "joint_a3" and verdict != "no_gap" else 0.41,
-            "noise_floor": 0.4,
-            "excess": 0.05,
-            "sensor_noise": 0.3,
-        }
-        for joint in JOINTS
-    }
+    known = {"noise_floor": 0.4, "excess": 0.05, "sensor_noise": 0.3}
+    rmse = dict.fromkeys(JOINTS, 0.41) | ({} if verdict == "no_gap" else {"joint_a3": 1.4})
     return {
-        "torque": torque,
+        "torque": {joint: {"rmse": size} | known for joint, size in rmse.items()},
         "power": {"rmse": 21.0, "noise_floor": None, "excess": None},
         "energy_error_percent": 1.2 if verdict == "no_gap" else 8.4,
     }
@@ -115,22 +108,6 @@ def _heat_map(size: float) -> dict[str, Any]:
         for joint in JOINTS
     ]
     return {"joints": JOINTS, "regimes": REGIMES, "excess": excess}
-
-
-def _disturbance(explained_by: str | None) -> dict[str, Any]:
-    return {
-        "id": "line@joint_a3",
-        "channel": "torque",
-        "joint": "joint_a3",
-        "kind": "line",
-        "rms": 0.77,
-        "share": 0.66,
-        "quantities": [
-            {"name": "f", "joint": "joint_a3", "value": 2.9, "unit": "Hz", "interval95": [2.88, 2.92]},
-            {"name": "A", "joint": "joint_a3", "value": 1.09, "unit": "N m", "interval95": None},
-        ],
-        "explained_by": explained_by,
-    }
 
 
 def _cause(effect: str, confidence: float, share: float, rivals: list[str], scope: str = "changed") -> dict[str, Any]:
@@ -192,14 +169,13 @@ def with_findings(said: dict[str, Any]) -> dict[str, Any]:
     return said | {"findings": findings_of(said["causes"])}
 
 
-def _by_cause(effect: str, scope: str, share: float, alone: list[float], without: list[float]) -> dict[str, Any]:
+def _by_cause(cause: dict[str, Any]) -> dict[str, Any]:
+    alone, without = ([0.6, 0.62], [1.3, 1.45]) if "stribeck" in cause["effect"] else ([0.8, 0.72], [1.2, 1.25])
     return {
-        "cause": f"{effect}@joint_a3",
-        "effect": effect,
-        "joints": ["joint_a3"],
-        "scope": scope,
+        "cause": cause["id"],
+        **{name: cause[name] for name in ("effect", "joints", "scope")},
         "channel": "torque",
-        "share": share,
+        "share": cause["evidence"]["share_of_what_is_closed"],
         "rmse_before": [1.4, 1.5],
         "rmse_alone": alone,
         "rmse_when_left_out": without,
@@ -207,23 +183,25 @@ def _by_cause(effect: str, scope: str, share: float, alone: list[float], without
     }
 
 
-def _shrink(closed: float | None, after: float, by_cause: list[dict[str, Any]]) -> dict[str, Any]:
+def _shrink(closed: float | None, after: float, causes: list[dict[str, Any]]) -> dict[str, Any]:
+    interval = [after - 0.05, after + 0.05]
     return {
         "held_out_runs": RUNS[2:],
         "noise_floor_from": "repeats",
-        "torque_rmse": {
-            "before": 1.45,
-            "after": after,
-            "noise_floor": 0.4,
-            "interval95_after": [after - 0.05, after + 0.05],
-        },
+        "torque_rmse": {"before": 1.45, "after": after, "noise_floor": 0.4, "interval95_after": interval},
         "power_rmse": {"before": 21.0, "after": 17.0, "noise_floor": None, "interval95_after": None},
         "energy_error_percent": {"before": 8.4, "after": 2.1, "noise_floor": None, "interval95_after": [1.0, 3.3]},
         "closed_fraction": None if closed is None else {"value": closed, "interval95": [closed - 0.05, closed + 0.04]},
-        "by_cause": by_cause,
+        "by_cause": [_by_cause(cause) for cause in causes],
     }
 
 
+def _caused(closed: float, *causes: dict[str, Any]) -> dict[str, Any]:
+    """Causes, and what they close."""
+    return {"causes": list(causes), "shrink": _shrink(closed, 0.5, list(causes))}
+
+
+_UNKNOWN = dict.fromkeys(("torque_rmse", "power_rmse", "energy_error_percent"))
 _SURE = {"share_interval95": [0.1, 0.9], "excess_interval95": [8.0, 15.0], "false_discovery_rate": 0.001}
 _LOCATED = [
     {"channel": "torque", "joint": "joint_a3", "regime": "low_speed", "follows": "speed", "runs": None, "share": 0.81}
@@ -235,21 +213,22 @@ _LOCATED = [
 ]
 _CASES: dict[str, dict[str, Any]] = {
     "no_gap": {
-        "shrink": {
-            "held_out_runs": RUNS[2:],
-            "noise_floor_from": "out_of_band",
-            "torque_rmse": None,
-            "power_rmse": None,
-            "energy_error_percent": None,
-            "closed_fraction": None,
-            "by_cause": [],
-        },
+        "shrink": _shrink(None, 1.45, []) | _UNKNOWN | {"noise_floor_from": "out_of_band"},
         "not_testable": _UNTESTABLE,
     },
     "attributed": {
         "locations": _LOCATED,
-        "not_repeating": [_disturbance("viscous_friction@joint_a3")],
-        "causes": [_cause("viscous_friction", 0.7, 0.7, []), _cause("stribeck_friction", 0.96, 0.3, [])],
+        "not_repeating": [
+            {
+                **{"id": "line@joint_a3", "channel": "torque", "joint": "joint_a3", "kind": "line"},
+                **{"rms": 0.77, "share": 0.66, "explained_by": "viscous_friction@joint_a3"},
+                "quantities": [
+                    {"name": "f", "joint": "joint_a3", "value": 2.9, "unit": "Hz", "interval95": [2.88, 2.92]},
+                    {"name": "A", "joint": "joint_a3", "value": 1.09, "unit": "N m", "interval95": None},
+                ],
+            }
+        ],
+        **_caused(0.93, _cause("viscous_friction", 0.7, 0.7, []), _cause("stribeck_friction", 0.96, 0.3, [])),
         "not_testable": _UNTESTABLE,
         "refused": [
             {
@@ -267,28 +246,13 @@ _CASES: dict[str, dict[str, Any]] = {
             "why": "The scale of torque is uncertain by 10 %: torque of drives comes from nominal constants",
         },
         "cutoff": {"hz": 9.786, "stated": False, "why": "found: 10 times the bandwidth of the motion"},
-        "shrink": _shrink(
-            0.93,
-            0.5,
-            [
-                _by_cause("viscous_friction", "changed", 0.7, [0.8, 0.72], [1.2, 1.25]),
-                _by_cause("stribeck_friction", "changed", 0.3, [0.6, 0.62], [1.3, 1.45]),
-            ],
-        ),
     },
     "ambiguous": {
         "locations": _LOCATED,
-        "causes": [
+        **_caused(
+            0.9,
             _cause("stribeck_friction", 0.52, 0.6, ["nonlinear_viscous_friction"], "missing"),
             _cause("nonlinear_viscous_friction", 0.44, 0.4, ["stribeck_friction"], "missing"),
-        ],
-        "shrink": _shrink(
-            0.9,
-            0.5,
-            [
-                _by_cause("stribeck_friction", "missing", 0.6, [0.6, 0.62], [1.3, 1.45]),
-                _by_cause("nonlinear_viscous_friction", "missing", 0.4, [0.8, 0.72], [1.2, 1.25]),
-            ],
         ),
         "next_experiment": {
             "purpose": "tell stribeck_friction from nonlinear_viscous_friction",
@@ -299,11 +263,8 @@ _CASES: dict[str, dict[str, Any]] = {
             "separation_now": 1.1,
             "separation_that_is_enough": 2.25,
             "questions": [
-                {
-                    "effects": ["stribeck_friction", "nonlinear_viscous_friction"],
-                    "separation_now": 1.1,
-                    "expected_separation": 7.24,
-                }
+                {"effects": ["stribeck_friction", "nonlinear_viscous_friction"]}
+                | {"separation_now": 1.1, "expected_separation": 7.24}
             ],
             "programme": {
                 "kind": "speed_ladder",
