@@ -49,11 +49,8 @@ def test_each_number_of_each_side_has_a_line():
 @pytest.mark.slow
 def test_the_page_has_a_plot_a_joint_and_the_numbers(tmp_path: Path):
     page = page_of(tmp_path, gap_cases.diagnosis("attributed"))
-    assert {name for name in figures_of(tmp_path / "p.html") if name.startswith("friction")} == {
-        "friction_0",
-        "friction_1",
-    }
+    drawn = [name for name in figures_of(tmp_path / "p.html") if name.startswith("friction")]
+    assert sorted(drawn) == ["friction_0", "friction_1"]
     section = re.search(r'<section id="friction".*?</section>', page, re.DOTALL)
-    assert section
     for said in ("Friction of joint_a3", "Coulomb friction, reference", "1.38 … 1.62", "that of the reference runs"):
         assert said in section[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from tests.html_elements import plain
 
 from irtwin.report.gap.findings import ToldFinding, counted, sentence
 
@@ -26,7 +27,7 @@ def finding(family: str = "friction", **changes: Any) -> ToldFinding:
 
 
 def said(verdict: str, *findings: ToldFinding, where: str = "", closes: str | None = "", **more: str) -> str:
-    return sentence(verdict, findings, where, closes, **more).replace("\N{NO-BREAK SPACE}", " ")
+    return plain(sentence(verdict, findings, where, closes, **more))
 
 
 LITTLE = {"matters": False, "share": 0.0004}
@@ -46,20 +47,6 @@ def test_the_family_is_said_before_its_effects() -> None:
         "Friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction (55 %) or position-dependent "
         "friction (30 %). It closes."
     )
-
-
-@pytest.mark.parametrize(
-    ("against", "claim"),
-    [
-        ("twin", "differs from the twin’s"),
-        ("reference", "changed since the reference runs"),
-        ("simulated", "differs from the simulator’s"),
-        ("both", "changed since the reference runs, and differs from the simulator’s"),
-    ],
-)
-def test_a_finding_is_set_against_the_runs_that_lack_it(against: str, claim: str) -> None:
-    one = finding("load", joints=(), against=against, confidence=0.94, members=((("payload", 0.94),),))
-    assert said("attributed", one) == f"Load {claim}: payload (94 % sure)."
 
 
 def test_bodies_are_many() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from tests import gap_cases
 from tests.gap_pages import figures_of, graph_of, page_of
+from tests.html_elements import plain
 from tests.rows import ROBOT
 
 from irtwin.document.document import Document
@@ -28,13 +29,7 @@ CELLS = re.compile(
     r'<(td class="number(?: unsure)?"|small|dd|b|span class="badge[^"]*"|p class="hint")>'
     r"(.*?)</(?:td|dd|b|span|p|small)>"
 )
-WORDS = {
-    "95",  # % of an interval
-    "100",  # standard deviations: "over 100"
-    "3", "1", "2",  # in names of joints and runs
-    "4",
-    "6",
-}  # fmt: skip
+WORDS = {"95", "100", "1", "2", "3", "4", "6"}  # % of intervals, "over 100" deviations, in names of joints and runs
 
 
 def told_apart(value: Any, count: Iterator[int]) -> Any:
@@ -56,15 +51,8 @@ def numbers(value: Any) -> Iterator[float]:
 
 def written(value: float) -> set[str]:
     """Return the ways in which a page may write a number."""
-    ways = [
-        wording.number(value),
-        wording.number(value, 2),
-        wording.given(value),
-        wording.share(value),
-        wording.percent(value),
-        wording.duration(value),
-        f"{value:.2g}",
-    ]
+    forms = (wording.number, wording.given, wording.share, wording.percent, wording.duration)
+    ways = [*(form(value) for form in forms), wording.number(value, 2), f"{value:.2g}"]
     return {found for way in ways for found in NUMBER.findall(way.replace("\N{NO-BREAK SPACE}", " "))}
 
 
@@ -93,26 +81,24 @@ def test_every_number_that_matters_is_shown(tmp_path: Path) -> None:
     document = Document.from_json(said)
     seen = set(shown(page_of(tmp_path, said)))
     experiment, shrink = document.next_experiment, document.shrink
-    assert experiment is not None and experiment.programme is not None and shrink.closed_fraction is not None
     shares = [shrink.closed_fraction.value, *shrink.closed_fraction.interval95]
-    plain: list[float] = [experiment.questions[0].separation_now, experiment.separation_that_is_enough]
+    plain_ones = [experiment.questions[0].separation_now, experiment.separation_that_is_enough]
     for cause in document.causes:
         why = cause.evidence
         shares += [cause.confidence, why.share_of_what_is_closed or 0.0, *why.probability_of_rivals.values()]
-        plain += [why.gain, why.log_odds, why.closed_where_it_acts]
-        plain += [number for one in cause.parameters for number in (one.value, *(one.interval95 or ()))]
+        plain_ones += [why.gain, why.log_odds, why.closed_where_it_acts]
+        plain_ones += [number for one in cause.parameters for number in (one.value, *(one.interval95 or ()))]
     for place in document.locations:
         shares += [place.share, *place.share_interval95]
-        plain += [place.excess, *place.excess_interval95]
+        plain_ones += [place.excess, *place.excess_interval95]
     for size in (document.gap.torque or {}).values():
-        plain += [size.rmse, size.noise_floor or 0.0]
+        plain_ones += [size.rmse, size.noise_floor or 0.0]
     for change in (shrink.torque_rmse, shrink.power_rmse, shrink.energy_error_percent):
-        assert change is not None
-        plain += [change.before, change.after, *(change.interval95_after or ())]
+        plain_ones += [change.before, change.after, *(change.interval95_after or ())]
     settings = [*(experiment.programme.speeds or {}).values(), *(experiment.programme.amplitudes or {}).values()]
-    plain += [number for values in settings for number in values]
+    plain_ones += [number for values in settings for number in values]
     assert [share for share in shares if not written(share) & seen] == []
-    assert [number for number in plain if not written(number) & seen] == []
+    assert [number for number in plain_ones if not written(number) & seen] == []
 
 
 def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -123,14 +109,8 @@ def friction_of(joint: str, share: float, confidence: float) -> tuple[dict[str, 
     cause |= {"id": name, "joints": [joint], "confidence": confidence}
     cause["parameters"] = [{"name": "Fs", "joint": joint, "value": 10 * share, "unit": "N m", "interval95": None}]
     cause["evidence"] |= {"share_of_what_is_closed": share, "log_odds": 100 * share}
-    change |= {
-        "cause": name,
-        "joints": [joint],
-        "share": share,
-        "rmse_alone": [share],
-        "rmse_when_left_out": [9 * share],
-    }
-    return cause, change | {"rmse_before": [1.4]}
+    change |= {"cause": name, "joints": [joint], "share": share}
+    return cause, change | {"rmse_before": [1.4], "rmse_alone": [share], "rmse_when_left_out": [9 * share]}
 
 
 def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
@@ -138,8 +118,7 @@ def test_two_causes_of_one_effect_are_kept_apart(tmp_path: Path) -> None:
     pairs = [friction_of("joint_a5", 0.65, 0.72), friction_of("joint_a2", 0.35, 0.61)]
     said["causes"] = [cause for cause, _ in pairs]
     said["shrink"]["by_cause"] = [change for _, change in reversed(pairs)]  # in another order than the causes
-    page = page_of(tmp_path, gap_cases.with_findings(said))
-    page = html.unescape(page).replace("\N{NO-BREAK SPACE}", " ")
+    page = plain(page_of(tmp_path, gap_cases.with_findings(said)))
     parts = page.split('id="which"')[1].split("<h3>")[1:]
     assert [part.split("</h3>")[0] for part in parts[:2]] == [
         "1. Stribeck friction on joint_a5",
@@ -168,7 +147,6 @@ def without_numbers(value: Any) -> Any:
 def without_curves(page: str) -> tuple[str, dict[str, Any]]:
     """Return a page's text, and what it draws but for curves."""
     data = re.search(r'id="page-data">(.*?)</script>', page)
-    assert data
     drawn = json.loads(data[1])["figures"]
     kept = {name: one for name, one in drawn.items() if not name.startswith("follows_") and name != "experiment"}
     return page.replace(data[1], ""), kept

@@ -16,9 +16,7 @@ def test_the_gap_stands_before_and_after_with_its_unit():
     rows = summary.gap(diagnosis).rows
     assert [(row["gap"], row["unit"]) for row in rows][:2] == [("torque (RMSE)", "N m"), ("power (RMSE)", "W")]
     change = diagnosis.shrink.torque_rmse
-    assert change is not None
-    assert rows[0]["before"] == pytest.approx(change.before, rel=0.01)
-    assert rows[0]["after"] == pytest.approx(change.after, rel=0.01)
+    assert (rows[0]["before"], rows[0]["after"]) == pytest.approx((change.before, change.after), rel=0.01)
 
 
 def test_the_filter_is_said_where_it_is_known():
@@ -57,8 +55,8 @@ def test_how_much_friction_differs_from_run_to_run_is_said(dry, viscous, said):
 def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
     said = gap_cases.diagnosis("attributed")
     said["causes"][0]["parameters"][0]["name"] = "dead_band"
-    both = [2.1e-3, 2.1e-3], [3e-4, 3e-4]
-    said["shrink"]["by_cause"][0] |= {"channel": "position", "rmse_when_left_out": both[0], "rmse_with_all": both[1]}
+    left_out, with_all = [2.1e-3, 2.1e-3], [3e-4, 3e-4]
+    said["shrink"]["by_cause"][0] |= {"channel": "position", "rmse_when_left_out": left_out, "rmse_with_all": with_all}
     document = Document.from_json(said)
     played, measured = summary.not_held(document.causes[:2], document)
     assert "keeps that difference, 2.1 mrad (mm) RMS where 0.3 are left with irtwin.simulator.callback." in played
@@ -88,8 +86,9 @@ def test_a_guess_is_called_one_and_what_closes_little_is_not_listed():
 
 
 @pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])
-def test_where_nothing_is_to_blame_there_is_no_table_of_causes(verdict):
+def test_where_nothing_is_to_blame_nothing_is_tabled_or_explained(verdict):
     assert not summary.causes(gap_cases.document(verdict))
+    assert summary.meanings(gap_cases.document(verdict)) == []
 
 
 def test_what_to_log_next_has_a_line_each():
@@ -111,7 +110,3 @@ def test_each_parameter_is_told_once_with_what_it_means():
         "Fs of stribeck friction: Friction above Coulomb's at standstill.",
         "d of stribeck friction: Stribeck exponent.",
     ]
-
-
-def test_where_nothing_is_to_blame_nothing_is_explained():
-    assert summary.meanings(gap_cases.document("no_gap")) == []
