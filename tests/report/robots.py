@@ -11,28 +11,12 @@ from pyoxigraph import NamedNode, Quad, RdfFormat, parse
 
 from irtwin import resources
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.knowledge.vocabulary import ID, SH
+from irtwin.knowledge.vocabulary import PREFIXES as KNOWN
 from irtwin.report.questions import Answers, ask, read_questions
 
-ID = "https://w3id.org/irtwin/id/"
-PREFIXES = """
-@prefix irt: <https://w3id.org/irtwin#> .
-@prefix effect: <https://w3id.org/irtwin/effect/> .
-@prefix provider: <https://w3id.org/irtwin/provider/> .
-@prefix prov: <http://www.w3.org/ns/prov#> .
-@prefix qudt: <http://qudt.org/schema/qudt/> .
-@prefix unit: <http://qudt.org/vocab/unit/> .
-@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
-@prefix skos: <http://www.w3.org/2004/02/skos/core#> .
-@prefix sh: <http://www.w3.org/ns/shacl#> .
-@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
-@prefix id: <https://w3id.org/irtwin/id/> .
-"""
-EFFECTS = {
-    "rigid_body": "rigid body",
-    "coulomb_friction": "Coulomb friction",
-    "viscous_friction": "viscous friction",
-    "standby_power": "standby power",
-}
+PREFIXES = "".join(f"@prefix {name}: <{place}> .\n" for name, place in (KNOWN | {"sh": SH}).items())
+EFFECTS = ("rigid_body", "coulomb_friction", "viscous_friction", "standby_power")
 
 
 @dataclass
@@ -45,7 +29,6 @@ class Factory:
     torque: bool = True
     power: bool = True
     simulated: bool = False
-    days: int = 3
     seed: int = 1
     joint_name: str = "joint_{}"
     scale_why: str | None = None  # how sure the scale of the twin's torque is
@@ -86,11 +69,10 @@ class Factory:
             )
         return self
 
-    def run(self, name: str, role: str = "observed", day: int = 1, repeat_of: str | None = None) -> Factory:
+    def run(self, name: str, role: str = "observed", day: int = 1) -> Factory:
         run = self._run(name)
-        repeat = f"irt:repeat_of {self._run(repeat_of)} ;" if repeat_of else ""
         self.say(
-            f"<{self.iri}> irt:has_RunProcess {run} . {run} a irt:IR_RunProcess ; {repeat} irt:Run_Name {_text(name)} ;"
+            f"<{self.iri}> irt:has_RunProcess {run} . {run} a irt:IR_RunProcess ; irt:Run_Name {_text(name)} ;"
             f' irt:Run_Role "{role}" ; irt:Payload 3.0e0 ; irt:Run_Time 20.0e0 ; irt:Sample_Rate 100.0e0 ;'
             " irt:Sample_Count 2000 ;"
             f' irt:Start_Time "2026-03-{day:02}T08:00:00Z"^^xsd:dateTime ; irt:Start_Time_From "log" ;'
@@ -198,9 +180,9 @@ class Factory:
         self._parameter("standby_power", "P0", "W", 150.0, "")
 
     def _parameter(self, effect: str, name: str, unit: str, value: float, joint: str) -> None:
-        weighed = self.scale_why is not None and unit != "W"
-        ends = f"; irt:Scaled_Interval_Lower {0.9 * value}e0 ; irt:Scaled_Interval_Upper {1.1 * value}e0"
-        scaled = ends if weighed else ""
+        scaled = f"; irt:Scaled_Interval_Lower {0.9 * value}e0 ; irt:Scaled_Interval_Upper {1.1 * value}e0"
+        if self.scale_why is None or unit == "W":
+            scaled = ""
         self.say(
             f"[] a irt:Twin_Parameter ; irt:parameter_of {self._twin} ; irt:of_Effect effect:{effect} ; {joint}"
             f' irt:Parameter_Name "{name}" ; irt:Parameter_Value {value}e0 ; qudt:hasUnit unit:{unit} ;'
@@ -251,13 +233,13 @@ class Factory:
         return f"<{ID}activity/{provider}.{self.robot_id}>"
 
 
-def six_axis(graph: KnowledgeGraph, runs: int = 6, **changes: object) -> Factory:
+def six_axis(graph: KnowledgeGraph, runs: int = 6, scale_why: str | None = None) -> Factory:
     """A robot of six axes with torque and power; the last third of its runs is held out."""
-    factory = Factory("KUKA_KR6_R700", "KUKA_KR6_R700", simulated=True, **changes)  # type: ignore[arg-type]
+    factory = Factory("KUKA_KR6_R700", "KUKA_KR6_R700", simulated=True, scale_why=scale_why)
     factory.robot(note={"torque": "motor current times torque constant", "supply": "3 x 400 V"})
     names = [f"exciting_{k}" if k % 2 else f"cycle_{k}" for k in range(1, runs + 1)]
     for index, name in enumerate(names):
-        factory.run(name, role="reference" if index < runs // 2 else "observed", day=1 + index % factory.days)
+        factory.run(name, role="reference" if index < runs // 2 else "observed", day=1 + index % 3)
     cut = runs - max(1, runs // 3)
     return factory.twin(names[:cut], names[cut:]).conclude(names[-1], twin=True).into(graph)
 

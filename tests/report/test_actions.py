@@ -90,17 +90,8 @@ def test_the_table_says_energies_in_kwh() -> None:
 def test_a_page_lists_what_the_graph_proposes(plant: KnowledgeGraph) -> None:
     answers = ask(plant, page.questions(), {})
     found = overview.overview(answers)
-    html = page.render(
-        "page.html.jinja",
-        answers,
-        {},
-        found=found,
-        reports=[],
-        actions=actions(answers),
-        file="",
-        excel=True,
-        trouble="",
-    )
+    said = {"found": found, "reports": [], "actions": actions(answers), "file": "", "excel": True, "trouble": ""}
+    html = page.render("page.html.jinja", answers, {}, **said)
     assert "What to do to save" in html and ">switch off while waiting</a>" in html
     assert ">check the gear oil and temperature</a><small>j1</small>" in html
     assert '<form action="/saving"' not in html and "with a token for updates" in html

@@ -22,8 +22,6 @@ def test_each_effect_has_a_colour_of_its_own() -> None:
 def test_figures_of_a_page_take_them(graph: KnowledgeGraph) -> None:
     drawn = figures(answers(graph, six_axis(graph)))
     for name in ("energy_per_effect", "energy_per_joint_and_effect"):
-        figure = drawn[name]
-        assert figure is not None
-        found = {bars["name"]: bars["marker"]["color"] for bars in figure["data"]}
+        found = {bars["name"]: bars["marker"]["color"] for bars in drawn[name]["data"]}
         assert found["Coulomb friction"] == effect_colour("coulomb_friction")
         assert found["standby power"] == effect_colour("standby_power")

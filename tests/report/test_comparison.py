@@ -12,24 +12,19 @@ from irtwin.report.plant.comparison import Comparison, Side, comparison, side, t
 from irtwin.report.questions import Answer
 
 
-@pytest.fixture(scope="module")
-def graph(plant: KnowledgeGraph) -> KnowledgeGraph:
-    return plant
-
-
-def compared(graph: KnowledgeGraph, robot: str, *sides: Side | None) -> Comparison:
+def compared(plant: KnowledgeGraph, *sides: tuple[str, Side | None]) -> Comparison:
+    """Hold one side, of a robot's name, against another."""
     asked = {name: one for name, one in page.questions("comparison").items() if "first" in one.bind}
     found = []
-    for one in sides:
-        assert one is not None
+    for robot, one in sides:
         bindings = {"robot": f"{ID}robot/{robot}", **one.bindings()}
-        found.append({name: Answer(of, tuple(graph.query(of.text, bindings))) for name, of in asked.items()})
+        found.append({name: Answer(of, tuple(plant.query(of.text, bindings))) for name, of in asked.items()})
     return comparison(*found)
 
 
-def test_two_times(graph: KnowledgeGraph) -> None:
+def test_two_times(plant: KnowledgeGraph) -> None:
     asked = {"a_to": "2026-03-02", "b_from": "2026-03-03", "b_to": "2026-03-03"}
-    found = compared(graph, "Arm_A", side(asked, "a"), side(asked, "b"))
+    found = compared(plant, ("Arm_A", side(asked, "a")), ("Arm_A", side(asked, "b")))
     pairs = {one.name: (one.before, one.after, one.percent) for one in (*found.pairs, *found.kinds[0][1])}
     assert pairs["runs"] == (2, 1, -50.0)
     assert pairs["energy"] == (3000.0, 1600.0, pytest.approx(-46.6667))
@@ -43,23 +38,17 @@ def test_two_times(graph: KnowledgeGraph) -> None:
     assert len(to_sheet(found).rows) == len(found.pairs) + len(found.kinds[0][1]) + 2
 
 
-def test_two_runs(graph: KnowledgeGraph) -> None:
+def test_two_runs(plant: KnowledgeGraph) -> None:
     asked = {"by": "run", "a_run": "Arm_C.press_1", "b_run": "Arm_C.press_2"}
-    found = compared(graph, "Arm_C", side(asked, "a"), side(asked, "b"))
+    found = compared(plant, ("Arm_C", side(asked, "a")), ("Arm_C", side(asked, "b")))
     ((of, pairs),) = found.kinds
     assert (of.name, pairs[1].before, pairs[1].after) == ("mechanical", 400.0, 440.0)
     assert not any("standby" in one.name for one in pairs)
 
 
-def test_measured_and_mechanical_energy_are_not_held_against_each_other(graph: KnowledgeGraph) -> None:
-    run = {name: Side(f"{ID}run/{name}", "0001-01-01", "9999-12-31") for name in ("Arm_A.fit_1", "Arm_C.press_1")}
-    asked = {name: one for name, one in page.questions("comparison").items() if "first" in one.bind}
-    sides = [
-        {name: Answer(of, tuple(graph.query(of.text, {"robot": f"{ID}robot/{run_name[:5]}", **one.bindings()})))
-         for name, of in asked.items()}
-        for run_name, one in run.items()
-    ]  # fmt: skip
-    found = comparison(*sides)
+def test_measured_and_mechanical_energy_are_not_held_against_each_other(plant: KnowledgeGraph) -> None:
+    runs = ("Arm_A.fit_1", "Arm_C.press_1")
+    found = compared(plant, *((name[:5], Side(f"{ID}run/{name}", "0001-01-01", "9999-12-31")) for name in runs))
     assert found.apart
     assert all(pair.difference is None for _, pairs in found.kinds for pair in pairs)
 
@@ -74,8 +63,8 @@ def test_what_is_no_day(text: str) -> None:
         side({"a_from": text}, "a")
 
 
-def test_a_time_without_runs(graph: KnowledgeGraph) -> None:
+def test_a_time_without_runs(plant: KnowledgeGraph) -> None:
     asked = {"a_to": "2020-01-01", "b_from": "2026-03-03"}
-    found = compared(graph, "Arm_A", side(asked, "a"), side(asked, "b"))
+    found = compared(plant, ("Arm_A", side(asked, "a")), ("Arm_A", side(asked, "b")))
     assert all(pair.difference is None for _, pairs in found.kinds for pair in pairs)
     assert found.pairs[0].before == 0

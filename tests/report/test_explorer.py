@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -8,25 +10,26 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.explorer import Columns, explorer
 
 
+def drawn(graph: KnowledgeGraph, factory: Factory) -> dict[str, Any]:
+    return explorer(answers(graph, factory), factory.read_series)
+
+
 def test_the_page_opens_on_a_held_out_run(graph: KnowledgeGraph):
-    factory = six_axis(graph)
-    curves = explorer(answers(graph, factory), factory.read_series)
-    assert curves
+    curves = drawn(graph, six_axis(graph))
     run = curves["runs"][curves["opens"]]
     assert run["name"] in ("exciting_5", "cycle_6") and run["part"] == "held_out"
 
 
 def test_curves_keep_the_extremes_of_the_samples(graph: KnowledgeGraph):
     factory = six_axis(graph)
-    curves = explorer(answers(graph, factory), factory.read_series)
-    assert curves
+    curves = drawn(graph, factory)
     run = curves["runs"][curves["opens"]]
     assert [chart["title"] for chart in run["torque"]] == factory.names
     assert run["held_out"] == [[0.0, 20.0]]
     samples = factory.series[f"series/{run['name']}.parquet"]["tau_joint_3"].to_numpy()
-    drawn = unpack(run["torque"][2]["measured"])
-    assert len(drawn) <= curves["points"] <= 2_000
-    np.testing.assert_allclose([drawn.min(), drawn.max()], [samples.min(), samples.max()], rtol=1e-3)
+    shown = unpack(run["torque"][2]["measured"])
+    assert len(shown) <= curves["points"] <= 2_000
+    np.testing.assert_allclose([shown.min(), shown.max()], [samples.min(), samples.max()], rtol=1e-3)
 
 
 def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
@@ -34,7 +37,6 @@ def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
     given = answers(graph, factory)
     given["joints"].rows[1]["kind"] = "prismatic"
     curves = explorer(given, factory.read_series)
-    assert curves
     run = curves["runs"][0]
     assert [chart["unit"] for chart in run["torque"]] == ["N m", "N", "N m", "N m", "N m", "N m"]
     assert (run["power"]["unit"], run["energy"]["unit"]) == ("W", "Wh")
@@ -43,8 +45,8 @@ def test_a_chart_has_the_unit_of_its_joint(graph: KnowledgeGraph):
 @pytest.mark.slow
 def test_many_runs_share_the_page(graph: KnowledgeGraph):
     factory = six_axis(graph, runs=30)
-    curves = explorer(answers(graph, factory), factory.read_series)
-    assert curves and len(curves["runs"]) == 30
+    curves = drawn(graph, factory)
+    assert len(curves["runs"]) == 30
     assert 300 <= curves["points"] < 700
 
 
@@ -53,16 +55,15 @@ def test_a_column_that_marks_the_held_out_part_is_shaded(graph: KnowledgeGraph):
     table = factory.series["series/pick.parquet"]
     marks = (table["time"].to_numpy() > 12.0) & (table["time"].to_numpy() < 18.0)
     factory.series["series/pick.parquet"] = table.append_column("held_out", pa.array(marks))
-    curves = explorer(answers(graph, factory), factory.read_series)
-    assert curves and curves["runs"][0]["torque"] == []
+    curves = drawn(graph, factory)
+    assert curves["runs"][0]["torque"] == []
     [[start, end]] = curves["runs"][0]["held_out"]
     np.testing.assert_allclose([start, end], [12.0, 18.0], atol=0.01)
 
 
 def test_without_power_the_modelled_one_stands_alone(graph: KnowledgeGraph):
     factory = Factory("TX40", "TX40", power=False, joints=7).robot().run("a").twin([], [], both=["a"]).into(graph)
-    curves = explorer(answers(graph, factory), factory.read_series)
-    assert curves
+    curves = drawn(graph, factory)
     assert curves["runs"][0]["power"]["measured"] is None
     assert len(curves["runs"][0]["torque"]) == 7
     assert curves["runs"][0]["held_out"] == []

@@ -10,7 +10,6 @@ from irtwin.report.traces import plain
 
 def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):
     figure = figures(answers(graph, six_axis(graph)))["energy_per_run"]
-    assert figure
     measured, modelled = figure["data"]
     assert len(measured["x"]) == len(modelled["x"]) == 6
     assert modelled["y"] == [2.5] * 6  # Wh
@@ -19,7 +18,6 @@ def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):
 
 def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(graph: KnowledgeGraph):
     figure = figures(answers(graph, six_axis(graph)))["energy_error"]
-    assert figure
     held_out, fitted = figure["data"]
     assert sorted(held_out["y"]) == [2.0, 3.0]
     assert sorted(fitted["y"]) == [2.0, 3.0, 4.0, 5.0]
@@ -30,30 +28,28 @@ def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: Knowled
     drawn = figures(answers(graph, six_axis(graph)))
     total = 6 * 2.5  # Wh
     for name in ("energy_per_effect", "energy_per_joint_and_effect"):
-        figure = drawn[name]
-        assert figure
-        assert sum(sum(trace["y"]) for trace in figure["data"]) == pytest.approx(total, rel=1e-4)
+        assert sum(sum(trace["y"]) for trace in drawn[name]["data"]) == pytest.approx(total, rel=1e-4)
     by_joint = drawn["energy_per_joint"]
-    assert by_joint and len(by_joint["data"]) == 6
+    assert len(by_joint["data"]) == 6
     assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0 / 3.6, rel=1e-4)
 
 
 def test_effects_are_named_by_the_ontology_and_keep_their_colour(graph: KnowledgeGraph):
     drawn = figures(answers(graph, six_axis(graph)))
     colours = [
-        {trace["name"]: trace["marker"]["color"] for trace in drawn[name]["data"]}  # type: ignore[index]
+        {trace["name"]: trace["marker"]["color"] for trace in drawn[name]["data"]}
         for name in ("energy_per_effect", "energy_per_joint_and_effect")
     ]
     assert colours[0] == colours[1]
     assert "Coulomb friction" in colours[0]
-    assert drawn["energy_per_joint_and_effect"]["layout"]["xaxis"]["categoryarray"][-1] == "whole robot"  # type: ignore[index]
+    assert drawn["energy_per_joint_and_effect"]["layout"]["xaxis"]["categoryarray"][-1] == "whole robot"
 
 
 def test_without_power_there_is_no_error_and_no_measured_bar(graph: KnowledgeGraph):
     factory = Factory("TX40", "TX40", power=False).robot().run("a").twin([], [], both=["a"]).into(graph)
     drawn = figures(answers(graph, factory))
     assert drawn["energy_error"] is None
-    assert [trace["name"] for trace in drawn["energy_per_run"]["data"]] == ["modelled by the twin"]  # type: ignore[index]
+    assert [trace["name"] for trace in drawn["energy_per_run"]["data"]] == ["modelled by the twin"]
 
 
 def test_one_day_is_no_figure_and_no_twin_is_none_at_all(graph: KnowledgeGraph):

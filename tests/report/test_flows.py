@@ -7,6 +7,7 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.html_elements import plain
 
 from irtwin.report.energy.flows import Flows, flows
 
@@ -28,31 +29,27 @@ ROWS = [
 ]
 
 
-def named(found, name):
-    return next(node for node in found.nodes if node.name == name)
-
-
 def test_what_is_given_back_goes_on_the_bus_beside_the_supply():
     found = flows(ROWS)
-    of_bus = named(found, "bus").height
-    assert named(found, "given back by joints").height / of_bus == pytest.approx(100 / 1102)
-    assert named(found, "supply").height / of_bus == pytest.approx(1002 / 1102)
-    assert named(found, "whole robot").height / of_bus == pytest.approx(200 / 1102)
+    height = {node.name: node.height for node in found.nodes}
+    for name, energy in (("given back by joints", 100), ("supply", 1002), ("whole robot", 200)):
+        assert height[name] / height["bus"] == pytest.approx(energy / 1102)
 
 
 def test_effects_that_take_little_are_one_and_the_largest_is_first():
-    effects = [node.name for node in flows(ROWS).nodes if node.x == max(each.x for each in flows(ROWS).nodes)]
+    nodes = flows(ROWS).nodes
+    effects = [node.name for node in nodes if node.x == max(each.x for each in nodes)]
     assert effects == ["coulomb friction", "copper loss", "standby power", "other effects"]
 
 
 def test_ribbons_say_from_where_to_where_and_how_much():
-    words = [ribbon.words.replace("\N{NO-BREAK SPACE}", " ") for ribbon in flows(ROWS).ribbons]
+    words = [plain(ribbon.words) for ribbon in flows(ROWS).ribbons]
     assert "joint_1 to coulomb friction: 0.167 Wh" in words
     assert not [one for one in words if one.startswith("joint_1 to mechanical power")]
 
 
 def test_ribbons_say_how_sure_they_are_and_are_pale_where_half_of_it_may_not_be():
-    ribbons = {one.words.replace("\N{NO-BREAK SPACE}", " "): one.unsure for one in flows(ROWS).ribbons}
+    ribbons = {plain(one.words): one.unsure for one in flows(ROWS).ribbons}
     assert ribbons["joint_2 to copper loss: 0.0833 Wh, between 0.0800 Wh and 0.0867 Wh"] is False
     assert ribbons["whole robot to standby power: 0.0556 Wh, between 0.0250 Wh and 0.0861 Wh"] is True
     assert ribbons["joint_1 to coulomb friction: 0.167 Wh"] is False

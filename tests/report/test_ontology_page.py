@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 from pyoxigraph import NamedNode, RdfFormat, parse
+from tests.html_elements import Elements
 from tests.trusting import trust_all
 
 from irtwin.cli import cli
@@ -18,26 +18,8 @@ from irtwin.resources import folder, resources_of, shipped
 IRT = "https://w3id.org/irtwin#"
 
 
-class Anchors(HTMLParser):
-    """Where the page can be led to, where it leads, and what it would load."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.links: set[str] = set()
-        self.loaded: set[str] = set()
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        said = dict(attrs)
-        if (tag, said.get("href")) == ("link", "data:,"):  # an empty icon, else a browser asks for one
-            return
-        if "id" in said:
-            self.ids.append(said["id"] or "")
-        if "href" in said:
-            self.links.add(said["href"] or "")
-        if "src" in said or tag in ("link", "script", "iframe"):
-            self.loaded.add(tag)
+def links_of(page: Elements) -> set[str]:
+    return set(page.values("href")) - {"data:,"}  # an empty icon, else a browser asks for one
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +28,8 @@ def text() -> str:
 
 
 @pytest.fixture(scope="module")
-def anchors(text: str) -> Anchors:
-    return Anchors(text)
+def elements(text: str) -> Elements:
+    return Elements(text)
 
 
 def declared() -> set[str]:
@@ -59,25 +41,27 @@ def declared() -> set[str]:
     }
 
 
-def test_each_term_has_the_anchor_of_its_iri(anchors: Anchors) -> None:
-    assert {iri.removeprefix(IRT) for iri in declared()} <= set(anchors.ids)
-    assert {"effect/coulomb_friction", "unit:N-M", "sosa:Platform"} <= set(anchors.ids)
+def test_each_term_has_the_anchor_of_its_iri(elements: Elements) -> None:
+    terms = {iri.removeprefix(IRT) for iri in declared()}
+    assert terms | {"effect/coulomb_friction", "unit:N-M", "sosa:Platform"} <= set(elements.values("id"))
 
 
-def test_no_anchor_stands_twice_and_no_link_leads_nowhere(anchors: Anchors) -> None:
-    assert len(anchors.ids) == len(set(anchors.ids))
-    assert {link.removeprefix("#") for link in anchors.links} <= set(anchors.ids)
+def test_no_anchor_stands_twice_and_no_link_leads_nowhere_or_away(elements: Elements) -> None:
+    ids = elements.values("id")
+    assert len(ids) == len(set(ids))
+    assert links_of(elements) <= {f"#{one}" for one in ids}
 
 
-def test_the_page_needs_no_network(anchors: Anchors, text: str) -> None:
-    assert all(link.startswith("#") for link in anchors.links)
-    assert anchors.loaded == set()
+def test_the_page_needs_no_network(elements: Elements, text: str) -> None:
+    assert elements.values("src") == []
+    assert [said for tag, said in elements.found if tag in ("link", "script", "iframe")] == [
+        {"rel": "icon", "href": "data:,"}
+    ]
     assert "default-src &#39;none&#39;" in text
 
 
 def test_what_the_page_says_of_a_property(text: str) -> None:
     article = re.search(r'<article id="Energy_Error">.*?</article>', text, re.DOTALL)
-    assert article is not None
     said = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", article[0]))
     for words in (
         "energy error irt:Energy_Error",
@@ -124,10 +108,10 @@ def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     (tmp_path / "ontology/shifts.ttl").write_text(OWN)
     trust_all(tmp_path)
     text = page(read_modules(resources_of(tmp_path)))
-    found = Anchors(text)
-    assert {"module-shifts", "shifts/Night_Run"} <= set(found.ids)
-    assert len(found.ids) == len(set(found.ids))
-    assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
+    ids = Elements(text).values("id")
+    assert {"module-shifts", "shifts/Night_Run"} <= set(ids)
+    assert len(ids) == len(set(ids))
+    assert {link for link in links_of(Elements(text)) if link.startswith("#")} <= {f"#{one}" for one in ids}
     assert "shifts.ttl of workspace" in text
     assert "Made &lt;by&gt; night." in text
     done = CliRunner().invoke(cli, ["docs", "--workspace", str(tmp_path), "--ontology", str(tmp_path / "page.html")])

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from markupsafe import Markup
 from tests.report.robots import power_only, six_axis
+from tests.screens import complaints_of
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.packing import Fragment, packed_scripts
@@ -40,15 +41,12 @@ def page(browser: playwright.Browser, file: Path) -> Iterator[Page]:
     """
     context = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True)
     page = context.new_page()
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: complaints.append(request.url) if "robot.html" not in request.url else None)
+    complaints = complaints_of(page, mine=(file.as_uri(), "data:", "blob:"))
     page.goto(file.as_uri())
     page.wait_for_selector("#figure-energy_per_joint .bars path")
     yield page
     context.close()
-    assert [text for text in complaints if not text.startswith(("data:", "blob:"))] == []
+    assert complaints == []
 
 
 def time_range(page: Page, figure: str) -> list[float]:
@@ -100,7 +98,6 @@ def test_the_scene_and_the_charts_show_the_same_moment(page: Page):
     assert cursors.count() == 6
     left = cursors.first.bounding_box()
     panel = page.locator("#figure-torque .nsewdrag").first.bounding_box()
-    assert left and panel
     assert left["x"] == pytest.approx(panel["x"] + panel["width"] / 4, abs=2)
     page.evaluate("document.addEventListener('irtwin:time', (event) => { window.told = event.detail.time; })")
     page.mouse.move(panel["x"] + panel["width"] / 2 - 3, panel["y"] + panel["height"] / 2)
@@ -131,7 +128,6 @@ def test_a_run_chosen_here_is_told_and_one_chosen_in_the_scene_is_drawn(page: Pa
 def test_dragging_zooms_all_charts_of_the_run(page: Page):
     page.locator("#figure-torque").scroll_into_view_if_needed()
     box = page.locator("#figure-torque .nsewdrag").first.bounding_box()
-    assert box
     middle = box["y"] + box["height"] / 2
     page.mouse.move(box["x"] + 0.25 * box["width"], middle)
     page.mouse.down()
@@ -149,9 +145,8 @@ def test_a_robot_without_torque(browser: playwright.Browser, tmp_path: Path):
     ur3 = power_only(graph)
     render(graph, ur3.iri, ur3.read_series, tmp_path / "robot.html")
     page = browser.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
+    complaints = complaints_of(page)
     page.goto((tmp_path / "robot.html").as_uri())
     page.wait_for_selector("#figure-power .scatterlayer .trace")
-    assert errors == []
+    assert complaints == []
     page.close()

@@ -1,11 +1,10 @@
-import html
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from markupsafe import Markup
 from pyoxigraph import Literal, NamedNode, Quad, Triple
+from tests.html_elements import Elements, plain
 from tests.report.robots import Factory, PageOf, power_only, six_axis
 
 from irtwin.errors import InputError
@@ -21,34 +20,12 @@ pytestmark = pytest.mark.slow
 HOSTILE = "<script>alert(1)</script>\"'&</title>"
 
 
-class Elements(HTMLParser):
-    """Elements of a page with their attributes, and the text of each script."""
-
-    def __init__(self, page: str):
-        super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.scripts: list[str] = []
-        self._inside = False
-        self.feed(page)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, dict(attrs)))
-        self._inside = tag == "script"
-
-    def handle_endtag(self, tag: str) -> None:
-        self._inside = False
-
-    def handle_data(self, data: str) -> None:
-        if self._inside:
-            self.scripts.append(data)
-
-
 def without_scripts(page: str) -> str:
     return re.sub(r"<script[^>]*>.*?</script>", "", page, flags=re.DOTALL)
 
 
 def text(page: str) -> str:
-    return without_scripts(page).replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+    return plain(without_scripts(page))
 
 
 def test_the_twin_says_how_sure_the_scale_of_its_torque_is(graph: KnowledgeGraph, page_of: PageOf):
@@ -79,8 +56,7 @@ def test_the_flow_of_energy_is_drawn_without_a_script(graph: KnowledgeGraph, pag
 
 def test_nothing_is_loaded_from_anywhere(graph: KnowledgeGraph, page_of: PageOf):
     page = page_of(six_axis(graph))
-    elements = Elements(page)
-    for tag, attributes in elements.found:
+    for tag, attributes in Elements(page).found:
         assert tag not in {"iframe", "object", "embed", "base"}
         assert tag != "link" or attributes == {"rel": "icon", "href": "data:,"}  # else a browser asks for one
         for name in ("src", "href", "srcset", "action"):
@@ -123,42 +99,36 @@ def test_hostile_names_are_text(graph: KnowledgeGraph, page_of: PageOf):
     factory = Factory("ODD", HOSTILE, joint_name=HOSTILE + "{}").robot(note={"<script>": "</script><script>alert(2)"})
     page = page_of(factory.run(HOSTILE.translate({60: "a", 62: "b", 34: "c", 39: "d"})).into(graph))
     elements = Elements(page)
-    assert [a.get("type") for tag, a in elements.found if tag == "script"] == [
-        "application/json",
-        "application/gzip",
-        "application/gzip",
-        "application/gzip",
-        None,
-    ]
+    kinds = [said.get("type") for tag, said in elements.found if tag == "script"]
+    assert kinds == ["application/json", *["application/gzip"] * 3, None]
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
 
 
 def test_hostile_joint_names_in_the_data_of_figures_cannot_end_the_script(graph: KnowledgeGraph, page_of: PageOf):
     factory = Factory("ODD", "ODD", joint_name="</script>{}").robot().run("a").twin(["a"], []).into(graph)
-    data = Elements(page_of(factory)).scripts[0]
+    data = re.findall(r"<script[^>]*>(.*?)</script>", page_of(factory), re.DOTALL)[0]
     assert data.startswith("{") and data.endswith("}") and "<" not in data
 
 
 @pytest.mark.parametrize(
     ("changes", "runs", "expected"),
     [
-        ({"power": False}, 1, ["No electrical power was measured, so there is no energy error to show."]),
-        ({"torque": False}, 1, ["Joint torque was not measured: only power can be compared."]),
-        ({"joints": 7}, 2, ["joint_7"]),
-        ({"joints": 1, "power": False, "torque": False}, 1, ["no measurement can check it"]),
+        ({"power": False}, 1, "No electrical power was measured, so there is no energy error to show."),
+        ({"torque": False}, 1, "Joint torque was not measured: only power can be compared."),
+        ({"joints": 7}, 2, "joint_7"),
+        ({"joints": 1, "power": False, "torque": False}, 1, "no measurement can check it"),
     ],
 )
 def test_what_is_missing_is_said(
-    changes: dict[str, object], runs: int, expected: list[str], graph: KnowledgeGraph, page_of: PageOf
+    changes: dict[str, object], runs: int, expected: str, graph: KnowledgeGraph, page_of: PageOf
 ):
     factory = Factory("R", "R", **changes).robot(facts=False)  # type: ignore[arg-type]
     names = [f"run_{number}" for number in range(runs)]
     for name in names:
         factory.run(name)
     page = text(page_of(factory.twin(names, []).into(graph)))
-    for words in expected:
-        assert words in page
+    assert expected in page
     assert "These logs are simulated" not in page
 
 
@@ -215,8 +185,7 @@ def test_a_robot_that_contradicts_itself_is_said_on_its_page_alone(graph: Knowle
     graph.replace([Quad(*triple, NamedNode(GRAPH_REASONED))], GRAPH_REASONED)
     page = page_of(wrong)
     (banner,) = re.findall(r'<p class="banner" id="contradiction">(.*?)</p>', page, re.DOTALL)
-    said = html.unescape(re.sub("<[^>]*>", "", banner))
-    assert said == (
+    assert plain(re.sub("<[^>]*>", "", banner)) == (
         f"What is said of this robot contradicts itself: {why}. Correct one of them, and run the data set again."
     )
     assert 'id="contradiction"' not in page_of(other)
