@@ -36,6 +36,9 @@ class Server:
     def sparql(self) -> str:
         return f"{self.url}/sparql"
 
+    def get(self, path: str, **headers: str) -> httpx.Response:
+        return CLIENT.get(self.url + path, headers=headers)
+
     def ask(self, query: str, **headers: str) -> httpx.Response:
         body = {"Content-Type": "application/sparql-query", **headers}
         return CLIENT.post(self.sparql, content=query, headers=body)

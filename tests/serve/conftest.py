@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ import pyarrow.parquet as pq
 import pytest
 from tests.conftest import MadeOnce
 from tests.endpoint import Server, make_graph, serving
+
+from irtwin.location import Location
+from irtwin.serve.pool import Limits, Pool
 
 
 @pytest.fixture(scope="session")
@@ -28,10 +32,35 @@ def server(new_graph: Callable[[], Path]) -> Iterator[Server]:
         yield running
 
 
-@pytest.fixture(scope="session")
-def start() -> Callable[..., object]:
-    """Give `serving`, for tests that need a server of their own."""
-    return serving
+@pytest.fixture(scope="module")
+def writable(new_graph: Callable[[], Path]) -> Iterator[Server]:
+    """A server that who has the token may write to."""
+    with serving(new_graph()) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def strict(new_graph: Callable[[], Path]) -> Iterator[Server]:
+    """A server that gives a query two seconds."""
+    with serving(new_graph(), "--timeout", 2) as running:
+        yield running
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    """What tests that are coroutines run on."""
+    return "asyncio"
+
+
+@asynccontextmanager
+async def pool(graph: Path, limits: Limits) -> AsyncIterator[Pool]:
+    """One worker on a graph, until the block ends."""
+    workers = Pool(Location(graph.parent), 1, limits)
+    await workers.open()
+    try:
+        yield workers
+    finally:
+        await workers.close()
 
 
 @pytest.fixture(scope="session")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-import httpx
 import pytest
-from tests.endpoint import CLIENT, Server, serving
+from tests.endpoint import Server, serving
 from tests.killed_writers import broken_off, take_in
 from tests.waiting import wait_for
 
@@ -26,10 +25,6 @@ def left_behind(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def get(server: Server, path: str, accept: str = "text/html") -> httpx.Response:
-    return CLIENT.get(server.url + path, headers={"Accept": accept})
-
-
 def wait(server: Server, standing: str | None) -> None:
     wait_for(lambda: server.ask("ASK {}").headers.get("irtwin-graph") == standing, 300)
 
@@ -39,8 +34,8 @@ def test_it_catches_up_by_itself(left_behind: Path, tmp_path: Path) -> None:
     shutil.copytree(left_behind, tmp_path / "workspace")
     with serving(tmp_path / "workspace/graph") as server:
         wait(server, None)
-        assert get(server, "/irtwin/id/robot/B", "text/turtle").status_code == 200
-        assert "irtwin-graph" not in get(server, "/").headers
+        assert server.get("/irtwin/id/robot/B", Accept="text/turtle").status_code == 200
+        assert "irtwin-graph" not in server.get("/", Accept="text/html").headers
 
 
 @pytest.mark.nightly
@@ -53,8 +48,8 @@ def test_where_it_cannot_it_says_why_once_and_all_that_answers_says_that_it_is_b
         said = server.process.stderr.readline()
         assert "behind the database, and cannot catch up: " in said and "it is open already" in said
         for path in ("/", ROBOT.removeprefix("/irtwin/id"), ROBOT):
-            page = get(server, path)
+            page = server.get(path, Accept="text/html")
             assert page.headers["irtwin-graph"] == "behind" and "The graph is behind the database." in page.text
         for path, accept in ((ROBOT, "text/turtle"), ("/sparql?query=ASK{}", "*/*"), ("/sparql", "text/turtle")):
-            assert get(server, path, accept).headers["irtwin-graph"] == "behind"
-        assert "irtwin-graph" not in get(server, "/questions").headers
+            assert server.get(path, Accept=accept).headers["irtwin-graph"] == "behind"
+        assert "irtwin-graph" not in server.get("/questions", Accept="text/html").headers

@@ -13,21 +13,21 @@ from urllib.parse import urlencode
 import httpx
 import pytest
 import uvicorn
-from tests.endpoint import Server
+from tests.endpoint import Server, serving
 
 from irtwin.serve import connections
 from irtwin.serve.answer import IN_MEMORY, Replies, Reply
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.anyio]
 
 LARGE = "SELECT * { ?a ?b ?c . VALUES ?n { 1 2 3 4 5 6 7 8 9 10 11 12 } }"  # some MB
 MOST = 256  # connections
 
 
 @pytest.fixture(scope="module")
-def patient(new_graph: Callable[[], Path], start) -> Iterator[Server]:
+def patient(new_graph: Callable[[], Path]) -> Iterator[Server]:
     """A server that gives a query longer than the test's own client waits."""
-    with start(new_graph(), "--timeout", 120) as running:
+    with serving(new_graph(), "--timeout", 120) as running:
         yield running
 
 
@@ -59,7 +59,7 @@ def test_who_reads_late_gets_all_of_it(patient: Server) -> None:
     assert answer.endswith(b"0\r\n\r\n")  # the last chunk: it is whole
 
 
-async def _serve(requests: Callable[[int], None]) -> None:
+async def serve(requests: Callable[[int], None]) -> None:
     async def application(scope, receive, send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         for _ in range(100):
@@ -75,7 +75,7 @@ async def _serve(requests: Callable[[int], None]) -> None:
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost:", b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"])
-def test_who_does_not_get_on_is_left(monkeypatch: pytest.MonkeyPatch, sent: bytes) -> None:
+async def test_who_does_not_get_on_is_left(monkeypatch: pytest.MonkeyPatch, sent: bytes) -> None:
     """Nothing sent, half a head sent, or an answer not read: the server ends the connection by itself."""
     monkeypatch.setattr(connections, "HEAD", 0.2)
     monkeypatch.setattr(connections, "STALL", 0.2)
@@ -91,46 +91,39 @@ def test_who_does_not_get_on_is_left(monkeypatch: pytest.MonkeyPatch, sent: byte
                 received = 0
             assert received < 100 << 20
 
-    asyncio.run(_serve(ask))
+    await serve(ask)
 
 
-def test_an_answer_waits_in_memory_and_then_in_a_file() -> None:
-    async def scenario() -> None:
-        answers = Replies(room=100 << 20)
-        with answers.new() as answer:
-            parts = [bytes([number]) * (1 << 20) for number in range(8)]
-            for part in parts[:7]:
-                answer.write(part)
-            assert answer.waiting == 7 << 20 > IN_MEMORY
-            pieces = answer.pieces()
-            first = await anext(pieces)
-            answer.write(parts[7])
-            answer.end()
-            assert b"".join([first, *[piece async for piece in pieces]]) == b"".join(parts)
-            assert answer.whole and not answer.broken_off
-
-    asyncio.run(scenario())
-
-
-def test_a_client_that_keeps_up_needs_no_room() -> None:
-    async def scenario() -> None:
-        answer, taken = Reply(), 0
-
-        async def take() -> int:
-            return sum([len(piece) async for piece in answer.pieces()])
-
-        taking = asyncio.create_task(take())
-        for _ in range(50):
-            answer.write(bytes(1 << 20))
-            while answer.waiting:
-                await asyncio.sleep(0)
+async def test_an_answer_waits_in_memory_and_then_in_a_file() -> None:
+    answers = Replies(room=100 << 20)
+    with answers.new() as answer:
+        parts = [bytes([number]) * (1 << 20) for number in range(8)]
+        for part in parts[:7]:
+            answer.write(part)
+        assert answer.waiting == 7 << 20 > IN_MEMORY
+        pieces = answer.pieces()
+        first = await anext(pieces)
+        answer.write(parts[7])
         answer.end()
-        taken = await taking
-        assert taken == 50 << 20
-        assert not answer._file._rolled  # type: ignore[attr-defined]
-        answer.close()
+        assert b"".join([first, *[piece async for piece in pieces]]) == b"".join(parts)
+        assert answer.whole and not answer.broken_off
 
-    asyncio.run(scenario())
+
+async def test_a_client_that_keeps_up_needs_no_room() -> None:
+    answer = Reply()
+
+    async def take() -> int:
+        return sum([len(piece) async for piece in answer.pieces()])
+
+    taking = asyncio.create_task(take())
+    for _ in range(50):
+        answer.write(bytes(1 << 20))
+        while answer.waiting:
+            await asyncio.sleep(0)
+    answer.end()
+    assert await taking == 50 << 20
+    assert not answer._file._rolled
+    answer.close()
 
 
 def test_the_answer_that_takes_most_room_is_given_up() -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import httpx
 import pytest
+from tests.endpoint import CLIENT, TOKEN
 
 pytestmark = pytest.mark.slow
 
@@ -11,19 +11,13 @@ OWN = {"graph": "https://example.org/notes"}
 TURTLE = "@prefix : <https://example.org/> . :press :stands 'here' ; :by [ :name 'wall' ] ."
 
 
-@pytest.fixture(scope="module")
-def writable(new_graph, start):
-    with start(new_graph()) as running:
-        yield running
-
-
 def send(server, method: str, body: str = "", *, kind: str = "text/turtle", token: bool = True, **parameters: str):
-    headers = {"Content-Type": kind} | ({"Authorization": "Bearer a-token-for-tests"} if token else {})
-    return httpx.request(method, server.sparql, params=parameters or OWN, content=body, headers=headers, timeout=60)
+    headers = {"Content-Type": kind} | ({"Authorization": f"Bearer {TOKEN}"} if token else {})
+    return CLIENT.request(method, server.sparql, params=parameters or OWN, content=body, headers=headers)
 
 
 def lines(server) -> list[str]:
-    said = httpx.get(server.sparql, params=OWN, headers={"Accept": "application/n-triples"})
+    said = CLIENT.get(server.sparql, params=OWN, headers={"Accept": "application/n-triples"})
     return sorted(said.text.splitlines())
 
 

@@ -6,41 +6,29 @@ import asyncio
 import os
 import signal
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import httpx
 import psutil
 import pytest
+from tests.endpoint import serving
+from tests.serve.conftest import pool
 from tests.waiting import wait_for
 
-from irtwin.location import Location
 from irtwin.serve.pool import Limits, Pool
 from irtwin.serve.protocol import Operation, Refusal
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.anyio]
 
 PRODUCT = "SELECT (COUNT(*) AS ?n) { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
 ALL_PAIRS = "SELECT DISTINCT * { ?a ?b ?c . ?d ?e ?f }"
 
 
-@pytest.fixture(scope="module")
-def strict(new_graph: Callable[[], Path], start) -> Iterator[object]:
-    """A server that gives a query two seconds."""
-    with start(new_graph(), "--timeout", 2) as running:
-        yield running
-
-
-def settled(server, gone: int) -> bool:
+def settle(server, gone: int) -> None:
     """Wait until a worker is gone and another in its place."""
-    deadline = time.monotonic() + 20
-    while time.monotonic() < deadline:
-        if gone not in (pids := server.workers()) and len(pids) >= 2:
-            return True
-        time.sleep(0.05)
-    return False
+    wait_for(lambda: gone not in (pids := server.workers()) and len(pids) >= 2, 20)
 
 
 def busy(server) -> int:
@@ -61,7 +49,7 @@ def test_a_query_that_takes_too_long_is_ended(strict) -> None:
         response = asked.result()
     assert response.status_code == 503
     assert response.text == "the query was cancelled after 2 s: ask for less, or add a LIMIT\n"
-    assert settled(strict, gone=worker)
+    settle(strict, gone=worker)
     assert strict.ask("ASK {}").json()["boolean"] is True
 
 
@@ -75,9 +63,9 @@ def test_an_update_that_takes_too_long_changes_nothing(strict) -> None:
     assert strict.ask(count).content == before
 
 
-def test_what_takes_too_much_memory_is_ended_and_changes_nothing(new_graph: Callable[[], Path], start) -> None:
+def test_what_takes_too_much_memory_is_ended_and_changes_nothing(new_graph: Callable[[], Path]) -> None:
     count = "SELECT (COUNT(*) AS ?n) { ?s ?p ?o }"
-    with start(new_graph(), "--memory", 128) as small:
+    with serving(new_graph(), "--memory", 128) as small:
         before = small.ask(count).content
         query = small.ask(f"{ALL_PAIRS} ORDER BY ?c ?f")
         assert (query.status_code, query.text) == (503, "the query needs more than 128 MB of memory: ask for less\n")
@@ -96,7 +84,7 @@ def test_a_client_that_leaves_ends_its_query_and_others_are_answered_meanwhile(s
         assert not asked.done()
         with pytest.raises(httpx.ReadTimeout):
             asked.result()
-    assert settled(server, gone=worker)
+    settle(server, gone=worker)
 
 
 def test_a_client_that_leaves_in_mid_answer_ends_its_query(server) -> None:
@@ -107,7 +95,7 @@ def test_a_client_that_leaves_in_mid_answer_ends_its_query(server) -> None:
         assert next(pieces)
         assert before <= set(server.workers())
     wait_for(lambda: not before <= set(server.workers()), 20)  # else the query goes on
-    assert settled(server, gone=(before - set(server.workers())).pop())
+    settle(server, gone=(before - set(server.workers())).pop())
     assert server.ask("ASK {}").status_code == 200
 
 
@@ -122,7 +110,8 @@ def test_killed_workers_are_replaced(server) -> None:
         os.kill(worker, signal.SIGKILL)
     answers = [server.ask("ASK { ?s ?p ?o }") for _ in range(6)]
     assert all(answer.status_code == 200 and answer.json()["boolean"] for answer in answers)
-    assert all(settled(server, gone=worker) for worker in before)
+    for worker in before:
+        settle(server, gone=worker)
 
 
 def test_many_clients_at_once_get_their_own_answers(server) -> None:
@@ -134,60 +123,40 @@ def test_many_clients_at_once_get_their_own_answers(server) -> None:
         assert list(threads.map(ask, range(200))) == list(range(200))
 
 
-@asynccontextmanager
-async def pool(graph: Path, limits: Limits, size: int = 1) -> AsyncIterator[Pool]:
-    workers = Pool(Location(graph.parent), size, limits)
-    await workers.open()
-    try:
-        yield workers
-    finally:
-        await workers.close()
-
-
 async def read(workers: Pool, query: str) -> bytes:
     async with workers.worker("here") as worker:
         await worker.ask(Operation("query", query), "http://e/sparql", "text/csv", False)
         return b"".join([piece async for piece in worker.pieces()])
 
 
-def test_an_answer_beyond_the_size_limit_is_refused(new_graph: Callable[[], Path]) -> None:
-    async def scenario() -> None:
-        async with pool(new_graph(), Limits(answer=1000)) as workers:
-            with pytest.raises(Refusal, match="larger than this endpoint sends"):
-                await read(workers, "SELECT * { ?s ?p ?o }")
-            assert (await read(workers, "SELECT (1 AS ?n) {}")).split() == [b"n", b"1"]
-
-    asyncio.run(scenario())
+async def test_an_answer_beyond_the_size_limit_is_refused(new_graph: Callable[[], Path]) -> None:
+    async with pool(new_graph(), Limits(answer=1000)) as workers:
+        with pytest.raises(Refusal, match="larger than this endpoint sends"):
+            await read(workers, "SELECT * { ?s ?p ?o }")
+        assert (await read(workers, "SELECT (1 AS ?n) {}")).split() == [b"n", b"1"]
 
 
-def test_a_large_answer_comes_whole(new_graph: Callable[[], Path]) -> None:
-    async def scenario() -> None:
-        async with pool(new_graph(), Limits()) as workers:
-            triples = len((await read(workers, "SELECT * { ?s ?p ?o }")).splitlines()) - 1
-            answer = await read(workers, "SELECT * { ?s ?p ?o VALUES ?n { 1 2 3 4 5 6 7 8 9 10 11 12 } }")
-            assert len(answer.splitlines()) - 1 == 12 * triples
-            assert len(answer) > 3 << 20
-
-    asyncio.run(scenario())
+async def test_a_large_answer_comes_whole(new_graph: Callable[[], Path]) -> None:
+    async with pool(new_graph(), Limits()) as workers:
+        triples = len((await read(workers, "SELECT * { ?s ?p ?o }")).splitlines()) - 1
+        answer = await read(workers, "SELECT * { ?s ?p ?o VALUES ?n { 1 2 3 4 5 6 7 8 9 10 11 12 } }")
+        assert len(answer.splitlines()) - 1 == 12 * triples
+        assert len(answer) > 3 << 20
 
 
-def test_who_finds_the_queue_full_is_told_to_come_back(new_graph: Callable[[], Path]) -> None:
-    async def scenario() -> None:
-        async with pool(new_graph(), Limits(waiting=1, seconds=1)) as workers, workers.worker("here"):
-            waiting = asyncio.create_task(read(workers, "ASK {}"))
-            await asyncio.sleep(0)
-            with pytest.raises(Refusal, match="too many queries are waiting") as full:
-                await read(workers, "ASK {}")
-            assert (full.value.status, full.value.headers) == (503, {"Retry-After": "2"})
-            with pytest.raises(Refusal, match="no worker came free in time"):
-                await waiting
-
-    asyncio.run(scenario())
+async def test_who_finds_the_queue_full_is_told_to_come_back(new_graph: Callable[[], Path]) -> None:
+    async with pool(new_graph(), Limits(waiting=1, seconds=1)) as workers, workers.worker("here"):
+        waiting = asyncio.create_task(read(workers, "ASK {}"))
+        await asyncio.sleep(0)
+        with pytest.raises(Refusal, match="too many queries are waiting") as full:
+            await read(workers, "ASK {}")
+        assert (full.value.status, full.value.headers) == (503, {"Retry-After": "2"})
+        with pytest.raises(Refusal, match="no worker came free in time"):
+            await waiting
 
 
-@pytest.mark.slow
-def test_a_worker_that_outlives_its_server_ends_itself(new_graph: Callable[[], Path], start) -> None:
-    with start(new_graph(), "--timeout", 1) as running, ThreadPoolExecutor(1) as threads:
+def test_a_worker_that_outlives_its_server_ends_itself(new_graph: Callable[[], Path]) -> None:
+    with serving(new_graph(), "--timeout", 1) as running, ThreadPoolExecutor(1) as threads:
         asked = threads.submit(running.ask, PRODUCT)
         worker = busy(running)
         running.process.kill()

@@ -34,16 +34,16 @@ def robot(folder: Path) -> Iterator[Server]:
 
 @pytest.mark.parametrize("path", ["/live", "/live/Arm"])
 def test_pages_take_everything_from_here(robot: Server, path: str) -> None:
-    page = httpx.get(robot.url + path)
+    page = robot.get(path)
     assert page.status_code == 200
     assert "default-src 'none'; script-src 'self'" in page.headers["Content-Security-Policy"]
     for asset in ("live.css", "live.js", "live_list.js", "meshcat.js", "robot.js"):
-        assert httpx.get(f"{robot.url}/assets/{asset}").status_code == 200
+        assert robot.get(f"/assets/{asset}").status_code == 200
         assert "http://" not in page.text and "https://" not in page.text
 
 
 def test_the_robot_is_made_of_the_graph(robot: Server) -> None:
-    said = httpx.get(f"{robot.url}/live/Arm/robot.json", timeout=60).json()
+    said = robot.get("/live/Arm/robot.json").json()
     assert said["name"] == "Arm"
     assert len(said["joints"]) == 2
     assert said["parts"]
@@ -53,7 +53,7 @@ def test_the_robot_is_made_of_the_graph(robot: Server) -> None:
 
 @pytest.mark.parametrize("name", ["nobody", "a%3E%20b", "..%2F..%2Fetc"])
 def test_a_robot_that_is_not_there(robot: Server, name: str) -> None:
-    assert httpx.get(f"{robot.url}/live/{name}/robot.json", timeout=60).status_code == 404
+    assert robot.get(f"/live/{name}/robot.json").status_code == 404
 
 
 def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server) -> None:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import httpx
 import pytest
 import rdflib
 from rdflib.compare import isomorphic
+from tests.endpoint import CLIENT
 
 from irtwin.resources import folder
 
 pytestmark = pytest.mark.slow
 
-CLIENT = httpx.Client(timeout=60)
 FORMATS = {
     "text/turtle": "turtle",
     "application/n-triples": "nt",
@@ -27,14 +26,14 @@ def test_each_module_is_at_its_iri_and_at_its_version_iri(server, file) -> None:
     module = rdflib.Graph().parse(file)
     iri = module.value(predicate=rdflib.RDF.type, object=rdflib.OWL.Ontology)
     for address in (iri, module.value(iri, rdflib.OWL.versionIRI)):
-        response = CLIENT.get(str(address).replace("https://w3id.org", server.url))
+        response = server.get(str(address).removeprefix("https://w3id.org"))
         assert response.headers["content-type"] == "text/turtle; charset=utf-8"
         assert response.content == file.read_bytes()
 
 
 @pytest.mark.parametrize("media_type", FORMATS)
 def test_in_each_form_it_says_the_same(server, media_type: str) -> None:
-    response = CLIENT.get(f"{server.url}/irtwin/robot", headers={"Accept": f"{media_type}, */*;q=0.1"})
+    response = server.get("/irtwin/robot", Accept=f"{media_type}, */*;q=0.1")
     assert response.headers["content-type"].startswith(media_type)
     assert response.headers["vary"].partition(",")[0] == "Accept"  # and the packing, where it is packed
     received = rdflib.Graph().parse(data=response.content, format=FORMATS[media_type])
@@ -42,15 +41,15 @@ def test_in_each_form_it_says_the_same(server, media_type: str) -> None:
 
 
 def test_what_there_is_not(server) -> None:
-    missing = CLIENT.get(f"{server.url}/irtwin/nothing")
+    missing = server.get("/irtwin/nothing")
     assert missing.status_code == 404 and "there are /irtwin, " in missing.text
-    assert CLIENT.get(f"{server.url}/irtwin", headers={"Accept": "image/png"}).status_code == 406
+    assert server.get("/irtwin", Accept="image/png").status_code == 406
     assert CLIENT.post(f"{server.url}/irtwin").status_code == 405
 
 
 @pytest.mark.parametrize("media_type", FORMATS)
 def test_the_service_describes_itself(server, media_type: str) -> None:
-    response = CLIENT.get(server.sparql, headers={"Accept": media_type})
+    response = server.get("/sparql", Accept=media_type)
     description = rdflib.Graph().parse(data=response.content, format=FORMATS[media_type])
     service = description.value(predicate=rdflib.RDF.type, object=SD.Service)
     assert description.value(service, SD.endpoint) == rdflib.URIRef(server.sparql)
@@ -64,17 +63,17 @@ def test_the_service_describes_itself(server, media_type: str) -> None:
 
 def test_a_browser_gets_the_page_instead(server) -> None:
     accept = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
-    response = CLIENT.get(server.sparql, headers={"Accept": accept})
+    response = server.get("/sparql", Accept=accept)
     assert response.headers["content-type"] == "text/html; charset=utf-8"
-    documentation = CLIENT.get(f"{server.url}/irtwin", headers={"Accept": accept})
+    documentation = server.get("/irtwin", Accept=accept)
     assert documentation.headers["content-type"] == "text/html; charset=utf-8"
     assert "Industrial_Robot" in documentation.text and "Content-Security-Policy" in documentation.text
-    assert CLIENT.get(server.sparql, headers={"Accept": "image/png"}).status_code == 406
-    assert CLIENT.get(server.sparql).headers["content-type"].startswith("text/turtle")
+    assert server.get("/sparql", Accept="image/png").status_code == 406
+    assert server.get("/sparql").headers["content-type"].startswith("text/turtle")
 
 
 def test_the_competency_questions_are_a_page_that_every_page_leads_to(server) -> None:
-    questions = CLIENT.get(f"{server.url}/questions")
+    questions = server.get("/questions")
     assert (questions.status_code, questions.headers["content-type"]) == (200, "text/html; charset=utf-8")
     assert 'id="energy_per_joint"' in questions.text
-    assert 'href="/questions"' in CLIENT.get(f"{server.url}/query").text
+    assert 'href="/questions"' in server.get("/query").text

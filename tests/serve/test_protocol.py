@@ -7,8 +7,7 @@ from urllib.parse import urlencode, urlsplit
 
 import httpx
 import pytest
-
-CLIENT = httpx.Client(timeout=60)
+from tests.endpoint import CLIENT
 
 FORM = "application/x-www-form-urlencoded"
 QUERY = "application/sparql-query"

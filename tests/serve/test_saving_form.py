@@ -69,10 +69,10 @@ def test_what_was_done_is_kept_with_its_author(writable: Server) -> None:
     assert (unknown.status_code, "knows no saving action" in unknown.text) == (404, True)
     kept = post(by="Anna <b>")
     assert (kept.status_code, kept.headers.get("location"), kept.text) == (303, "/#saving", "")
-    page = CLIENT.get(f"{writable.url}/").text
+    page = writable.get("/").text
     assert "<strong>too few runs</strong><small>done 2026-03-02 by Anna &lt;b&gt;</small>" in page
     assert "0 runs before, 1 after" in page and '<form action="/saving" method="post"' in page
-    table = CLIENT.get(f"{writable.url}/tables/actions.csv").text
+    table = writable.get("/tables/actions.csv").text
     assert 'switch off while waiting,,"done, too few runs",2026-03-02,Anna <b>' in table
 
 
@@ -82,4 +82,4 @@ def test_who_has_no_token_says_nothing(writable: Server, plant: Server) -> None:
     assert (wrong.status_code, "needs the token" in wrong.text) == (401, True)
     closed = CLIENT.post(f"{plant.url}/saving", content=form())
     assert (closed.status_code, closed.text) == (403, "this endpoint is read-only\n")
-    assert "with a token for updates" in CLIENT.get(f"{plant.url}/").text
+    assert "with a token for updates" in plant.get("/").text

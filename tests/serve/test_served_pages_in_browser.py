@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-import httpx
 import pytest
 from tests.endpoint import Server
 from tests.screens import complaints_of, faults, is_dark, narrow_and_dark
@@ -60,7 +59,7 @@ def test_a_question_is_answered_under_headings_with_units_and_plotted(
     page, complaints = page
     page.goto(f"{plant.url}/query")
     page.wait_for_selector("#questions button")
-    said = httpx.get(f"{plant.url}/questions.json").json()
+    said = plant.get("/questions.json").json()
     assert page.locator("#questions button").count() == len(said["questions"])
     page.fill("#filter", "how much energy did each run take")
     assert page.locator("#questions li:visible").count() == 1

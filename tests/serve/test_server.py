@@ -14,21 +14,20 @@ from urllib.parse import urlsplit
 import httpx
 import psutil
 import pytest
-from tests.data_sets import irtwin
+from tests.data_sets import refused
+from tests.endpoint import CLIENT, serving
 
-CLIENT = httpx.Client(timeout=60)
 
-
-def refused(*arguments: object) -> str:
-    said = irtwin("serve", *arguments)
-    assert (said.status, said.out) == (2, ""), said.err
-    assert said.err.startswith("irtwin: ") and said.err.count("\n") == 1
-    return said.err
+def told(*arguments: object) -> str:
+    """Return the one line that a server says which does not begin."""
+    said = refused("serve", *arguments)
+    assert said.startswith("irtwin: ") and said.count("\n") == 1
+    return said
 
 
 @pytest.mark.slow
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
-    assert "no graph here; run `irtwin run DATASET`" in refused("--workspace", tmp_path / "none", "--port", 0)
+    assert "no graph here; run `irtwin run DATASET`" in told("--workspace", tmp_path / "none", "--port", 0)
     assert not (tmp_path / "none").exists()
 
 
@@ -36,13 +35,13 @@ def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
 def test_a_port_that_is_taken(new_graph: Callable[[], Path]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
-        message = refused("--workspace", new_graph().parent, "--port", port)
+        message = told("--workspace", new_graph().parent, "--port", port)
     assert f"cannot listen on 127.0.0.1, port {port}: Address already in use; --port 0 picks a free one" in message
 
 
 @pytest.mark.slow
 def test_a_host_that_is_not_ours(new_graph: Callable[[], Path]) -> None:
-    assert "cannot listen on 203.0.113.1" in refused("--workspace", new_graph().parent, "--host", "203.0.113.1")
+    assert "cannot listen on 203.0.113.1" in told("--workspace", new_graph().parent, "--host", "203.0.113.1")
 
 
 @pytest.mark.slow
@@ -53,13 +52,12 @@ def test_a_token_file_that_says_nothing(
     file = tmp_path / "token"
     if content is not None:
         file.write_bytes(content)
-    assert message in refused("--workspace", new_graph().parent, "--port", 0, "--token-file", file)
+    assert message in told("--workspace", new_graph().parent, "--port", 0, "--token-file", file)
 
 
 def test_a_query_has_a_day_at_most(tmp_path: Path) -> None:
-    said = irtwin("serve", "--workspace", tmp_path, "--timeout", 1e300)
-    assert said.status == 2
-    assert "Invalid value for '--timeout'" in said.err.splitlines()[-1]
+    said = refused("serve", "--workspace", tmp_path, "--timeout", 1e300)
+    assert "Invalid value for '--timeout'" in said.splitlines()[-1]
 
 
 ELSEWHERE = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"}
@@ -109,8 +107,8 @@ def test_it_listens_on_this_machine_alone(server) -> None:
 
 
 @pytest.mark.slow
-def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start) -> None:
-    with start(new_graph()) as running:
+def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path]) -> None:
+    with serving(new_graph()) as running:
         assert running.update("CLEAR ALL").status_code == 204  # its process stays for the next
         workers = list(running.workers())
         assert len(workers) > 3
@@ -122,8 +120,8 @@ def test_a_signal_ends_it_and_its_workers(new_graph: Callable[[], Path], start) 
 
 
 @pytest.mark.slow
-def test_clients_that_hang_are_broken_off_in_one_line(new_graph: Callable[[], Path], start) -> None:
-    with start(new_graph()) as running:
+def test_clients_that_hang_are_broken_off_in_one_line(new_graph: Callable[[], Path]) -> None:
+    with serving(new_graph()) as running:
         parts, workers = urlsplit(running.url), list(running.workers())
         asked = ["GET /live/Arm_A/events HTTP/1.1\r\n"] * 2
         asked += ["POST /sparql HTTP/1.1\r\nContent-Type: application/sparql-query\r\nContent-Length: 99\r\n"]
@@ -145,7 +143,7 @@ PATHS = ("/", "/sparql", "/sparql?query=ASK{}", "/sparql?query=rubbish", "/irtwi
 
 @pytest.mark.parametrize("path", PATHS)
 def test_every_response_has_the_security_headers(server, path: str) -> None:
-    headers = CLIENT.get(f"{server.url}{path}").headers
+    headers = server.get(path).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["x-frame-options"] == "DENY"
     assert headers["referrer-policy"] == "no-referrer"
@@ -157,13 +155,13 @@ def test_every_response_has_the_security_headers(server, path: str) -> None:
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "localhost.evil"])
 def test_other_names_of_this_machine_get_nothing(server, host: str) -> None:
-    response = CLIENT.get(f"{server.url}/sparql?query=ASK{{}}", headers={"Host": host})
+    response = server.get("/sparql?query=ASK{}", Host=host)
     assert (response.status_code, response.text) == (421, "this server answers to localhost only\n")
 
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST:1234", "127.0.0.1", "[::1]:80"])
 def test_its_own_names_do(server, host: str) -> None:
-    assert CLIENT.get(f"{server.url}/sparql?query=ASK{{}}", headers={"Host": host}).status_code == 200
+    assert server.get("/sparql?query=ASK{}", Host=host).status_code == 200
 
 
 @pytest.mark.parametrize(

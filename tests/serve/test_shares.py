@@ -5,9 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from pathlib import Path
 
 import httpx
 import pytest
@@ -63,13 +61,6 @@ def test_no_client_is_kept_out_and_none_has_two_more_than_one_that_was_refused(a
     assert room < len(taken) or all(taken[client] for client in asked)
 
 
-@pytest.fixture(scope="module")
-def shared(new_graph: Callable[[], Path], start) -> Iterator[Server]:
-    """A server that gives a query two seconds."""
-    with start(new_graph(), "--timeout", 2) as running:
-        yield running
-
-
 def asking(of: str) -> httpx.Client:
     return httpx.Client(transport=httpx.HTTPTransport(local_address=of), timeout=60)
 
@@ -80,13 +71,13 @@ def status(raw: socket.socket) -> bytes:
 
 @pytest.mark.nightly
 @pytest.mark.slow
-def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_their_limit(shared: Server) -> None:
+def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_their_limit(strict: Server) -> None:
     over = threading.Event()
 
     def ask_too_much() -> None:
         with asking(GREEDY) as http:
             while not over.is_set():
-                http.get(shared.sparql, params={"query": TOO_MUCH})
+                http.get(strict.sparql, params={"query": TOO_MUCH})
 
     threads = [threading.Thread(target=ask_too_much) for _ in range(20)]
     for thread in threads:
@@ -95,7 +86,7 @@ def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_th
         found, until = [], time.monotonic() + 5  # twice all workers of the greedy are ended and replaced
         with asking(OTHER) as http:
             while time.monotonic() < until:
-                found.append(http.get(shared.sparql, params={"query": "ASK {}"}).status_code)
+                found.append(http.get(strict.sparql, params={"query": "ASK {}"}).status_code)
                 time.sleep(0.05)
     finally:
         over.set()
@@ -105,35 +96,35 @@ def test_another_clients_small_queries_are_answered_beside_twenty_that_run_to_th
 
 
 @pytest.mark.slow
-def test_another_client_looks_on_beside_one_that_took_all_streams(shared: Server) -> None:
+def test_another_client_looks_on_beside_one_that_took_all_streams(strict: Server) -> None:
     with ExitStack() as held:
-        theirs = [held.enter_context(shared.connected(EVENTS, GREEDY)) for _ in range(samples.MOST)]
+        theirs = [held.enter_context(strict.connected(EVENTS, GREEDY)) for _ in range(samples.MOST)]
         assert {status(raw) for raw in theirs} == {b"200"}
-        other = held.enter_context(shared.connected(EVENTS, OTHER))
+        other = held.enter_context(strict.connected(EVENTS, OTHER))
         assert status(other) == b"200"
-        assert status(held.enter_context(shared.connected(EVENTS, GREEDY))) == b"503"
-        others = [held.enter_context(shared.connected(EVENTS, OTHER)) for _ in range(samples.MOST)]
+        assert status(held.enter_context(strict.connected(EVENTS, GREEDY))) == b"503"
+        others = [held.enter_context(strict.connected(EVENTS, OTHER)) for _ in range(samples.MOST)]
         assert [status(raw) for raw in others].count(b"200") == samples.MOST // 2 - 1
 
 
 @pytest.mark.slow
-def test_another_client_is_answered_beside_one_that_took_all_connections(shared: Server) -> None:
+def test_another_client_is_answered_beside_one_that_took_all_connections(strict: Server) -> None:
     with ExitStack() as held:
         for _ in range(CONNECTIONS + 40):
-            held.enter_context(shared.connected(SLOW_BODY, GREEDY))
+            held.enter_context(strict.connected(SLOW_BODY, GREEDY))
         with asking(OTHER) as http:
-            answers = [http.get(shared.sparql, params={"query": "ASK {}"}).status_code for _ in range(5)]
+            answers = [http.get(strict.sparql, params={"query": "ASK {}"}).status_code for _ in range(5)]
     assert answers == [200] * 5
 
 
 @pytest.mark.slow
-def test_who_forwards_is_believed_on_this_machine_alone(shared: Server) -> None:
+def test_who_forwards_is_believed_on_this_machine_alone(strict: Server) -> None:
     """Who says other clients in X-Forwarded-For stays one, but for 127.0.0.1: a proxy there tells its own apart."""
     forged = [EVENTS[:-2] + f"X-Forwarded-For: 10.0.0.{number}\r\n\r\n".encode() for number in range(2)]
     for of, said in ((GREEDY, b"503"), ("127.0.0.1", b"200")):
         with ExitStack() as held:
             for _ in range(samples.MOST):
-                held.enter_context(shared.connected(forged[0], of))
+                held.enter_context(strict.connected(forged[0], of))
             time.sleep(0.5)
-            assert status(held.enter_context(shared.connected(forged[1], of))) == said
+            assert status(held.enter_context(strict.connected(forged[1], of))) == said
         time.sleep(0.5)

@@ -5,26 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import httpx
 import pytest
 import rdflib
 from rdflib.plugins.stores.sparqlstore import SPARQLUpdateStore
-from tests.endpoint import CLIENT
+from tests.endpoint import CLIENT, TOKEN, serving
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 pytestmark = pytest.mark.slow
 
 VALUES = "SELECT ?o { <http://e/s> <http://e/p> ?o } ORDER BY ?o"
-
-
-@pytest.fixture(scope="module")
-def writable(new_graph: Callable[[], Path], start) -> Iterator[object]:
-    with start(new_graph()) as running:
-        yield running
 
 
 def values(server) -> list[str]:
@@ -52,7 +44,7 @@ def test_who_has_not_is_refused(writable, authorization: str | None, status: int
     response = httpx.post(writable.sparql, content="CLEAR ALL", headers=headers)
     assert response.status_code == status
     assert response.headers["www-authenticate"] == "Bearer"
-    assert "a-token-for-tests" not in response.text
+    assert TOKEN not in response.text
     assert values(writable) == before
 
 
@@ -75,9 +67,7 @@ def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, 
 
 
 def update_of(server, text: str, **dataset: str) -> httpx.Response:
-    return CLIENT.post(
-        server.sparql, data={"update": text} | dataset, headers={"Authorization": "Bearer a-token-for-tests"}
-    )
+    return CLIENT.post(server.sparql, data={"update": text} | dataset, headers={"Authorization": f"Bearer {TOKEN}"})
 
 
 def test_the_dataset_of_an_update_is_what_its_patterns_are_asked_of(writable) -> None:
@@ -105,7 +95,7 @@ def test_a_dataset_that_cannot_be_is_refused(writable, text: str, graph: str, me
 
 def test_rdflib_writes_through_it(writable) -> None:
     store = SPARQLUpdateStore(
-        writable.sparql, writable.sparql, headers={"Authorization": "Bearer a-token-for-tests"}, context_aware=False
+        writable.sparql, writable.sparql, headers={"Authorization": f"Bearer {TOKEN}"}, context_aware=False
     )
     subject, predicate = rdflib.URIRef("http://e/rdflib"), rdflib.URIRef("http://e/p")
     graph = rdflib.Graph(store)
@@ -146,9 +136,9 @@ def state(server) -> tuple[int, int, int] | None:
 
 
 @pytest.mark.nightly
-def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph, start) -> None:
+def test_readers_see_whole_states_of_a_writer_and_the_last_within_a_second(new_graph) -> None:
     folder = new_graph()
-    with start(folder) as running:
+    with serving(folder) as running:
         command = [sys.executable, "-c", WRITER, str(folder), "8", "0.2"]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as writer:
             assert writer.stdout is not None and writer.stdin is not None

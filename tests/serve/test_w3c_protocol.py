@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import httpx
 import pytest
-from tests.endpoint import CLIENT, TOKEN, Server
+from tests.endpoint import CLIENT, TOKEN, Server, serving
 
 pytestmark = pytest.mark.slow
 
@@ -22,14 +23,17 @@ DOCUMENT, RESOURCE = "http://xmlns.com/foaf/0.1/Document", "http://purl.org/dc/t
 DATA0, DATA1, DATA2, DATA3 = (f"{DATA}{number}.rdf" for number in range(4))
 ALL_DATA = " ".join(f"GRAPH <{name}> {{ <{name}> a <{DOCUMENT}> }}" for name in (DATA1, DATA2, DATA3))
 PREFIXES = "PREFIX dc: <http://purl.org/dc/terms/>\nPREFIX foaf: <http://xmlns.com/foaf/0.1/>\n"
-BOTH_NAMED = f"GRAPH ?g1 {{ <{DATA1}> a ?type }} GRAPH ?g2 {{ <{DATA2}> a ?type }}"
+IN_NAMED = f"GRAPH ?g1 {{ <{DATA1}> a ?type }} GRAPH ?g2 {{ <{DATA2}> a ?type }}"
 BOTH = f"ASK {{ <{DATA1}> a ?type . <{DATA2}> a ?type . }}"
+BOTH_NAMED = f"ASK {{ {IN_NAMED} }}"
+FULL = f"ASK {{\n  <{DATA3}> a ?type\n  {IN_NAMED}\n}}"
+EMPTY = "query=ASK%20%7B%7D"
 
 
 @pytest.fixture(scope="module")
-def w3c(new_graph: Callable[[], Path], start) -> Iterator[Server]:
+def w3c(new_graph: Callable[[], Path]) -> Iterator[Server]:
     """A server of the suite's data; updates that are done come last, for each takes a second, and none is put back."""
-    with start(new_graph()) as running:
+    with serving(new_graph()) as running:
         done = running.update(f"CLEAR ALL ; INSERT DATA {{ {ALL_DATA} }}")
         assert done.status_code == 204, done.text
         yield running
@@ -40,9 +44,10 @@ def send(server: Server, method: str, parameters: str = "", kind: str | None = N
     return CLIENT.request(method, f"{server.sparql}?{parameters}", content=body, headers=headers)
 
 
-def chosen(**graphs: list[str]) -> str:
+def graphs(**chosen: list[str]) -> str:
+    """Return the parameters that choose graphs: default, named, using or using_named."""
     return "&".join(
-        f"{name.replace('_', '-')}-uri={quote(iri, safe='')}" for name, iris in graphs.items() for iri in iris
+        f"{name.replace('_', '-')}-graph-uri={quote(iri, safe='')}" for name, iris in chosen.items() for iri in iris
     )
 
 
@@ -51,164 +56,114 @@ def is_true(response: httpx.Response) -> bool:
     return response.json()["boolean"] is True
 
 
-@pytest.mark.parametrize(
-    ("method", "parameters", "kind", "body"),
-    [
-        pytest.param("POST", chosen(default_graph=[DATA0]), FORM, "query=ASK%20%7B%7D", id="query_post_form"),
-        pytest.param("GET", f"query=ASK%20%7B%7D&{chosen(default_graph=[DATA0])}", None, "", id="query_get"),
-        pytest.param("POST", "", QUERY, "ASK {}", id="query_post_direct"),
-        pytest.param(
-            "GET",
-            f"query={quote(BOTH)}&{chosen(default_graph=[DATA1, DATA2])}",
-            None,
-            "",
-            id="query_dataset_default_graphs_get",
-        ),
-        pytest.param("POST", chosen(default_graph=[DATA1, DATA2]), QUERY, BOTH, id="query_dataset_default_graphs_post"),
-        pytest.param(
-            "GET",
-            f"query={quote(f'ASK {{ {BOTH_NAMED} }}')}&{chosen(named_graph=[DATA1, DATA2])}",
-            None,
-            "",
-            id="query_dataset_named_graphs_get",
-        ),
-        pytest.param(
-            "POST",
-            chosen(named_graph=[DATA1, DATA2]),
-            QUERY,
-            f"ASK {{ {BOTH_NAMED} }}",
-            id="query_dataset_named_graphs_post",
-        ),
-        pytest.param(
-            "POST",
-            chosen(default_graph=[DATA3], named_graph=[DATA1, DATA2]),
-            QUERY,
-            f"ASK {{\n  <{DATA3}> a ?type\n  {BOTH_NAMED}\n}}",
-            id="query_dataset_full",
-        ),
-        pytest.param(
-            "POST",
-            chosen(named_graph=[DATA1, DATA2]),
-            QUERY,
-            f"ASK FROM <{DATA3}> {{ {BOTH_NAMED} }}",
-            id="query_multiple_dataset",
-        ),
-    ],
-)
+def by_name(cases: dict[str, tuple[Any, ...]], arguments: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize(arguments, cases.values(), ids=cases)
+
+
+ANSWERED = {
+    "query_post_form": ("POST", graphs(default=[DATA0]), FORM, EMPTY),
+    "query_get": ("GET", f"{EMPTY}&{graphs(default=[DATA0])}", None, ""),
+    "query_post_direct": ("POST", "", QUERY, "ASK {}"),
+    "query_dataset_default_graphs_get": ("GET", f"query={quote(BOTH)}&{graphs(default=[DATA1, DATA2])}", None, ""),
+    "query_dataset_default_graphs_post": ("POST", graphs(default=[DATA1, DATA2]), QUERY, BOTH),
+    "query_dataset_named_graphs_get": ("GET", f"query={quote(BOTH_NAMED)}&{graphs(named=[DATA1, DATA2])}", None, ""),
+    "query_dataset_named_graphs_post": ("POST", graphs(named=[DATA1, DATA2]), QUERY, BOTH_NAMED),
+    "query_dataset_full": ("POST", graphs(default=[DATA3], named=[DATA1, DATA2]), QUERY, FULL),
+    "query_multiple_dataset": ("POST", graphs(named=[DATA1, DATA2]), QUERY, f"ASK FROM <{DATA3}> {{ {IN_NAMED} }}"),
+}
+
+
+@by_name(ANSWERED, "method, parameters, kind, body")
 def test_a_query_is_answered(w3c: Server, method: str, parameters: str, kind: str | None, body: str) -> None:
     assert is_true(send(w3c, method, parameters, kind, body))
 
 
-@pytest.mark.parametrize(
-    ("query", "kinds"),
-    [
-        pytest.param("SELECT (1 AS ?value) {}", ("sparql-results", "csv", "separated"), id="query_content_type_select"),
-        pytest.param("ASK {}", ("sparql-results",), id="query_content_type_ask"),
-        pytest.param("DESCRIBE <http://example.org/>", ("rdf+", "turtle"), id="query_content_type_describe"),
-        pytest.param("CONSTRUCT { <s> <p> 1 } WHERE {}", ("rdf+", "turtle"), id="query_content_type_construct"),
-    ],
-)
+KINDS = {
+    "query_content_type_select": ("SELECT (1 AS ?value) {}", ("sparql-results", "csv", "separated")),
+    "query_content_type_ask": ("ASK {}", ("sparql-results",)),
+    "query_content_type_describe": ("DESCRIBE <http://example.org/>", ("rdf+", "turtle")),
+    "query_content_type_construct": ("CONSTRUCT { <s> <p> 1 } WHERE {}", ("rdf+", "turtle")),
+}
+
+
+@by_name(KINDS, "query, kinds")
 def test_the_answer_has_a_fitting_type(w3c: Server, query: str, kinds: tuple[str, ...]) -> None:
-    response = send(w3c, "POST", chosen(default_graph=[DATA0]), QUERY, query)
+    response = send(w3c, "POST", graphs(default=[DATA0]), QUERY, query)
     assert response.status_code == 200
     assert any(kind in response.headers["content-type"] for kind in kinds)
 
 
-@pytest.mark.parametrize(
-    ("method", "parameters", "kind", "body"),
-    [
-        pytest.param("PUT", f"query=ASK%20%7B%7D&{chosen(default_graph=[DATA0])}", FORM, "", id="bad_query_method"),
-        pytest.param("GET", "query=ASK%20%7B%7D&query=SELECT%20%2A%20%7B%7D", None, "", id="bad_multiple_queries"),
-        pytest.param("POST", "", "text/plain", "ASK {}", id="bad_query_wrong_media_type"),
-        pytest.param("POST", "", None, "query=ASK%20%7B%7D", id="bad_query_missing_form_type"),
-        pytest.param("POST", "", None, "ASK {}", id="bad_query_missing_direct_type"),
-        pytest.param("POST", "", f"{QUERY}; charset=UTF-16", "ASK {}".encode("utf-16"), id="bad_query_non_utf8"),
-        pytest.param("GET", "query=ASK%20%7B", None, "", id="bad_query_syntax"),
-        pytest.param("GET", "update=CLEAR%20ALL", None, "", id="bad_update_get"),
-        pytest.param("POST", "", FORM, "update=CLEAR%20NAMED&update=CLEAR%20DEFAULT", id="bad_multiple_updates"),
-        pytest.param("POST", "", "text/plain", "CLEAR NAMED", id="bad_update_wrong_media_type"),
-        pytest.param("POST", "", None, "update=CLEAR%20NAMED", id="bad_update_missing_form_type"),
-        pytest.param("POST", "", f"{UPDATE}; charset=UTF-16", "CLEAR NAMED".encode("utf-16"), id="bad_update_non_utf8"),
-        pytest.param("POST", "", FORM, "update=CLEAR%20XYZ", id="bad_update_syntax"),
-        pytest.param(
-            "POST",
-            chosen(using_named_graph=["http://example/people"]),
-            UPDATE,
-            "PREFIX foaf:  <http://xmlns.com/foaf/0.1/>\nWITH <http://example/addresses>\n"
-            "DELETE { ?person foaf:givenName 'Bill' }\nINSERT { ?person foaf:givenName 'William' }\n"
-            "WHERE {\n    ?person foaf:givenName 'Bill'\n}",
-            id="bad_update_dataset_conflict",
-        ),
-    ],
-)
+CONFLICT = """PREFIX foaf:  <http://xmlns.com/foaf/0.1/>
+WITH <http://example/addresses>
+DELETE { ?person foaf:givenName 'Bill' }
+INSERT { ?person foaf:givenName 'William' }
+WHERE {
+    ?person foaf:givenName 'Bill'
+}"""
+REFUSED = {
+    "bad_query_method": ("PUT", f"{EMPTY}&{graphs(default=[DATA0])}", FORM, ""),
+    "bad_multiple_queries": ("GET", f"{EMPTY}&query=SELECT%20%2A%20%7B%7D", None, ""),
+    "bad_query_wrong_media_type": ("POST", "", "text/plain", "ASK {}"),
+    "bad_query_missing_form_type": ("POST", "", None, EMPTY),
+    "bad_query_missing_direct_type": ("POST", "", None, "ASK {}"),
+    "bad_query_non_utf8": ("POST", "", f"{QUERY}; charset=UTF-16", "ASK {}".encode("utf-16")),
+    "bad_query_syntax": ("GET", "query=ASK%20%7B", None, ""),
+    "bad_update_get": ("GET", "update=CLEAR%20ALL", None, ""),
+    "bad_multiple_updates": ("POST", "", FORM, "update=CLEAR%20NAMED&update=CLEAR%20DEFAULT"),
+    "bad_update_wrong_media_type": ("POST", "", "text/plain", "CLEAR NAMED"),
+    "bad_update_missing_form_type": ("POST", "", None, "update=CLEAR%20NAMED"),
+    "bad_update_non_utf8": ("POST", "", f"{UPDATE}; charset=UTF-16", "CLEAR NAMED".encode("utf-16")),
+    "bad_update_syntax": ("POST", "", FORM, "update=CLEAR%20XYZ"),
+    "bad_update_dataset_conflict": ("POST", graphs(using_named=["http://example/people"]), UPDATE, CONFLICT),
+}
+
+
+@by_name(REFUSED, "method, parameters, kind, body")
 def test_what_breaks_the_protocol_is_refused(w3c: Server, method: str, parameters: str, kind, body) -> None:
     assert 400 <= send(w3c, method, parameters, kind, body).status_code < 500
     assert is_true(send(w3c, "POST", "", QUERY, f"ASK {{ <{DATA1}> a <{DOCUMENT}> }}"))  # nothing was done
 
 
-def update_of(place: str, pattern: str = "?s a foaf:Document", what: str = "a dc:BibliographicResource") -> str:
+def update_of(pattern: str = "?s a foaf:Document", what: str = "a dc:BibliographicResource") -> str:
     return f"""{PREFIXES}DROP ALL ;
 INSERT DATA {{ {ALL_DATA} }} ;
-INSERT {{ GRAPH <{place}> {{ ?s {what} }} }}
+INSERT {{ GRAPH <{PLACE}> {{ ?s {what} }} }}
 WHERE {{ {pattern} }}"""
 
 
 PLACE = "http://example.org/protocol-update-dataset-test/"
 IS_RESOURCE = {name: f"GRAPH <{PLACE}> {{ <{name}> a <{RESOURCE}> }}" for name in (DATA1, DATA2, DATA3)}
 TWO_OF_THREE = f"ASK {{ {IS_RESOURCE[DATA1]} {IS_RESOURCE[DATA2]} FILTER NOT EXISTS {{ {IS_RESOURCE[DATA3]} }} }}"
+ONE = f"""{PREFIXES}CLEAR ALL ;
+INSERT DATA {{ GRAPH <{DATA1}> {{ <{DATA1}> a foaf:Document }} }} ;
+INSERT {{ GRAPH <{PLACE}> {{ ?s a dc:BibliographicResource }} }}
+WHERE {{ ?s a foaf:Document }}"""
+IN_NAMED_ONES, SAYS_WHICH = "GRAPH ?g { ?s a foaf:Document }", "<http://example.org/in> ?in"
+IN_ANY = """{ GRAPH ?g { ?s a foaf:Document } BIND(?g AS ?in) }
+UNION { ?s a foaf:Document . BIND("default" AS ?in) }"""
+IN_BOTH = f"""ASK {{
+  GRAPH <{PLACE}> {{
+    <{DATA1}> <http://example.org/in> "default" .
+    <{DATA2}> <http://example.org/in> <{DATA2}> .
+  }}
+  FILTER NOT EXISTS {{ GRAPH <{PLACE}> {{ <{DATA3}> ?p ?o }} }}
+}}"""
+OF_DATASET = {
+    "update_dataset_default_graph": (graphs(using=[DATA1]), ONE, f"ASK {{ {IS_RESOURCE[DATA1]} }}"),
+    "update_dataset_default_graphs": (graphs(using=[DATA1, DATA2]), update_of(), TWO_OF_THREE),
+    "update_dataset_named_graphs": (graphs(using_named=[DATA1, DATA2]), update_of(IN_NAMED_ONES), TWO_OF_THREE),
+    "update_dataset_full": (graphs(using=[DATA1], using_named=[DATA2]), update_of(IN_ANY, SAYS_WHICH), IN_BOTH),
+}
 
 
-@pytest.mark.parametrize(
-    ("parameters", "update", "then"),
-    [
-        pytest.param(
-            chosen(using_graph=[DATA1]),
-            f"{PREFIXES}CLEAR ALL ;\nINSERT DATA {{ GRAPH <{DATA1}> {{ <{DATA1}> a foaf:Document }} }} ;\n"
-            f"INSERT {{ GRAPH <{PLACE}> {{ ?s a dc:BibliographicResource }} }}\nWHERE {{ ?s a foaf:Document }}",
-            f"ASK {{ {IS_RESOURCE[DATA1]} }}",
-            id="update_dataset_default_graph",
-        ),
-        pytest.param(
-            chosen(using_graph=[DATA1, DATA2]), update_of(PLACE), TWO_OF_THREE, id="update_dataset_default_graphs"
-        ),
-        pytest.param(
-            chosen(using_named_graph=[DATA1, DATA2]),
-            update_of(PLACE, "GRAPH ?g { ?s a foaf:Document }"),
-            TWO_OF_THREE,
-            id="update_dataset_named_graphs",
-        ),
-        pytest.param(
-            chosen(using_graph=[DATA1], using_named_graph=[DATA2]),
-            update_of(
-                PLACE,
-                "{ GRAPH ?g { ?s a foaf:Document } BIND(?g AS ?in) } "
-                'UNION { ?s a foaf:Document . BIND("default" AS ?in) }',
-                "<http://example.org/in> ?in",
-            ),
-            f"""ASK {{
-              GRAPH <{PLACE}> {{
-                <{DATA1}> <http://example.org/in> "default" .
-                <{DATA2}> <http://example.org/in> <{DATA2}> .
-              }}
-              FILTER NOT EXISTS {{ GRAPH <{PLACE}> {{ <{DATA3}> ?p ?o }} }}
-            }}""",
-            id="update_dataset_full",
-        ),
-    ],
-)
+@by_name(OF_DATASET, "parameters, update, then")
 def test_an_update_asks_the_graphs_of_its_request(w3c: Server, parameters: str, update: str, then: str) -> None:
     response = send(w3c, "POST", parameters, UPDATE, update)
     assert response.status_code == 204, response.text
     assert is_true(send(w3c, "POST", "", QUERY, then))
 
 
-@pytest.mark.parametrize(
-    ("kind", "body"),
-    [
-        pytest.param(FORM, "update=CLEAR+ALL", id="update_post_form"),
-        pytest.param(UPDATE, "CLEAR ALL", id="update_post_direct"),
-    ],
-)
+@by_name({"update_post_form": (FORM, "update=CLEAR+ALL"), "update_post_direct": (UPDATE, "CLEAR ALL")}, "kind, body")
 def test_an_update_is_done(w3c: Server, kind: str, body: str) -> None:
     assert send(w3c, "POST", "", kind, body).status_code == 204
     assert not is_true(send(w3c, "POST", "", QUERY, "ASK { ?s ?p ?o }"))
