@@ -1,7 +1,8 @@
-"""The broker that Debian ships, on a port of its own."""
+"""The broker that Debian ships, on a port of its own, and who listens to it."""
 
 from __future__ import annotations
 
+import queue
 import shutil
 import socket
 import subprocess
@@ -10,7 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import paho.mqtt.client as paho
 import pytest
+from paho.mqtt.enums import CallbackAPIVersion
 from tests.sparql_servers import free_port
 
 _PROGRAM = shutil.which("mosquitto", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
@@ -34,3 +37,26 @@ def running(folder: Path, who: str, port: int | None = None) -> Iterator[int]:
     finally:
         broker.terminate()
         broker.wait()
+
+
+@contextmanager
+def listening(
+    port: int, topic: str, password: str | None = None
+) -> Iterator[tuple[paho.Client, queue.Queue[paho.MQTTMessage]]]:
+    """Listen to topics until the block ends; give the client, and what it has heard."""
+    heard: queue.Queue[paho.MQTTMessage] = queue.Queue()
+    ready: queue.Queue[None] = queue.Queue()
+    client = paho.Client(CallbackAPIVersion.VERSION2)
+    if password is not None:
+        client.username_pw_set("me", password)
+    client.on_connect = lambda *_: client.subscribe(topic, qos=1)
+    client.on_subscribe = lambda *_: ready.put(None)
+    client.on_message = lambda _client, _data, message: heard.put(message)
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    try:
+        ready.get(timeout=30)
+        yield client, heard
+    finally:
+        client.disconnect()
+        client.loop_stop()

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import queue
 import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import paho.mqtt.client as paho
 import pytest
-from paho.mqtt.enums import CallbackAPIVersion
 from sparkplub_b_packets.core.sparkplug_b_pb2 import Payload
 from tests.alarms import mosquitto
 
@@ -37,53 +34,35 @@ def port(tmp_path: Path) -> Iterator[int]:
         yield port
 
 
-class Host:
-    """A host that hears all of Sparkplug."""
-
-    def __init__(self, port: int) -> None:
-        self.got: queue.Queue[tuple[str, tuple[int | None, dict[str, Any]]]] = queue.Queue()
-        ready: queue.Queue[None] = queue.Queue()
-        self.client = paho.Client(CallbackAPIVersion.VERSION2)
-        self.client.on_connect = lambda client, *_: client.subscribe("spBv1.0/#", qos=1)
-        self.client.on_subscribe = lambda *_: ready.put(None)
-        self.client.on_message = self._take
-        self.client.connect("127.0.0.1", port)
-        self.client.loop_start()
-        ready.get(timeout=30)
-
-    def _take(self, _client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:
-        if "NCMD" not in message.topic:
-            self.got.put((message.topic.removeprefix("spBv1.0/plant/"), decoded(message.payload)))
-
-    def next(self) -> tuple[str, tuple[int | None, dict[str, Any]]]:
-        return self.got.get(timeout=30)
-
-
 @mosquitto.needed
 @pytest.mark.system
 def test_births_data_and_deaths_reach_a_host_in_order(port: int) -> None:
-    host, said = Host(port), []
+    said: list[str] = []
     born = {"Energy/Wh": 12.5, "Power/W": None, "State": "moving"}
-    node = EdgeNode(Broker("127.0.0.1", port, "plant/irtwin"), said.append)
-    assert host.next() == ("NBIRTH/irtwin", (0, {"bdSeq": 0, "Node Control/Rebirth": False}))
-    node.tell([ARM])
-    assert host.next() == ("DBIRTH/irtwin/Arm_1", (1, born))
-    node.tell([ARM])
-    node.tell([ARM | {"power_W": 300.0}])
-    assert host.next() == ("DDATA/irtwin/Arm_1", (2, {"Power/W": 300.0}))
-    host.client.publish("spBv1.0/plant/NCMD/irtwin", payload([("Node Control/Rebirth", 11, True)]))
-    assert host.next()[0] == "NBIRTH/irtwin"
-    assert host.next() == ("DBIRTH/irtwin/Arm_1", (1, born | {"Power/W": 300.0}))
-    node.tell([])
-    assert host.next() == ("DDEATH/irtwin/Arm_1", (2, {}))
-    node._client.socket().shutdown(socket.SHUT_RDWR)  # it breaks: the broker tells the death that was left with it
-    assert host.next() == ("NDEATH/irtwin", (None, {"bdSeq": 0}))
-    assert host.next() == ("NBIRTH/irtwin", (0, {"bdSeq": 1, "Node Control/Rebirth": False}))
-    assert "the connection is lost" in said[0]
-    node.close()
-    assert host.next() == ("NDEATH/irtwin", (None, {"bdSeq": 1}))
-    host.client.disconnect()
-    host.client.loop_stop()
+    with mosquitto.listening(port, "spBv1.0/#") as (host, heard):
+
+        def told() -> tuple[str, tuple[int | None, dict[str, Any]]]:
+            message = heard.get(timeout=30)
+            return message.topic.removeprefix("spBv1.0/plant/"), decoded(message.payload)
+
+        node = EdgeNode(Broker("127.0.0.1", port, "plant/irtwin"), said.append)
+        assert told() == ("NBIRTH/irtwin", (0, {"bdSeq": 0, "Node Control/Rebirth": False}))
+        node.tell([ARM])
+        assert told() == ("DBIRTH/irtwin/Arm_1", (1, born))
+        node.tell([ARM])
+        node.tell([ARM | {"power_W": 300.0}])
+        assert told() == ("DDATA/irtwin/Arm_1", (2, {"Power/W": 300.0}))
+        host.publish("spBv1.0/plant/NCMD/irtwin", payload([("Node Control/Rebirth", 11, True)]))
+        assert [told()[0], told()[0]] == ["NCMD/irtwin", "NBIRTH/irtwin"]
+        assert told() == ("DBIRTH/irtwin/Arm_1", (1, born | {"Power/W": 300.0}))
+        node.tell([])
+        assert told() == ("DDEATH/irtwin/Arm_1", (2, {}))
+        node._client.socket().shutdown(socket.SHUT_RDWR)  # it breaks: the broker tells the death that was left with it
+        assert told() == ("NDEATH/irtwin", (None, {"bdSeq": 0}))
+        assert told() == ("NBIRTH/irtwin", (0, {"bdSeq": 1, "Node Control/Rebirth": False}))
+        assert "the connection is lost" in said[0]
+        node.close()
+        assert told() == ("NDEATH/irtwin", (None, {"bdSeq": 1}))
 
 
 def test_a_broker_that_is_not_there_holds_nobody_up() -> None:
