@@ -60,7 +60,10 @@ class Followed:
             assert time.monotonic() < ends, (len(self.states), self.refused[:3], self.said)
             time.sleep(0.02)
 
-    def end(self) -> None:
+    def __enter__(self) -> Followed:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._done.set()
         self._thread.join(10.0)
         assert not self._thread.is_alive()
@@ -73,9 +76,8 @@ def said(tmp_path: Path, text: str) -> Path:
 
 
 def test_axes_of_opc_40010_are_read_in_their_unit(served: ServedRobot) -> None:
-    it = Followed(served)
-    it.until(lambda: len(it.states) > 60)
-    it.end()
+    with Followed(served) as it:
+        it.until(lambda: len(it.states) > 60)
     assert it.client.what == "position (deg)"
     assert (it.refused, it.said) == ([], [])
     assert abs(it.states[-1].time - time.time()) < 5.0
@@ -94,9 +96,8 @@ def test_node_ids_units_and_the_power_are_those_of_the_file(served: ServedRobot,
         OpcUa(served.address, arm(6), "arm", said(tmp_path, text.replace("=P", "=Q")))
     with pytest.raises(InputError, match='"bar" is no unit of it'):
         OpcUa(served.address, arm(6), "arm", said(tmp_path, text.replace("kW", "bar")))
-    it = Followed(served, said(tmp_path, text))
-    it.until(lambda: len(it.states) > 10)
-    it.end()
+    with Followed(served, said(tmp_path, text)) as it:
+        it.until(lambda: len(it.states) > 10)
     assert it.states[-1].of("power") == (500.0,)
 
 
@@ -119,25 +120,23 @@ def test_a_file_that_says_what_is_none_is_refused(tmp_path: Path, text: str, why
 
 
 def test_a_number_that_is_none_and_a_node_that_fails_are_refused_and_the_rest_goes_on(served: ServedRobot) -> None:
-    it = Followed(served)
-    failed = ua.StatusCode(ua.StatusCodes.BadSensorFailure)
-    for value, why in (
-        (ua.Variant(float("nan")), "position is not a number within"),
-        (ua.DataValue(ua.Variant(1.0), StatusCode=failed), "position ns=2;s=A2: BadSensorFailure"),
-    ):
-        served.values = {"ns=2;s=A2": value}
-        it.until(lambda why=why: any(why in reason for reason in it.refused))
-    served.values = {}
-    count = len(it.states)
-    it.until(lambda: len(it.states) > count + 20)
-    it.end()
+    with Followed(served) as it:
+        failed = ua.StatusCode(ua.StatusCodes.BadSensorFailure)
+        for value, why in (
+            (ua.Variant(float("nan")), "position is not a number within"),
+            (ua.DataValue(ua.Variant(1.0), StatusCode=failed), "position ns=2;s=A2: BadSensorFailure"),
+        ):
+            served.values = {"ns=2;s=A2": value}
+            it.until(lambda why=why: any(why in reason for reason in it.refused))
+        served.values = {}
+        count = len(it.states)
+        it.until(lambda: len(it.states) > count + 20)
     assert it.said == []
 
 
 def test_a_text_where_a_number_should_be_is_refused(served: ServedRobot, tmp_path: Path) -> None:
-    it = Followed(served, said(tmp_path, 'power = "ns=2;s=T"\nunits = { power = "W" }\n'))
-    it.until(lambda: it.refused)
-    it.end()
+    with Followed(served, said(tmp_path, 'power = "ns=2;s=T"\nunits = { power = "W" }\n')) as it:
+        it.until(lambda: it.refused)
     assert it.refused[0] == f"{served.address}: power ns=2;s=T: 'open' is not a number"
     assert it.states == []
 
@@ -146,9 +145,8 @@ def test_a_text_where_a_number_should_be_is_refused(served: ServedRobot, tmp_pat
 def test_a_robot_that_stands_has_states_though_no_position_has_a_new_time(served: ServedRobot) -> None:
     served.still = True
     time.sleep(2.1)
-    it = Followed(served)
-    it.until(lambda: len(it.states) >= 3)
-    it.end()
+    with Followed(served) as it:
+        it.until(lambda: len(it.states) >= 3)
     assert abs(it.states[0].time - time.time()) < 8.0
     steps = [later.time - state.time for state, later in zip(it.states, it.states[1:], strict=False)]
     assert steps == pytest.approx([0.5] * len(steps), abs=0.1)
@@ -158,27 +156,25 @@ def test_a_robot_that_stands_has_states_though_no_position_has_a_new_time(served
 @pytest.mark.parametrize("hung", [1, 6])
 def test_a_node_that_hangs_while_its_status_is_good_is_refused(served: ServedRobot, hung: int) -> None:
     served.stands = True
-    it = Followed(served)
-    it.until(lambda: len(it.states) > 40)
-    assert it.refused == []
-    served.hung, served.stands = hung, False
-    it.until(lambda: it.refused)
-    assert it.refused[0].endswith("position ns=2;s=A1: hangs: its status is good, its time stands still")
-    served.hung, count = 0, len(it.states)
-    it.until(lambda: len(it.states) > count + 10)
-    it.end()
+    with Followed(served) as it:
+        it.until(lambda: len(it.states) > 40)
+        assert it.refused == []
+        served.hung, served.stands = hung, False
+        it.until(lambda: it.refused)
+        assert it.refused[0].endswith("position ns=2;s=A1: hangs: its status is good, its time stands still")
+        served.hung, count = 0, len(it.states)
+        it.until(lambda: len(it.states) > count + 10)
     assert it.said == []
 
 
 def test_a_connection_that_is_lost_is_made_again(served: ServedRobot) -> None:
-    it = Followed(served)
-    it.until(lambda: len(it.states) > 10)
-    served.stop()
-    it.until(lambda: it.said)
-    count = len(it.states)
-    served.start()
-    it.until(lambda: len(it.states) > count + 10)
-    it.end()
+    with Followed(served) as it:
+        it.until(lambda: len(it.states) > 10)
+        served.stop()
+        it.until(lambda: it.said)
+        count = len(it.states)
+        served.start()
+        it.until(lambda: len(it.states) > count + 10)
     assert "the connection is lost" in it.said[0]
     assert it.said[-1] == f"{served.address}: connected again"
     assert all(later.time > state.time for state, later in zip(it.states, it.states[1:], strict=False))

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.data_sets import irtwin
+from tests.data_sets import done
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.storage.database import Workspace
@@ -19,7 +19,7 @@ CONSUMPTION = ("fleet_totals", "energy_per_robot", "energy_per_day", "energy_per
 
 
 def totals(workspace: Path) -> dict[str, str]:
-    return {name: irtwin("query", name, "--workspace", workspace, "--format", "csv").out for name in CONSUMPTION}
+    return {name: done("query", name, "--workspace", workspace, "--format", "csv") for name in CONSUMPTION}
 
 
 @pytest.mark.nightly
@@ -28,10 +28,9 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
     before = totals(workspace)
     assert all(len(answer.splitlines()) > 1 for answer in before.values())
     log = next((small_run / "data" / "runs").iterdir())
-    live = irtwin("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
-    assert live.status == 0, live.err
+    done("live", "--replay", log, "--robot", "Arm", "--speed", "100", "--workspace", workspace)
     assert totals(workspace) == before
-    assert irtwin("workspace", "reason", "--workspace", workspace).status == 0
+    done("workspace", "reason", "--workspace", workspace)
     assert totals(workspace) == before
     with Workspace.existing(workspace) as place, KnowledgeGraph.of_workspace(place) as graph:
         (run,) = graph.query(
@@ -39,9 +38,9 @@ def test_a_replay_changes_no_total_and_is_said_to_be_one(small_run: Path, tmp_pa
             "OPTIONAL { ?run irt:Modelled_Energy ?modelled } OPTIONAL { ?run irt:Energy_Consumption ?took } }"
         )
         assert run["took"] is None and run["modelled"] is not None
-    assert "1 replayed" in irtwin("workspace", "status", "--workspace", workspace).out
-    assert irtwin("run", small_run / "data", "--workspace", workspace).status == 0  # which keeps it
-    assert "1 replayed" in irtwin("workspace", "status", "--workspace", workspace).out
+    assert "1 replayed" in done("workspace", "status", "--workspace", workspace)
+    done("run", small_run / "data", "--workspace", workspace)  # which keeps it
+    assert "1 replayed" in done("workspace", "status", "--workspace", workspace)
 
 
 @pytest.mark.nightly
@@ -51,8 +50,7 @@ def test_what_a_simulator_wrote_is_no_consumption(small_run: Path, tmp_path: Pat
     head, *runs = text.split("[[run]]")
     simulated = [re.sub('role = "[a-z]+"', 'role = "simulated"', run) for run in runs]
     (data / "dataset.toml").write_text("[[run]]".join([head, *simulated]), encoding="utf-8")
-    done = irtwin("run", data, "--workspace", tmp_path / "workspace")
-    assert done.status == 0, done.err
+    done("run", data, "--workspace", tmp_path / "workspace")
     with Workspace.existing(tmp_path / "workspace") as place, KnowledgeGraph.of_workspace(place) as graph:
         (count,) = graph.query("SELECT (COUNT(?run) AS ?runs) (COUNT(?took) AS ?energies) { ?run a irt:Simulated_Run "
                                "OPTIONAL { ?run irt:Energy_Consumption ?took } }")  # fmt: skip
