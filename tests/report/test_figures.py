@@ -4,6 +4,7 @@ import pytest
 from tests.report.robots import Factory, answers, power_only, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
+from irtwin.report.colours import effect_colour
 from irtwin.report.energy.figures import figures
 from irtwin.report.traces import plain
 
@@ -34,14 +35,15 @@ def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: Knowled
     assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0 / 3.6, rel=1e-4)
 
 
-def test_effects_are_named_by_the_ontology_and_keep_their_colour(graph: KnowledgeGraph):
+def test_effects_are_named_by_the_ontology_and_have_their_colour_in_each_figure(graph: KnowledgeGraph):
     drawn = figures(answers(graph, six_axis(graph)))
     colours = [
         {trace["name"]: trace["marker"]["color"] for trace in drawn[name]["data"]}
         for name in ("energy_per_effect", "energy_per_joint_and_effect")
     ]
     assert colours[0] == colours[1]
-    assert "Coulomb friction" in colours[0]
+    for name, effect in (("Coulomb friction", "coulomb_friction"), ("standby power", "standby_power")):
+        assert colours[0][name] == effect_colour(effect)
     assert drawn["energy_per_joint_and_effect"]["layout"]["xaxis"]["categoryarray"][-1] == "whole robot"
 
 

@@ -61,10 +61,6 @@ def test_every_figure_is_drawn(page: Page):
     assert page.locator("#figure-power .scatterlayer .trace").count() == 6
 
 
-def test_the_file_is_small(file: Path):
-    assert file.stat().st_size < 3e6
-
-
 def test_the_scenes_script_may_run(page: Page):
     assert page.locator("#stub").get_attribute("data-ran") == "yes"
 

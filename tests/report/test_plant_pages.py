@@ -255,3 +255,19 @@ def test_what_is_next_to_nothing_is_counted_alone(plant: KnowledgeGraph) -> None
     tiny = {**rows[0], "entry": "tiny", "entry_j": 1e-9}
     found = robot.of_run({**answers, "ledger": replace(answers["ledger"], rows=(*rows, tiny))})
     assert [entry for entry in found["entries"] if entry not in found["told"]] == [[tiny]]
+
+
+def test_each_line_is_on_one_page() -> None:
+    lines = list(range(2 * page.PAGE + 1))
+    assert page.pages(lines) == 3
+    assert [line for number in (1, 2, 3) for line in page.on_page(lines, number)] == lines
+    assert list(page.on_page(lines, 99)) == [2 * page.PAGE]
+    assert page.pages([]) == 1
+    assert not page.on_page([], 4)
+
+
+@pytest.mark.parametrize(
+    ("said", "number"), [(None, 1), ("", 1), ("7", 7), ("0", 1), ("-3", 1), ("x", 1), ("²", 1), ("9" * 40, 1)]
+)
+def test_an_address_says_its_page_or_nonsense(said: str | None, number: int) -> None:
+    assert page.page_number(said) == number

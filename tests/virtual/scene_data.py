@@ -53,7 +53,6 @@ def unpack(packed: Packed) -> np.ndarray:
 def embedded(fragment: Fragment) -> dict[str, Any]:
     """Read the data that the fragment carries, signals decoded: q and torque (frames, n), energy, power (frames,)."""
     found = re.search(r'<script type="application/json">(.*?)</script>', fragment.html, re.DOTALL)
-    assert found is not None
     data: dict[str, Any] = json.loads(found.group(1))
     for one in data["runs"]:
         one["energy"] = np.frombuffer(base64.b64decode(one["energy"]), dtype="<f4")

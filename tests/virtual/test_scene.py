@@ -1,4 +1,5 @@
 import base64
+import json
 import re
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ from irtwin.robot.kinematics import flange, link_placements
 from irtwin.robot.meshes import Mesh
 from irtwin.robot.structure import structure_of
 from irtwin.robot.urdf import parse_urdf
-from irtwin.virtual.scene import scene_html
+from irtwin.virtual.scene import apart_html, scene_html
 
 KR6 = kr6()
 
@@ -58,7 +59,6 @@ def test_signals_are_those_of_the_run_at_25_frames_a_second() -> None:
     assert data["step"] == pytest.approx(0.04)
     np.testing.assert_allclose(data["energy"], np.interp(frames, shown.time, shown.energy), rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(data["q"][:, 2], np.interp(frames, shown.time, shown.q[:, 2]), atol=3e-5)
-    assert shown.torque is not None
     np.testing.assert_allclose(data["torque"][:, 5], np.interp(frames, shown.time, shown.torque[:, 5]), atol=6e-4)
     assert data["energy"][-1] == pytest.approx(shown.energy[-1], rel=1e-6)
 
@@ -207,3 +207,20 @@ def test_large_meshes_are_drawn_with_few_triangles() -> None:
     fragment = scene_html(robot, [run(robot)], meshes={SLIDE: mesh, ARM: mesh})
     assert all(len(base64.b64decode(one["faces"])) <= 8_000 * 12 for one in embedded(fragment)["meshes"])
     assert len(fragment.html) < 1_000_000
+
+
+POSES = {"as it is": np.array([0.3, -0.2]), "with the robot's numbers": np.array([0.11, 0.19])}
+
+
+def test_each_pose_of_a_robot_and_its_simulator_has_a_picture_with_its_caption() -> None:
+    html = str(apart_html(bare(), np.array([0.1, 0.2]), POSES).html)
+    assert html.count('class="ia-picture"') == 2
+    assert re.findall(r"<figcaption>(.*?)</figcaption>", html) == ["as it is", "with the robot&#39;s numbers"]
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+    assert (data["robot"], data["simulators"]) == ([0.1, 0.2], [[0.3, -0.2], [0.11, 0.19]])
+
+
+def test_a_name_of_a_pose_stays_a_name() -> None:
+    html = str(apart_html(bare(HOSTILE), np.array([0.1, 0.2]), {HOSTILE: np.zeros(2)}).html)
+    assert "<script>window.hacked" not in html
+    assert "<img src=x" not in html

@@ -21,7 +21,7 @@ from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import link_placements
 from irtwin.robot.meshes import Mesh, read_mesh
 from irtwin.virtual.performance import Performance
-from irtwin.virtual.scene import scene_html
+from irtwin.virtual.scene import apart_html, scene_html
 
 pytestmark = pytest.mark.system
 
@@ -49,11 +49,7 @@ COLOURS = """() => {
 
 
 def open_page(
-    browser: Any,
-    folder: Path,
-    robot: Robot,
-    *more: Performance,
-    meshes: Mapping[str, Mesh] | None = None,
+    browser: Any, folder: Path, robot: Robot, *more: Performance, meshes: Mapping[str, Mesh] | None = None
 ) -> tuple[Any, list[str]]:
     """Open the scene of runs as a file; return the page and whatever it complains of or asks for."""
     path = folder / "scene.html"
@@ -151,7 +147,6 @@ def test_joints_that_slide_stand_right_and_a_curve_of_each_follows_the_time(brow
     assert values() == [f"{at[0]:.3f} m", f"{np.degrees(at[1]):.1f}°"]
     before = page.eval_on_selector(".is-joints path", "path => path.getAttribute('d')")
     page.select_option(".is-quantity", "torque")
-    assert shown.torque is not None
     at = [np.interp(7.0, shown.time, column) for column in shown.torque.T]
     assert values() == [f"{at[0]:.1f} N", f"{at[1]:.1f} N m"]
     assert page.eval_on_selector(".is-joints path", "path => path.getAttribute('d')") != before
@@ -237,3 +232,18 @@ def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     assert page.locator(".is-run option").all_inner_texts() == ["sweep", HOSTILE]
     assert page.evaluate("window.hacked === undefined")
     assert complaints == []
+
+
+def test_a_robot_and_its_simulator_are_drawn_in_one_picture_a_pose(browser: Any, tmp_path: Path) -> None:
+    poses = {"as it is": np.array([0.3, -0.2]), "with the robot's numbers": np.array([0.11, 0.19])}
+    fragment = apart_html(bare(), np.array([0.1, 0.2]), poses)
+    policy = content_policy(fragment.scripts)
+    (tmp_path / "p.html").write_text(f"{PAGE.format(policy)}</head><body>{fragment.html}</body></html>")
+    page = browser.new_page()
+    complaints = complaints_of(page)
+    page.goto((tmp_path / "p.html").as_uri())
+    page.locator(".ia-picture img[src]").nth(1).wait_for(state="attached")
+    drawn = "() => [...document.querySelectorAll('.ia-picture img')].map(each => each.naturalWidth)"
+    assert all(width > 0 for width in page.evaluate(drawn))
+    assert complaints == []
+    page.close()
