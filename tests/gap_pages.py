@@ -22,12 +22,10 @@ from irtwin.storage.schema import JointRow
 from tests import gap_cases, rows
 
 
-def six_axis(workspace: Workspace) -> None:
-    """Put the robot of `gap_cases`, and its runs, into a workspace."""
-    joints = [
-        JointRow(robot_id=rows.ROBOT, name=name, position=k, kind="revolute")
-        for k, name in enumerate(gap_cases.JOINTS, 1)
-    ]
+def six_axis(workspace: Workspace, kind: str = "revolute") -> None:
+    """Put the robot of `gap_cases`, with joints of a kind, and its runs, into a workspace."""
+    names = enumerate(gap_cases.JOINTS, 1)
+    joints = [JointRow(robot_id=rows.ROBOT, name=name, position=k, kind=kind) for k, name in names]
     runs = [rows.run(name, role="reference" if name.startswith("ref") else "observed") for name in gap_cases.RUNS]
     workspace.ingest(rows.robot(controlled_axes=6), joints, runs, {run.run_id: rows.samples(1) for run in runs})
 
@@ -41,19 +39,18 @@ def graph_of(workspace: Workspace) -> KnowledgeGraph:
     return graph
 
 
-def page_of(place: Path, said: dict[str, Any], drawn: dict[str, Any] | None = None) -> str:
+def page_of(
+    place: Path, said: dict[str, Any], drawn: dict[str, Any] | None = None, twin: str | None = None, **robot: str
+) -> str:
     """Return the page of a diagnosis, which is then `place`/p.html."""
     with Workspace(place / "w") as workspace:
-        six_axis(workspace)
+        six_axis(workspace, **robot)
         curves = Curves.from_json(drawn or gap_cases.evidence("attributed"))
-        record(workspace, rows.ROBOT, Document.from_json(said), curves)
+        record(workspace, rows.ROBOT, Document.from_json(said), curves, twin)
         render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, place / "p.html")
     return (place / "p.html").read_text()
 
 
 def figures_of(page: Path) -> dict[str, Any]:
     """Return what a page draws, by the name of the figure."""
-    found = re.search(r'id="page-data">(.*?)</script>', page.read_text())
-    assert found
-    figures: dict[str, Any] = json.loads(found[1])["figures"]
-    return figures
+    return json.loads(re.search(r'id="page-data">(.*?)</script>', page.read_text())[1])["figures"]

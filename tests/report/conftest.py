@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.report.robots import Factory, PageOf
+from tests.report.robots import Factory, PageOf, answers, six_axis
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy.page import render
+from irtwin.report.questions import Answers
 
 
 @pytest.fixture
@@ -16,6 +17,14 @@ def graph() -> KnowledgeGraph:
     graph = KnowledgeGraph()
     graph.load_ontology()
     return graph
+
+
+@pytest.fixture(scope="session")
+def six_answers() -> Answers:
+    """What the questions say of a robot of six axes."""
+    graph = KnowledgeGraph()
+    graph.load_ontology()
+    return answers(graph, six_axis(graph))
 
 
 @pytest.fixture

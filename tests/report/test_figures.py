@@ -1,32 +1,38 @@
 import json
+from typing import Any
 
 import pytest
-from tests.report.robots import Factory, answers, power_only, six_axis
+from tests.report.robots import Factory, answers, power_only
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.colours import effect_colour
 from irtwin.report.energy.figures import figures
+from irtwin.report.questions import Answers
 from irtwin.report.traces import plain
 
 
-def test_energy_per_run_shows_measured_beside_modelled(graph: KnowledgeGraph):
-    figure = figures(answers(graph, six_axis(graph)))["energy_per_run"]
+@pytest.fixture(scope="module")
+def drawn(six_answers: Answers) -> dict[str, Any]:
+    return figures(six_answers)
+
+
+def test_energy_per_run_shows_measured_beside_modelled(drawn: dict[str, Any]):
+    figure = drawn["energy_per_run"]
     measured, modelled = figure["data"]
     assert len(measured["x"]) == len(modelled["x"]) == 6
     assert modelled["y"] == [2.5] * 6  # Wh
     assert figure["layout"]["yaxis"]["title"]["text"] == "energy, Wh"
 
 
-def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(graph: KnowledgeGraph):
-    figure = figures(answers(graph, six_axis(graph)))["energy_error"]
+def test_energy_error_tells_held_out_runs_from_fitted_ones_and_shows_the_seed(drawn: dict[str, Any]):
+    figure = drawn["energy_error"]
     held_out, fitted = figure["data"]
     assert sorted(held_out["y"]) == [2.0, 3.0]
     assert sorted(fitted["y"]) == [2.0, 3.0, 4.0, 5.0]
     assert [line["y0"] for line in figure["layout"]["shapes"]] == [6.54]
 
 
-def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: KnowledgeGraph):
-    drawn = figures(answers(graph, six_axis(graph)))
+def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(drawn: dict[str, Any]):
     total = 6 * 2.5  # Wh
     for name in ("energy_per_effect", "energy_per_joint_and_effect"):
         assert sum(sum(trace["y"]) for trace in drawn[name]["data"]) == pytest.approx(total, rel=1e-4)
@@ -35,8 +41,7 @@ def test_stacks_by_effect_and_by_joint_sum_to_the_modelled_energy(graph: Knowled
     assert sum(sum(trace["y"]) for trace in by_joint["data"]) == pytest.approx(6 * 6.0 / 3.6, rel=1e-4)
 
 
-def test_effects_are_named_by_the_ontology_and_have_their_colour_in_each_figure(graph: KnowledgeGraph):
-    drawn = figures(answers(graph, six_axis(graph)))
+def test_effects_are_named_by_the_ontology_and_have_their_colour_in_each_figure(drawn: dict[str, Any]):
     colours = [
         {trace["name"]: trace["marker"]["color"] for trace in drawn[name]["data"]}
         for name in ("energy_per_effect", "energy_per_joint_and_effect")

@@ -13,9 +13,7 @@ from tests.gap_pages import figures_of, graph_of, page_of, six_axis
 from tests.html_elements import plain
 from tests.screens import complaints_of
 
-from irtwin.document.curves import Curves
 from irtwin.errors import InputError
-from irtwin.providers.gap import record
 from irtwin.providers.names import robot_iri
 from irtwin.report.gap.page import render_gap
 from irtwin.report.gap.summary import line
@@ -28,15 +26,10 @@ ORDER = ["summary", "where", "which", "friction", "shrink", "next", "untestable"
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    files = {}
     base = tmp_path_factory.mktemp("gap")
     for verdict in gap_cases.VERDICTS:
-        with Workspace(base / verdict) as workspace:
-            six_axis(workspace)
-            record(workspace, rows.ROBOT, gap_cases.document(verdict), gap_cases.curves(verdict), "{}")
-            files[verdict] = base / f"{verdict}.html"
-            render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, files[verdict])
-    return files
+        page_of(base / verdict, gap_cases.diagnosis(verdict), gap_cases.evidence(verdict), twin="{}")
+    return {verdict: base / verdict / "p.html" for verdict in gap_cases.VERDICTS}
 
 
 @pytest.fixture(scope="module")
@@ -276,13 +269,7 @@ def test_every_figure_is_drawn_without_network(browser: Any, pages: dict[str, Pa
 
 
 def test_the_residual_of_a_joint_that_slides_is_a_force(tmp_path: Path):
-    drawn = gap_cases.evidence("attributed")
-    with Workspace(tmp_path / "w") as workspace:
-        six_axis(workspace)
-        with workspace.engine.begin() as connection:
-            connection.exec_driver_sql("UPDATE joint SET kind = 'prismatic'")
-        record(workspace, rows.ROBOT, gap_cases.document("attributed"), Curves.from_json(drawn))
-        render_gap(graph_of(workspace), robot_iri(rows.ROBOT), workspace.read_document, tmp_path / "p.html")
+    page_of(tmp_path, gap_cases.diagnosis("attributed"), kind="prismatic")
     titles = [
         figure["layout"]["yaxis"]["title"]["text"]
         for name, figure in figures_of(tmp_path / "p.html").items()

@@ -9,26 +9,25 @@ from tests.report.robots import Factory, answers, power_only, six_axis
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.energy import lead
+from irtwin.report.questions import Answers
 
 # Of `six_axis`: 6 runs of 20 s, 9 kJ modelled each, measured less by 2 to 5, 2 and 3 %.
 JOULES = sum(9000 / (1 + error / 100) for error in (2, 3, 4, 5, 2, 3))
 
 
-def test_what_was_taken_and_what_an_hour_takes(graph: KnowledgeGraph) -> None:
-    found = answers(graph, six_axis(graph))
+def test_what_was_taken_and_what_an_hour_takes(six_answers: Answers) -> None:
     said = f"This robot took {JOULES / 3600:.1f} Wh in 6 runs of 2 min 0 s, measured: {JOULES / 120 / 1000:.3f} kWh"
-    assert plain(lead.taken(found)) == f"{said} for each hour of such work."
+    assert plain(lead.taken(six_answers)) == f"{said} for each hour of such work."
 
 
-def test_a_constant_power_stands_beside_the_twin(graph: KnowledgeGraph) -> None:
-    found = answers(graph, six_axis(graph))
+def test_a_constant_power_stands_beside_the_twin(six_answers: Answers) -> None:
     mean = sum(9000 / (1 + error / 100) for error in (2, 3, 4, 5)) / 4  # J, of runs equally long
     misses = [100 * abs(mean * (1 + error / 100) / 9000 - 1) for error in (2, 3)]
-    constant = lead.constant_power(found)
+    constant = lead.constant_power(six_answers)
     assert constant["error_percent"] == pytest.approx(sum(misses) / 2, rel=1e-4)
     assert constant["mean_power_w"] == pytest.approx(mean / 20, rel=1e-4)
     assert (constant["runs"], constant["error_worst_percent"]) == (2, pytest.approx(max(misses), rel=1e-4))
-    assert "A constant power, the mean of the runs that the twin was fitted to, would miss" in lead.trust(found)
+    assert "A constant power, the mean of the runs that the twin was fitted to, would miss" in lead.trust(six_answers)
 
 
 def test_a_run_cut_in_time_has_no_constant_power_beside_it(graph: KnowledgeGraph) -> None:
