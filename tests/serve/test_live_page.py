@@ -12,7 +12,7 @@ import httpx
 import pytest
 from tests.endpoint import Server, serving
 from tests.forks import Command
-from tests.screens import faults, narrow_and_dark
+from tests.screens import complaints_of, faults, narrow_and_dark
 from tests.waiting import wait_for
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -74,12 +74,8 @@ def test_too_many_pages_are_refused_and_those_that_leave_make_room(robot: Server
 
 @pytest.mark.system
 def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, browser: Any) -> None:
-    complaints: list[str] = []
     page = browser.new_page(viewport={"width": 900, "height": 700})
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on(
-        "request", lambda it: None if it.url.startswith((robot.url, "data:", "blob:")) else complaints.append(it.url)
-    )
+    complaints = complaints_of(page, (robot.url, "data:", "blob:"))
     page.goto(f"{robot.url}/live/Arm")
     wait_for(lambda: page.inner_text("#stream") == "not watched yet")
     log = next((folder / "data").rglob("*.parquet"))

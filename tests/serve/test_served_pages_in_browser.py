@@ -31,32 +31,34 @@ def opened(browser: Any, plant: Server) -> Iterator[tuple[Any, list[str]]]:
 
 
 @pytest.fixture
-def page(opened: tuple[Any, list[str]]) -> tuple[Any, list[str]]:
-    """The page as if it were new: wide, light, empty, and without a complaint."""
-    page, complaints = opened
+def complaints(opened: tuple[Any, list[str]]) -> list[str]:
+    """What the page of a test complains of: one that is to complain looks at it, and clears it."""
+    return opened[1]
+
+
+@pytest.fixture
+def page(opened: tuple[Any, list[str]], complaints: list[str]) -> Iterator[Any]:
+    """The page as if it were new: wide, light and empty. It complains of nothing until the test ends."""
+    page, _ = opened
     page.goto("about:blank")
     page.set_viewport_size({"width": 1440, "height": 900})
     page.emulate_media(color_scheme="light")
     complaints.clear()
-    return opened
+    yield page
+    assert complaints == []
 
 
 @pytest.mark.parametrize("path", PAGES)
-def test_each_page_wide_and_narrow_light_and_dark(page: tuple[Any, list[str]], plant: Server, path: str) -> None:
-    page, complaints = page
+def test_each_page_wide_and_narrow_light_and_dark(page: Any, plant: Server, path: str) -> None:
     page.goto(plant.url + path)
     page.wait_for_selector(READY.get(path, "main h1"))
     assert not is_dark(page)
     assert page.evaluate("document.documentElement.scrollWidth") == 1440
     assert faults(page) == []
     assert narrow_and_dark(page) == []
-    assert complaints == []
 
 
-def test_a_question_is_answered_under_headings_with_units_and_plotted(
-    page: tuple[Any, list[str]], plant: Server
-) -> None:
-    page, complaints = page
+def test_a_question_is_answered_under_headings_with_units_and_plotted(page: Any, plant: Server) -> None:
     page.goto(f"{plant.url}/query")
     page.wait_for_selector("#questions button")
     said = plant.get("/questions.json").json()
@@ -85,7 +87,6 @@ def test_a_question_is_answered_under_headings_with_units_and_plotted(
         "([names, tables]) => names.map((name) => irtwinAnswer.headingOf(name, tables))", [names, said["headings"]]
     )
     assert here == [heading(name) for name in names]
-    assert complaints == []
 
 
 ASKED = {
@@ -97,8 +98,7 @@ ASKED = {
 }
 
 
-def test_whatever_is_asked(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, complaints = page
+def test_whatever_is_asked(page: Any, complaints: list[str], plant: Server) -> None:
     page.goto(f"{plant.url}/query")
     page.wait_for_selector("#questions button")
     for query, said in ASKED.items():
@@ -107,18 +107,17 @@ def test_whatever_is_asked(page: tuple[Any, list[str]], plant: Server) -> None:
         page.keyboard.press("Control+Enter")
         page.wait_for_selector(f"#said >> text={said}")
     assert all("400 (Bad Request)" in complaint for complaint in complaints)
+    complaints.clear()
     page.focus(".CodeMirror textarea")
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.id") == "run"
 
 
-def test_a_long_name_of_a_file_is_broken(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, complaints = page
+def test_a_long_name_of_a_file_is_broken(page: Any, plant: Server) -> None:
     page.set_viewport_size({"width": 400, "height": 900})
     page.goto(plant.url + next(path for path in PAGES if path.startswith("/run/")))
     page.evaluate("document.querySelector('#files code').textContent = `series/${'a'.repeat(64)}.parquet`")
     assert page.evaluate("document.documentElement.scrollWidth") == 400
-    assert complaints == []
 
 
 def until(page: Any, what: str) -> None:
@@ -130,8 +129,7 @@ def until(page: Any, what: str) -> None:
     pytest.fail(what)
 
 
-def test_curves_zoom_and_mark_a_moment(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, complaints = page
+def test_curves_zoom_and_mark_a_moment(page: Any, plant: Server) -> None:
     page.goto(f"{plant.url}/run/Arm_A.fit_1#t=7.3")
     until(page, "document.getElementById('moment').value === '7.3'")
     lines = "document.getElementById('curves').data.map((line) => [line.name, line.x.length, Math.max(...line.y)])"
@@ -150,11 +148,9 @@ def test_curves_zoom_and_mark_a_moment(page: tuple[Any, list[str]], plant: Serve
     assert [line[0] for line in page.evaluate(lines)] == ["fit_1", "check_1", "j1", "j1"]
     assert faults(page) == []
     assert narrow_and_dark(page) == []
-    assert complaints == []
 
 
-def test_from_the_plant_to_a_run_and_a_comparison(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, complaints = page
+def test_from_the_plant_to_a_run_and_a_comparison(page: Any, plant: Server) -> None:
     page.goto(plant.url)
     page.click("#measured tbody th >> text=Arm_A")
     page.wait_for_selector("h1 >> text=Arm_A")
@@ -176,11 +172,9 @@ def test_from_the_plant_to_a_run_and_a_comparison(page: tuple[Any, list[str]], p
     page.wait_for_selector("h1 >> text=check_1")
     page.click("text=All that the graph says")
     page.wait_for_selector("text=https://w3id.org/irtwin/id/run/Arm_A.check_1")
-    assert complaints == []
 
 
-def test_by_keyboard(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, _ = page
+def test_by_keyboard(page: Any, plant: Server) -> None:
     page.goto(plant.url)
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.className") == "skip"
@@ -189,7 +183,7 @@ def test_by_keyboard(page: tuple[Any, list[str]], plant: Server) -> None:
     assert page.evaluate("document.activeElement.closest('main') !== null")
 
 
-def test_a_report_cannot_ask_the_server(page: tuple[Any, list[str]], plant: Server) -> None:
-    page, _ = page
+def test_a_report_cannot_ask_the_server(page: Any, complaints: list[str], plant: Server) -> None:
     page.goto(f"{plant.url}/reports/Arm_A.html")
     page.wait_for_selector("text=kept out")
+    complaints.clear()  # that it was
