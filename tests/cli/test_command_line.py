@@ -175,6 +175,12 @@ def test_a_command_by_its_old_name_says_the_new_one_and_does_what_it_did(tmp_pat
         (["diagnose", "robots", "--out", "o", "--json", "x"], "--json is for one data set, and does not go with --out"),
         (["improve", "Arm", "--repair"], "--repair says how LOG was made, and goes with it"),
         (["import", "--repair", "--out", "set"], "--repair says how to read a FILE: give one"),
+        (["workspace", "reason", "in.ttl"], "Missing option '--out'"),
+        (["workspace", "reason", "--out", "out.ttl"], "SOURCE and --out go together"),
+        (["query", "ASK {}", "--graph", "somewhere"], "give the URL of a SPARQL server"),
+        (["export"], "Give one of --owl, --ros, --urdf, --mjcf, --sdf, --usd, --aas."),
+        (["export", "--owl", "a.owl", "--twin", "twin.json"], "--twin goes with --urdf, --mjcf, --sdf or --usd."),
+        (["export", "--owl", "a.owl", "--robot", "Arm"], "--owl writes the whole graph; leave --robot out."),
     ],
 )
 def test_a_users_mistake_exits_with_2(tmp_path, monkeypatch, arguments, message):
@@ -243,11 +249,6 @@ def test_the_exported_ontology_is_consistent_to_hermit(workspace, tmp_path):
     assert inconsistent == 0
 
 
-def test_reason_says_what_goes_together(tmp_path):
-    assert "Missing option '--out'" in refused("workspace", "reason", tmp_path / "in.ttl")
-    assert "SOURCE and --out go together" in refused("workspace", "reason", "--out", tmp_path / "out.ttl")
-
-
 # What a command has besides --workspace; the others have both.
 HAS = {
     "query": {"--graph"},  # it reads the graph, and no rows
@@ -263,9 +264,3 @@ def test_each_command_on_a_workspace_says_where_rows_and_graph_are():
         options = {option for parameter in command.params for option in parameter.opts}
         if "--workspace" in options:
             assert options & {"--database", "--graph"} == HAS.get(name, {"--database", "--graph"}), name
-
-
-def test_a_graph_that_is_no_url_is_refused(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert "give the URL of a SPARQL server" in refused("query", "ASK {}", "--graph", "somewhere")
-    assert not list(tmp_path.iterdir())
