@@ -50,24 +50,18 @@ def screen(folder: Path, packages: Path) -> Iterator[Screen]:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]
-        (folder / "home").mkdir(mode=0o700)
-        yield Screen(
-            {
-                "PATH": "/usr/bin:/bin",
-                "HOME": str(folder / "home"),
-                "XDG_RUNTIME_DIR": str(folder / "home"),
-                "DISPLAY": f":{display}",
-                "LIBGL_ALWAYS_SOFTWARE": "1",
-                "LANG": "C.UTF-8",
-                "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
-                "ROS_IP": "127.0.0.1",
-                "ROS_PACKAGE_PATH": f"{packages}:/usr/share",
-                "ROS_HOME": str(folder / "home"),
-                "ROS_LOG_DIR": str(folder / "home"),
-            },
-            port,
-            folder / "Xvfb_screen0",
-        )
+        home = folder / "home"
+        home.mkdir(mode=0o700)
+        environment = dict.fromkeys(("HOME", "XDG_RUNTIME_DIR", "ROS_HOME", "ROS_LOG_DIR"), str(home)) | {
+            "PATH": "/usr/bin:/bin",
+            "DISPLAY": f":{display}",
+            "LIBGL_ALWAYS_SOFTWARE": "1",
+            "LANG": "C.UTF-8",
+            "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+            "ROS_IP": "127.0.0.1",
+            "ROS_PACKAGE_PATH": f"{packages}:/usr/share",
+        }
+        yield Screen(environment, port, folder / "Xvfb_screen0")
 
 
 @contextmanager
@@ -76,15 +70,8 @@ def started(
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Give a process that is ended at the end, with all that it started."""
     with log.open("wb") as file:
-        process = subprocess.Popen(
-            command,
-            env=environment,
-            stdout=file,
-            stderr=file,
-            stdin=subprocess.DEVNULL,
-            pass_fds=keep,
-            start_new_session=True,
-        )
+        streams = {"stdin": subprocess.DEVNULL, "stdout": file, "stderr": file}
+        process = subprocess.Popen(command, env=environment, **streams, pass_fds=keep, start_new_session=True)
     try:
         yield process
     finally:

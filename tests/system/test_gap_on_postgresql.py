@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from tests import gap_cases, rows
-from tests.gap_pages import six_axis
+from tests.gap_pages import graph_of, six_axis
 
-from irtwin.knowledge.mapping import map_database
 from irtwin.knowledge.questions.queries import ask
-from irtwin.knowledge.reasoning import reason
-from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_ACTIVITY, GRAPH_SOURCE
 from irtwin.providers.gap import record
-from irtwin.resources import folder
 from irtwin.storage.database import Workspace
 
 pytestmark = pytest.mark.system
 FOREMOST = {"attributed": "viscous friction", "ambiguous": "Stribeck friction"}
 QUESTIONS = ("why_more_energy", "where_is_the_gap", "what_to_do", "gap_shrinkage", "not_testable", "next_experiment")
-MAPPINGS = sorted(Path(folder("mappings")).glob("*.r2rml.ttl"))
 
 
 def answers(workspace: Workspace) -> dict[str, list[dict[str, object]]]:
-    graph = KnowledgeGraph()
-    graph.load_ontology()
-    graph.replace(map_database(workspace.engine, MAPPINGS), GRAPH_SOURCE, GRAPH_ACTIVITY)
-    reason(graph)
+    graph = graph_of(workspace)
     return {name: [dict(row) for row in ask(graph, name)] for name in QUESTIONS}
 
 

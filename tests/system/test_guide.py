@@ -44,7 +44,7 @@ def test_its_notebooks_show_what_is_true_of_their_robot(guide: Path) -> None:
     assert "viscous_friction turn" in shown["2_simulator"] and "Fv: -9.0" in shown["2_simulator"]
     assert "<td>standby power</td>" in shown["3_energy"] and "sha256" in shown["4_ask"]
     saved = re.search(r"(\d+)[\d.]* \+- [\d.]+ J less", shown["5_cheaper_motion"])
-    assert saved is not None and int(saved[1]) > 100
+    assert int(saved[1]) > 100
     assert all((guide / "notebooks" / f"{name}.ipynb").is_file() for name in shown)
 
 
@@ -97,5 +97,4 @@ def test_each_step_of_the_tutorials_can_be_done(tmp_path: Path) -> None:
 
 def damping(model: Path, joint: str) -> float:
     tag = re.search(rf'<joint name="{joint}"[^>]* damping="([^"]+)"', model.read_text(encoding="utf-8"))
-    assert tag is not None
     return float(tag[1])

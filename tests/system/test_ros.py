@@ -77,9 +77,8 @@ def points(shape: Solid) -> np.ndarray:
         found = np.concatenate([mantle, *ends])
     else:
         tilt = np.pi * high
-        found = shape.size[0] * np.column_stack(
-            [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
-        )
+        ball = [np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)]
+        found = shape.size[0] * np.column_stack(ball)
     place = shape.origin.transform
     return found @ place[:3, :3].T + place[:3, 3]
 
@@ -87,20 +86,10 @@ def points(shape: Solid) -> np.ndarray:
 def expected(robot: Robot, q: np.ndarray, view: dict[str, float]) -> np.ndarray:
     """Return where the robot is to be seen: (HEIGHT, WIDTH), by the orbit of RViz' camera."""
     places = link_placements(robot, q)
-    cloud = np.concatenate(
-        [
-            points(shape) @ places[shape.link][:3, :3].T + places[shape.link][:3, 3]
-            for shape in structure_of(robot).solids
-            if shape.purpose == "visual" and shape.kind != "mesh"
-        ]
-    )
-    back = np.array(
-        [
-            np.cos(view["Yaw"]) * np.cos(view["Pitch"]),
-            np.sin(view["Yaw"]) * np.cos(view["Pitch"]),
-            np.sin(view["Pitch"]),
-        ]
-    )
+    shapes = [one for one in structure_of(robot).solids if one.purpose == "visual" and one.kind != "mesh"]
+    cloud = np.concatenate([points(one) @ places[one.link][:3, :3].T + places[one.link][:3, 3] for one in shapes])
+    yaw, pitch = view["Yaw"], view["Pitch"]
+    back = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     seen = cloud - np.array([view["X"], view["Y"], view["Z"]]) - view["Distance"] * back
@@ -192,4 +181,4 @@ def test_rviz_shows_the_robot_in_the_runs_last_pose(robot: Robot, run: Signals, 
     assert overlap(drawn(shown.picture), expected(robot, run.q[0], view)) < 0.7  # the measure tells poses apart
     signals, _ = read_signals(shown.copy, robot)  # as ROS wrote it, compressed
     assert np.array_equal(signals.q, run.q)
-    assert run.power is not None and np.array_equal(signals.power, run.power)
+    assert np.array_equal(signals.power, run.power)

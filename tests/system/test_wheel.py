@@ -153,9 +153,7 @@ def test_the_graph_is_served(program: Path, away: Path) -> None:
     command = [str(program), "serve", "--port", "0"]
     with subprocess.Popen(command, cwd=away, env=bare(away), stdout=subprocess.PIPE, text=True) as server:
         try:
-            assert server.stdout is not None
             told = re.search(r"http://[\d.]+:\d+", server.stdout.readline())
-            assert told is not None
             for place in ("/", "/assets/yasqe.min.js", "/assets/meshcat.js", "/live", "/sparql"):
                 with urllib.request.urlopen(told[0] + place, timeout=60) as answer:
                     assert answer.status == 200
