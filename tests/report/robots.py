@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +14,7 @@ from irtwin import resources
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, SH
 from irtwin.knowledge.vocabulary import PREFIXES as KNOWN
-from irtwin.report.questions import Answers, ask, read_questions
+from irtwin.report.questions import Answer, Answers, PageQuestion, ask, read_questions
 
 PREFIXES = "".join(f"@prefix {name}: <{place}> .\n" for name, place in (KNOWN | {"sh": SH}).items())
 EFFECTS = ("rigid_body", "coulomb_friction", "viscous_friction", "standby_power")
@@ -259,6 +260,16 @@ def answers(graph: KnowledgeGraph, factory: Factory, twin: bool = True) -> Answe
     if twin:
         bindings["twin"] = f"{ID}twin/{factory.robot_id}.1a2b"
     return ask(graph, read_questions((resources.folder("reports") / "energy").glob("*.rq")), bindings)
+
+
+def answered(rows: Mapping[str, Iterable[Mapping[str, Any]]]) -> Answers:
+    """Give rows as what questions of these names were answered."""
+    return {name: Answer(PageQuestion(name, "", (), ""), tuple(of)) for name, of in rows.items()}
+
+
+def instead(answers: Answers, **rows: Iterable[Mapping[str, Any]]) -> Answers:
+    """Return answers with other rows to some questions."""
+    return {**answers, **{name: replace(answers[name], rows=tuple(of)) for name, of in rows.items()}}
 
 
 def _checksum(name: str) -> str:

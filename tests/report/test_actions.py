@@ -7,17 +7,14 @@ from typing import Any, cast
 import pytest
 from pyoxigraph import QuerySolutions, RdfFormat, Store
 from tests import plants
+from tests.report.robots import answered
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, IRT
 from irtwin.report.plant import overview, page
 from irtwin.report.plant.actions import actions, actions_sheet
 from irtwin.report.plant.choice import Selection
-from irtwin.report.questions import Answer, Answers, PageQuestion, ask
-
-
-def answered(rows: dict[str, list[dict[str, Any]]]) -> Answers:
-    return {name: Answer(PageQuestion(name, "", (), ""), tuple(of)) for name, of in rows.items()}
+from irtwin.report.questions import ask
 
 
 def action(robot: str, what: str, done_on: str | None = None, year_j: float | None = None) -> dict[str, Any]:

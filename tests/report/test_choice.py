@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
+from tests.report.robots import instead
 
 from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
@@ -37,7 +36,7 @@ def test_days_narrow_energies(plant: KnowledgeGraph) -> None:
 
 def test_robots_are_found_grouped_and_sorted(answers: Answers) -> None:
     rows = [{**row, "cell": "7" if row["name"] == "Arm_B" else None} for row in answers["robots"].rows]
-    said = {**answers, "robots": replace(answers["robots"], rows=tuple(rows))}
+    said = instead(answers, robots=rows)
 
     def names(asked: Selection) -> list[str]:
         return [line["name"] for line in overview.overview(said, asked).groups[0].lines]
@@ -55,7 +54,7 @@ def test_what_saves_most_comes_first(answers: Answers) -> None:
     kwh = 3.6e6
     ten = {"robot": robots["Arm_A"], "energy_j": 10 * kwh, "lower_j": 9 * kwh, "upper_j": 11 * kwh}
     fifty = {"robot": robots["Arm_B"], "energy_j": 50 * kwh, "lower_j": None, "upper_j": None}
-    said = {**answers, "waiting": replace(answers["waiting"], rows=(ten, fifty))}
+    said = instead(answers, waiting=(ten, fifty))
     found = overview.overview(said)
     assert [line["name"] for line in found.groups[0].lines] == ["Arm_B", "Arm_A"]
     assert found.saving_j == pytest.approx(60 * kwh)

@@ -9,9 +9,11 @@ from tests.html_elements import plain
 
 from irtwin.report.gap.findings import ToldFinding, counted, sentence
 
+FRICTION = "Friction of joint_5 differs from the twin’s (97 % sure)"
 
-def finding(family: str = "friction", **changes: Any) -> ToldFinding:
-    """A finding of joint_5 that its data do not tell apart."""
+
+def finding(family: str = "friction", effect: str | None = None, **changes: Any) -> ToldFinding:
+    """A finding of joint_5: of one effect, as sure as the finding, or of two that its data do not tell apart."""
     known: dict[str, Any] = {
         "joints": ("joint_5",),
         "against": "twin",
@@ -23,7 +25,8 @@ def finding(family: str = "friction", **changes: Any) -> ToldFinding:
         "matters": True,
         "members": ((("load-dependent friction", 0.55), ("position-dependent friction", 0.3)),),
     }
-    return ToldFinding(family=family, **(known | changes))
+    known |= changes
+    return ToldFinding(family=family, **known | ({"members": (((effect, known["confidence"]),),)} if effect else {}))
 
 
 def said(verdict: str, *findings: ToldFinding, where: str = "", closes: str | None = "", **more: str) -> str:
@@ -34,23 +37,19 @@ LITTLE = {"matters": False, "share": 0.0004}
 
 
 def test_of_many_joints_it_is_said_how_many() -> None:
-    sure = {"members": ((("hysteresis", 0.97),),)}
-    told = said("attributed", finding(joints=tuple(f"joint_{k}" for k in range(7)), **sure))
-    assert told.startswith("Friction of 7 joints differs from the twin’s: hysteresis (97 % sure).")
-    assert "joint_0, joint_1, joint_2 and joint_3" in said(
-        "attributed", finding(joints=tuple(f"joint_{k}" for k in range(4)), **sure)
-    )
+    many, four = (finding(effect="hysteresis", joints=tuple(f"joint_{k}" for k in range(count))) for count in (7, 4))
+    assert said("attributed", many).startswith("Friction of 7 joints differs from the twin’s: hysteresis (97 % sure).")
+    assert "joint_0, joint_1, joint_2 and joint_3" in said("attributed", four)
 
 
 def test_the_family_is_said_before_its_effects() -> None:
     assert said("ambiguous", finding(), closes=" It closes.") == (
-        "Friction of joint_5 differs from the twin’s (97 % sure): load-dependent friction (55 %) or position-dependent "
-        "friction (30 %). It closes."
+        f"{FRICTION}: load-dependent friction (55 %) or position-dependent friction (30 %). It closes."
     )
 
 
 def test_bodies_are_many() -> None:
-    one = finding("bodies", joints=(), against="simulated", confidence=0.94, members=((("rigid body", 0.94),),))
+    one = finding("bodies", "rigid body", joints=(), against="simulated", confidence=0.94)
     assert said("attributed", one) == "Bodies differ from the simulator’s: rigid body (94 % sure)."
 
 
@@ -67,31 +66,26 @@ def test_where_nothing_is_known_of_the_whole_the_first_finding_says_what_it_clos
 
 def test_several_causes_are_joined_and_a_guess_keeps_its_effects_to_itself() -> None:
     both = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.6), ("backlash", 0.2))))
-    guess = finding("sensing", joints=("joint_1", "joint_3"), confidence=0.48, members=((("gain", 0.48),),))
+    guess = finding("sensing", "gain", joints=("joint_1", "joint_3"), confidence=0.48)
     assert said("attributed", both, guess) == (
-        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %) and hysteresis (60 %) or "
-        "backlash (20 %); perhaps sensing of joint_1 and joint_3 (48 % sure)."
+        f"{FRICTION}: stribeck friction (90 %) and hysteresis (60 %) or backlash (20 %); "
+        "perhaps sensing of joint_1 and joint_3 (48 % sure)."
     )
 
 
 def test_a_confidence_that_all_share_is_said_once() -> None:
     both = finding(members=((("stribeck friction", 0.971),), (("hysteresis", 0.968),)))
-    assert said("attributed", both) == (
-        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction and hysteresis."
-    )
+    assert said("attributed", both) == f"{FRICTION}: stribeck friction and hysteresis."
     assert not both.has_alternatives and finding().has_alternatives
 
 
 def test_guesses_beside_a_likely_cause_are_counted() -> None:
     three = finding(members=((("stribeck friction", 0.9),), (("hysteresis", 0.3), ("backlash", 0.1)), (("lag", 0.04),)))
-    assert said("attributed", three) == (
-        "Friction of joint_5 differs from the twin’s (97 % sure): stribeck friction (90 %), and 2 less likely."
-    )
+    assert said("attributed", three) == f"{FRICTION}: stribeck friction (90 %), and 2 less likely."
 
 
 def test_guesses_alone_are_said_to_be_guesses() -> None:
-    one = {"members": ((("payload", 0.4),),)}
-    guesses = [finding("load", confidence=0.4, **one), finding("sensing", confidence=0.2, **one)]
+    guesses = [finding("load", "payload", confidence=0.4), finding("sensing", "gain", confidence=0.2)]
     told = said("unexplained", *guesses, where=" in the torque", closes=" It closes.", because="unsure")
     assert told == (
         "There is a gap in the torque, and no cause that was found is sure: perhaps load of joint_5 (40 % sure); "
@@ -118,8 +112,8 @@ def test_alternatives_of_other_families_are_named_where_one_of_them_is_likely() 
 
 
 def test_what_is_sure_is_named_before_larger_guesses_and_stays_in_its_place() -> None:
-    guesses = [finding(joints=(f"joint_{k}",), confidence=0.2, members=((("x", 0.2),),)) for k in range(1, 5)]
-    told = said("attributed", *guesses, finding("load", confidence=0.9, members=((("payload", 0.9),),)))
+    guesses = [finding(effect="x", joints=(f"joint_{k}",), confidence=0.2) for k in range(1, 5)]
+    told = said("attributed", *guesses, finding("load", "payload", confidence=0.9))
     assert told.startswith("Perhaps friction of joint_1 (20 % sure); perhaps friction of joint_2 (20 % sure); load of ")
     assert "joint_3" not in told and "payload (90 % sure)" in told
 
@@ -168,7 +162,7 @@ def test_an_unexplained_gap_says_what_part_is_closed() -> None:
 def test_an_unexplained_gap_says_why(because: str, told: str) -> None:
     more = {"where": " in the power", "because": because, "differ": "a drift"}
     assert said("unexplained", **more) == told
-    guess = finding(confidence=0.3, members=((("x", 0.3),),))
+    guess = finding(effect="x", confidence=0.3)
     assert said("unexplained", guess, **more) == f"{told} Part of it is perhaps friction of joint_5 (30 % sure)."
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 from tests.html_elements import plain
+from tests.report.robots import answered
 
 from irtwin.report.gap.verdict import sentence
-from irtwin.report.questions import Answer, PageQuestion
 
 
 def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9, verdict="ambiguous", odd=()):
@@ -30,7 +30,7 @@ def answers(scope, simulated=False, referenced=True, parameters=(), sure=0.9, ve
         "cause_parameters": parameters,
         "odd_stretches": odd,
     }
-    return {name: Answer(PageQuestion(name, "", (), ""), tuple(of)) for name, of in rows.items()}
+    return answered(rows)
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from zoneinfo import ZoneInfo
 
 import pytest
 from tests import plants
+from tests.report.robots import instead
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, IRT
@@ -68,7 +68,7 @@ def test_a_robot_that_is_watched(answers: Answers) -> None:
 def test_energies_of_two_kinds_of_one_robot_are_two_lines(answers: Answers) -> None:
     rows = answers["energy"].rows
     other = {**next(row for row in rows if row["robot"].endswith("Arm_A")), "energy_from": "modelled", "energy_j": 9e9}
-    found = overview.overview({**answers, "energy": replace(answers["energy"], rows=(*rows, other))})
+    found = overview.overview(instead(answers, energy=(*rows, other)))
     lines = [(group.kind.name, line["energy_j"]) for group in found.groups if group.kind for line in group.lines
              if line["name"] == "Arm_A"]  # fmt: skip
     assert lines == [("measured", 4600.0), ("modelled", 9e9)]
@@ -76,10 +76,7 @@ def test_energies_of_two_kinds_of_one_robot_are_two_lines(answers: Answers) -> N
 
 def test_what_nobody_said_is_not_shown(answers: Answers) -> None:
     nothing = dict.fromkeys(answers["tariff"].rows[0])
-    unsaid = answers | {
-        "tariff": replace(answers["tariff"], rows=(nothing,)),
-        "waiting": replace(answers["waiting"], rows=()),
-    }
+    unsaid = instead(answers, tariff=(nothing,), waiting=())
     priced, without = drawn(answers), drawn(unsaid)
     assert "cost, EUR" in priced and "CO₂, kg" in priced and "could save a year, EUR" in priced
     assert "cost, " not in without and "CO₂, kg" not in without and "Cost and CO₂ are not shown" in without
@@ -98,8 +95,7 @@ def test_a_plant_without_robots() -> None:
 
 
 def test_alarms_are_not_counted_as_none_beside_a_contradiction(answers: Answers) -> None:
-    rows = ({"contradiction": "two payloads of one run"},)
-    said = text(drawn(answers | {"contradictions": replace(answers["contradictions"], rows=rows)}))
+    said = text(drawn(instead(answers, contradictions=[{"contradiction": "two payloads of one run"}])))
     assert "of what is not contradicted, see above" in said
     assert "of what is not contradicted" not in text(drawn(answers))
 
@@ -253,7 +249,7 @@ def test_what_is_next_to_nothing_is_counted_alone(plant: KnowledgeGraph) -> None
     answers = ask(plant, page.questions("run"), {"run": f"{ID}run/Arm_A.fit_1"})
     rows = answers["ledger"].rows
     tiny = {**rows[0], "entry": "tiny", "entry_j": 1e-9}
-    found = robot.of_run({**answers, "ledger": replace(answers["ledger"], rows=(*rows, tiny))})
+    found = robot.of_run(instead(answers, ledger=(*rows, tiny)))
     assert [entry for entry in found["entries"] if entry not in found["told"]] == [[tiny]]
 
 

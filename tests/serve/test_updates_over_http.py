@@ -33,37 +33,32 @@ def test_who_has_the_token_writes_and_reads_it_at_once(writable) -> None:
 
 
 @pytest.mark.parametrize(
-    ("authorization", "status"),
-    [(None, 401), ("Bearer wrong", 401), ("Bearer", 401), ("Basic YS10b2tlbi1mb3ItdGVzdHM6", 401), ("Bearer é", 401)],
+    "authorization", [None, "Bearer wrong", "Bearer", "Basic YS10b2tlbi1mb3ItdGVzdHM6", "Bearer é"]
 )
-def test_who_has_not_is_refused(writable, authorization: str | None, status: int) -> None:
+def test_who_has_not_is_refused(writable, authorization: str | None) -> None:
     headers = {"Content-Type": "application/sparql-update"}
     if authorization is not None:
-        headers["Authorization"] = authorization.encode()  # type: ignore[assignment]
+        headers["Authorization"] = authorization.encode()
     before = values(writable)
-    response = httpx.post(writable.sparql, content="CLEAR ALL", headers=headers)
-    assert response.status_code == status
-    assert response.headers["www-authenticate"] == "Bearer"
+    response = CLIENT.post(writable.sparql, content="CLEAR ALL", headers=headers)
+    assert (response.status_code, response.headers["www-authenticate"]) == (401, "Bearer")
     assert TOKEN not in response.text
     assert values(writable) == before
 
 
 @pytest.mark.parametrize(
-    ("text", "status", "message"),
+    ("text", "message"),
     [
-        ("INSERT DATA {\n <http://e/s> }", 400, "not a SPARQL update: error at 2:"),
-        (
-            "INSERT DATA { GRAPH <http://e/g> { <http://e/s> a <http://e/C> } } ; CREATE GRAPH <http://e/g>",
-            400,
-            "nothing",
-        ),
+        ("INSERT DATA {\n <http://e/s> }", "not a SPARQL update: error at 2:"),
+        ("INSERT DATA { GRAPH <http://e/g> { <http://e/s> a <http://e/C> } } ; CREATE GRAPH <http://e/g>", "nothing"),
     ],
 )
-def test_an_update_that_fails_changes_nothing(writable, text: str, status: int, message: str) -> None:
-    before = writable.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content
+def test_an_update_that_fails_changes_nothing(writable, text: str, message: str) -> None:
+    count = "SELECT (COUNT(*) AS ?n) { ?s ?p ?o }"
+    before = writable.ask(count).content
     response = writable.update(text)
-    assert (response.status_code, message in response.text) == (status, True), response.text
-    assert writable.ask("SELECT (COUNT(*) AS ?n) { ?s ?p ?o }").content == before
+    assert (response.status_code, message in response.text) == (400, True), response.text
+    assert writable.ask(count).content == before
 
 
 def update_of(server, text: str, **dataset: str) -> httpx.Response:
