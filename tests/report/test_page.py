@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from markupsafe import Markup
 from tests.report.robots import power_only, six_axis
 from tests.screens import complaints_of
+from tests.waiting import wait_for
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.packing import Fragment, packed_scripts
@@ -68,10 +68,7 @@ def test_the_scenes_script_may_run(page: Page):
 @pytest.mark.parametrize("width", [1024, 1440])
 def test_nothing_sticks_out(page: Page, width: int):
     page.set_viewport_size({"width": width, "height": 900})
-    until = time.monotonic() + 20.0
-    while (wide := page.evaluate("document.documentElement.scrollWidth")) != width:  # charts take their time to follow
-        assert time.monotonic() < until, f"{wide} pixels"
-        page.wait_for_timeout(100)
+    wait_for(lambda: page.evaluate("document.documentElement.scrollWidth") == width, 20.0)  # charts follow in time
 
 
 def test_on_paper_no_chart_is_wider_than_the_page(page: Page, tmp_path: Path):

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from tests.endpoint import Server
 from tests.screens import complaints_of, faults, is_dark, narrow_and_dark
+from tests.waiting import wait_for
 
 from irtwin.report.wording import heading
 
@@ -122,11 +123,7 @@ def test_a_long_name_of_a_file_is_broken(page: Any, plant: Server) -> None:
 
 def until(page: Any, what: str) -> None:
     """Wait until something holds, which the page's policy lets no script of Playwright's do."""
-    for _ in range(300):
-        if page.evaluate(what):
-            return
-        page.wait_for_timeout(100)
-    pytest.fail(what)
+    wait_for(lambda: page.evaluate(what), 30.0)
 
 
 def test_curves_zoom_and_mark_a_moment(page: Any, plant: Server) -> None:

@@ -1,6 +1,7 @@
 import base64
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,12 @@ from irtwin.robot.urdf import parse_urdf
 from irtwin.virtual.scene import apart_html, scene_html
 
 KR6 = kr6()
+FIELDS = ("time", "q", "energy", "power", "torque")
+
+
+def scene_of(robot: Robot, meshes: Mapping[str, Mesh] | None = None) -> Fragment:
+    """The scene of one run of a robot."""
+    return scene_html(robot, [run(robot)], meshes=meshes)
 
 
 def placed(values: list[float]) -> np.ndarray:
@@ -96,14 +103,13 @@ def test_long_runs_and_many_of_them_stay_small() -> None:
 
 
 def test_shapes_of_the_urdf_are_drawn_where_the_robot_has_them() -> None:
-    data = embedded(scene_html(KR6, [run(KR6)]))
+    data = embedded(scene_of(KR6))
     assert len(data["parts"]) == sum(solid.purpose == "visual" for solid in structure_of(KR6).solids)
     assert {part["joint"] for part in data["parts"]} >= set(range(-1, 6))
 
 
 def test_a_robot_without_shapes_gets_a_skeleton_from_joint_to_joint() -> None:
-    robot = bare()
-    parts = embedded(scene_html(robot, [run(robot)]))["parts"]
+    parts = embedded(scene_of(bare()))["parts"]
     tubes = [part for part in parts if part["kind"] == "cylinder" and part["joint"] == 1]
     towards = [placed(part["placement"])[:3, 2] * part["size"][1] for part in tubes]
     assert any(np.allclose(tube, [0.1, 0, 0.3], atol=1e-4) for tube in towards)
@@ -119,8 +125,7 @@ def test_a_robot_of_any_axes_is_drawn(count: int, kind: str) -> None:
         '<axis xyz="0 1 0"/></joint>'
         for number in range(count)
     )
-    robot = parse_urdf(f'<robot name="odd">{links}{joints}</robot>')
-    data = embedded(scene_html(robot, [run(robot)]))
+    data = embedded(scene_of(parse_urdf(f'<robot name="odd">{links}{joints}</robot>')))
     assert [joint["axis"] for joint in data["joints"]] == [[0.0, 1.0, 0.0]] * count
 
 
@@ -134,14 +139,12 @@ def test_names_cannot_break_out_of_the_page() -> None:
 
 
 def test_the_fragment_loads_nothing() -> None:
-    fragment = scene_html(KR6, [run(KR6)])
+    fragment = scene_of(KR6)
     for text in (fragment.html, *fragment.scripts):
         assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", text)
         assert "@import" not in text
-        assert set(re.findall(r"https?://[\w./]+", text)) <= {
-            "http://www.w3.org/1999/xhtml",
-            "http://www.w3.org/2000/svg",
-        }
+        names = {"http://www.w3.org/1999/xhtml", "http://www.w3.org/2000/svg"}
+        assert set(re.findall(r"https?://[\w./]+", text)) <= names
 
 
 @pytest.mark.parametrize(
@@ -152,10 +155,7 @@ def test_the_fragment_loads_nothing() -> None:
         (lambda r: {"torque": r.torque[:, 1:]}, "torque has the shape"),
         (lambda r: {"power": np.where(r.power > 300, np.nan, r.power)}, "power holds values that are not finite"),
         (lambda r: {"time": r.time[::-1]}, "time does not rise"),
-        (
-            lambda r: {name: getattr(r, name)[:1] for name in ("time", "q", "energy", "power", "torque")},
-            "does not rise",
-        ),
+        (lambda r: {name: getattr(r, name)[:1] for name in FIELDS}, "does not rise"),
     ],
 )
 def test_signals_that_do_not_fit_are_refused(change, message: str) -> None:  # type: ignore[no-untyped-def]
@@ -168,8 +168,7 @@ BOX = Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]]), np.array([[
 
 
 def test_meshes_are_drawn_and_shapes_stand_in_for_those_that_are_missing() -> None:
-    robot = mesh_robots.robot()
-    fragment = scene_html(robot, [run(robot)], meshes={SLIDE: BOX, ARM: BOX})
+    fragment = scene_of(mesh_robots.robot(), {SLIDE: BOX, ARM: BOX})
     data = embedded(fragment)
     kinds = [(part["joint"], part["kind"], part["mesh"]) for part in data["parts"]]
     assert kinds == [(-1, "box", None), (0, "mesh", 0), (1, "mesh", 1), (2, "cylinder", None), (2, "sphere", None)]
@@ -183,8 +182,7 @@ def test_meshes_are_drawn_and_shapes_stand_in_for_those_that_are_missing() -> No
 
 
 def test_without_any_of_its_meshes_a_robot_is_seen_by_its_collision_shapes() -> None:
-    robot = mesh_robots.robot()
-    fragment = scene_html(robot, [run(robot)])
+    fragment = scene_of(mesh_robots.robot())
     kinds = [(part["joint"], part["kind"]) for part in embedded(fragment)["parts"]]
     assert kinds == [(-1, "box"), (1, "box"), (2, "cylinder"), (2, "sphere")]
     assert "3 of the robot\u2019s meshes are not in its data set" in fragment.html
@@ -192,10 +190,9 @@ def test_without_any_of_its_meshes_a_robot_is_seen_by_its_collision_shapes() -> 
 
 def test_a_robot_whose_meshes_are_missing_and_that_has_no_shapes_gets_a_skeleton() -> None:
     text = mesh_robots.URDF.replace("<collision>", "<!--").replace("</collision>", "-->")
-    robot = parse_urdf(text)
-    parts = embedded(scene_html(robot, [run(robot)]))["parts"]
+    parts = embedded(scene_of(parse_urdf(text)))["parts"]
     assert {part["joint"] for part in parts} == {-1, 0, 1, 2} and len(parts) > 5
-    assert "not in its data set" not in scene_html(KR6, [run(KR6)]).html
+    assert "not in its data set" not in scene_of(KR6).html
 
 
 @pytest.mark.slow
@@ -203,8 +200,7 @@ def test_large_meshes_are_drawn_with_few_triangles() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5)
     mesh = Mesh(np.array(ball.vertices), np.array(ball.faces))
     assert len(mesh.faces) > 20_000
-    robot = mesh_robots.robot()
-    fragment = scene_html(robot, [run(robot)], meshes={SLIDE: mesh, ARM: mesh})
+    fragment = scene_of(mesh_robots.robot(), {SLIDE: mesh, ARM: mesh})
     assert all(len(base64.b64decode(one["faces"])) <= 8_000 * 12 for one in embedded(fragment)["meshes"])
     assert len(fragment.html) < 1_000_000
 
