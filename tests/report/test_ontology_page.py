@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from pyoxigraph import NamedNode, RdfFormat, parse
+from tests.data_sets import done
 from tests.html_elements import Elements
 from tests.trusting import trust_all
 
-from irtwin.cli import cli
 from irtwin.report.ontology.page import page, read_modules
 from irtwin.resources import folder, resources_of, shipped
 
@@ -32,17 +31,13 @@ def elements(text: str) -> Elements:
     return Elements(text)
 
 
-def declared() -> set[str]:
-    return {
-        quad.subject.value
+def test_each_term_has_the_anchor_of_its_iri(elements: Elements) -> None:
+    terms = {
+        quad.subject.value.removeprefix(IRT)
         for file in folder("ontology").glob("*.ttl")
         for quad in parse(path=str(file), format=RdfFormat.TURTLE)
         if isinstance(quad.subject, NamedNode) and quad.subject.value.startswith(IRT)
     }
-
-
-def test_each_term_has_the_anchor_of_its_iri(elements: Elements) -> None:
-    terms = {iri.removeprefix(IRT) for iri in declared()}
     assert terms | {"effect/coulomb_friction", "unit:N-M", "sosa:Platform"} <= set(elements.values("id"))
 
 
@@ -88,13 +83,6 @@ def test_the_tree_has_what_is_below_within_what_is_above(text: str) -> None:
     assert tree[above:below].count("<ul>") > tree[above:below].count("</ul>")
 
 
-@pytest.mark.slow
-def test_the_command_writes_the_page(tmp_path: Path) -> None:
-    out = tmp_path / "ontology.html"
-    assert CliRunner().invoke(cli, ["docs", "--ontology", str(out)]).exit_code == 0
-    assert "industrial robots and the energy they use" in out.read_text(encoding="utf-8")
-
-
 OWN = """@prefix my: <https://example.org/my#> . @prefix irt: <https://w3id.org/irtwin#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
 <https://example.org/my> a owl:Ontology .
@@ -114,6 +102,5 @@ def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     assert {link for link in links_of(Elements(text)) if link.startswith("#")} <= {f"#{one}" for one in ids}
     assert "shifts.ttl of workspace" in text
     assert "Made &lt;by&gt; night." in text
-    done = CliRunner().invoke(cli, ["docs", "--workspace", str(tmp_path), "--ontology", str(tmp_path / "page.html")])
-    assert done.exit_code == 0, done.output
+    done("docs", "--workspace", tmp_path, "--ontology", tmp_path / "page.html")
     assert (tmp_path / "page.html").read_text() == text

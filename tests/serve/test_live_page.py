@@ -95,7 +95,7 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
             "SELECT (COALESCE(?measured, ?modelled) AS ?energy) { ?run a irt:Replayed_Run "
             "OPTIONAL { ?run irt:Measured_Energy ?measured } OPTIONAL { ?run irt:Modelled_Energy ?modelled } }"
         )
-    wait_for(lambda: page.inner_text("#energy") == written(row["energy"]))
+    wait_for(lambda: page.inner_text("#energy") == f"{row['energy'] / 3600:.2f}")
     assert page.locator("#by-joint .bar").count() == 2
     assert page.locator("#by-effect .bar").count() > 2
     wait_for(lambda: page.locator("#gaps .bar").count() == 3)
@@ -110,10 +110,6 @@ def test_the_page_follows_a_log_that_is_played(robot: Server, folder: Path, brow
     assert faults(page) == []
     assert narrow_and_dark(page) == []
     assert complaints == []
-
-
-def written(joules: float) -> str:
-    return f"{joules / 3600:.2f}"
 
 
 def begins_with_what_was_missed(robot: Server, browser: Any) -> None:
