@@ -15,14 +15,7 @@ from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.robot_library import robot_of, robots, with_fixed
 from irtwin.errors import InputError
 from irtwin.robot.urdf import parse_urdf
-from irtwin.signals.log import (
-    DATA_SET_KEYS,
-    ROBOT_KEYS,
-    RUN_KEYS,
-    SHEET_KEYS,
-    TWIN_KEYS,
-    read_data_set,
-)
+from irtwin.signals.log import DATA_SET_KEYS, ROBOT_KEYS, RUN_KEYS, SHEET_KEYS, TWIN_KEYS, read_data_set
 
 MAINS = Options(power_at="mains")
 
@@ -164,10 +157,7 @@ def test_a_word_that_says_nothing_is_refused(tmp_path: Path, options: Options, s
         ("a,b\n" + "1" * 200_000 + ",2\n", "no delimiter"),
         ("\0\0\0", "is no text"),
         ("time,a,b\n" + "0,1,2\n" * 30 + "1,2\n" + "0,1,2\n", "line 32: 2 values instead of 3"),
-        (
-            "t,a,b,c\n" + "0,1,2,5,1,2,3,4\n" * 30,
-            "have 8 values, the line above them 4 names; where decimals",
-        ),
+        ("t,a,b,c\n" + "0,1,2,5,1,2,3,4\n" * 30, "have 8 values, the line above them 4 names; where decimals"),
         ("time,a,b\n" + "10:30:00,1,2\n" * 30, "column time holds neither numbers nor dates and times of ISO 8601"),
         ("time,a,a\n" + "0,1,2\n" * 30, "column a occurs twice"),
         ("time,a,b\n" + "0,1,2\n" * 60 + "0,x,2\n", "line 62, column a: 'x' is no number"),

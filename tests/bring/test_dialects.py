@@ -20,10 +20,7 @@ from irtwin.bring.bring import Options, bring
 from irtwin.check.check import check
 from irtwin.errors import InputError
 from irtwin.signals.channels import columns_of
-from irtwin.signals.log import (
-    DataSet,
-    read_data_set,
-)
+from irtwin.signals.log import DataSet, read_data_set
 from irtwin.signals.sources import catalogue
 from irtwin.signals.sources.source import Source
 

@@ -294,10 +294,7 @@ CASES = [
         off=0.1,
     ),
     Case(
-        drive.InverterLoss(joints=J2),
-        {("V0", "joint_2"): 3.0},
-        power=lambda s: 3 * np.abs(s.real[:, 1]) / KT,
-        off=0.1,
+        drive.InverterLoss(joints=J2), {("V0", "joint_2"): 3.0}, power=lambda s: 3 * np.abs(s.real[:, 1]) / KT, off=0.1
     ),
     Case(supply.NoRegeneration(), {("returned", None): 0.0}, power=lambda s: np.maximum(s.axes, 0) - s.axes),
     Case(supply.BusCapacitor(E=30.0), {("E", None): 30.0}, power=stored),

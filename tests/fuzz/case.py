@@ -58,13 +58,7 @@ class Kind:
 
 
 _ASKING = ("status", "query", "query json", "questions", "alarms", "alarms of the robot", "explain", "export", "docs")
-_ASKING += (
-    "backup",
-    "export for ROS",
-    "predict into workspace",
-    "live replay",
-    "fleet run",
-)
+_ASKING += ("backup", "export for ROS", "predict into workspace", "live replay", "fleet run")
 _CHANGING = ("repair", "adopt", "drop", "drop a run", "reason into workspace", "run", "improve", "live", "optimise")
 _CHANGING += ("diagnose into workspace", "alarms follow", "serve", "live controller", "map", "plan into workspace")
 _HERE = ("workspace", "data")

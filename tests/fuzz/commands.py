@@ -141,10 +141,7 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
         "robot ros": (["robot", "ros", data, "--out", folder / "package"], []),
         "export for ROS": (["export", "--ros", folder / "ros", "--robot", _robot(folder), *here], []),
-        "live replay": (
-            ["live", "--replay", run, "--robot", _robot(folder), "--speed", "1000", *here],
-            [],
-        ),
+        "live replay": (["live", "--replay", run, "--robot", _robot(folder), "--speed", "1000", *here], []),
         "predict into workspace": (
             ["predict", _robot(folder), run, "--out", out["taken.parquet"], "--run", "taken", *here],
             [out["taken.parquet"]],
@@ -195,10 +192,7 @@ def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tupl
         "trust": (["workspace", "trust", workspace], []),
         "query json": (["query", "SELECT * { ?s ?p ?o } LIMIT 20", "--format", "json", *here], []),
         "questions": (["query", *here], []),
-        "docs": (
-            ["docs", "--ontology", out["docs.html"], "--questions", out["asked.html"], *here],
-            [out["docs.html"]],
-        ),
+        "docs": (["docs", "--ontology", out["docs.html"], "--questions", out["asked.html"], *here], [out["docs.html"]]),
         "reason into workspace": (["workspace", "reason", *here], []),
         "optimise": (["optimise", _robot(folder), run.stem, "--cycle", "20", *here], []),
         "plan into workspace": (["plan", _robot(folder), *_ends(case), "--search", "2", *here], []),

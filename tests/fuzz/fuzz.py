@@ -104,11 +104,7 @@ def main() -> None:
 def _draw(session: Session, number: int) -> None:
     """Draw a round of cases by a seed."""
     drawn = settings(
-        max_examples=_ROUND,
-        deadline=None,
-        database=None,
-        phases=[Phase.generate],
-        suppress_health_check=[*HealthCheck],
+        max_examples=_ROUND, deadline=None, database=None, phases=[Phase.generate], suppress_health_check=[*HealthCheck]
     )
     drawn(seed(number)(given(cases(tried=session.commands))(session.take)))()
 

@@ -142,13 +142,7 @@ def test_one_run_is_cut_in_time():
 
 def test_places_without_a_known_floor_stand_out_of_their_joint():
     (seen,) = joint_maps([traces(on(1, lambda m, t: 2.0 * m.ddq[:, 1]))], labels(traces()), DEFAULT.data.little)
-    places = locate(
-        "torque",
-        JOINTS,
-        ["acceleration"] * 3,
-        seen,
-        level_of(None, seen, None),
-    )
+    places = locate("torque", JOINTS, ["acceleration"] * 3, seen, level_of(None, seen, None))
     assert places[0].joint == "joint_2"
     assert places[0].regime in ("accelerating", "braking", "loaded")
 
@@ -167,13 +161,7 @@ def test_power_that_is_given_back_is_located():
         given = np.minimum((trace.torque * trace.motion.dq).sum(axis=1), 0.0)
         observed.append(replace(trace, residual=(trace.residual[:, 0] - given)[:, None]))
     (seen,) = robot_maps([observed], labels(observed), DEFAULT.data.little)
-    first = locate(
-        "power",
-        (None,),
-        ("mechanical_power",),
-        seen,
-        level_of(np.array([0.5]), seen, None),
-    )[0]
+    first = locate("power", (None,), ("mechanical_power",), seen, level_of(np.array([0.5]), seen, None))[0]
     assert (first.joint, first.regime) == (None, "regenerating")
 
 

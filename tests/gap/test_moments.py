@@ -45,11 +45,7 @@ def group(rng: np.random.Generator, count: int, used: list[list[int]]) -> tuple[
 def test_they_are_the_products_of_all_columns(count, used, seed):
     rng = np.random.default_rng(seed)
     (one, first), (other, second) = group(rng, count, used), group(rng, 2 * count, used)
-    for found, expected in (
-        (one, first),
-        (Whole(one), first),
-        (Summed([one, other]), first + second),
-    ):
+    for found, expected in ((one, first), (Whole(one), first), (Summed([one, other]), first + second)):
         np.testing.assert_allclose(found.of(np.arange(found.size)), expected, atol=1e-9)
         rows, columns = rng.integers(0, COLUMNS + 1, 4), rng.permutation(COLUMNS + 1)[:6]
         np.testing.assert_allclose(found.among(rows, columns), expected[np.ix_(rows, columns)], atol=1e-9)

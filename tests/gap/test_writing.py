@@ -9,14 +9,7 @@ from tests.gap_cases import document, parameter
 from tests.synthetic import arm
 
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.gap.writing import (
-    _joints,
-    _members,
-    closing_nothing,
-    doubted,
-    folded,
-    number_is_off,
-)
+from irtwin.gap.writing import _joints, _members, closing_nothing, doubted, folded, number_is_off
 
 
 def test_members_are_the_cause_and_its_rivals_each_with_its_probability():

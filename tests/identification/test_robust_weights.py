@@ -53,10 +53,7 @@ def test_without_such_a_stretch_it_is_least_squares():
     assert 0.5 < found.weights.min() < found.weights.max() < 1.25
 
 
-@given(
-    sizes=st.lists(st.floats(0, 1e6), min_size=2, max_size=9),
-    unit=st.floats(1e-100, 1e100),
-)
+@given(sizes=st.lists(st.floats(0, 1e6), min_size=2, max_size=9), unit=st.floats(1e-100, 1e100))
 def test_what_leaves_more_counts_less_whatever_the_unit(sizes, unit):
     squares, rows = np.array(sorted(sizes)) ** 2 * 10, np.full(len(sizes), 10)
     weights = robust_weights(squares, rows, 1.0, 0.0)

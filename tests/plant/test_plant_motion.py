@@ -27,8 +27,7 @@ def test_point_to_point_uses_the_limits_and_keeps_them(drawings: Drawings, profi
     check(motion, drawings.limits)
     _assert_consistent(motion, 0.02)
     used = max(
-        (np.abs(motion.dq) / drawings.limits.speed).max(),
-        (np.abs(motion.ddq) / drawings.limits.acceleration).max(),
+        (np.abs(motion.dq) / drawings.limits.speed).max(), (np.abs(motion.ddq) / drawings.limits.acceleration).max()
     )
     assert 0.95 < used <= 1.0 + 1e-9
 

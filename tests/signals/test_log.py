@@ -172,10 +172,7 @@ def test_bad_samples_are_named(tmp_path, signals, message):
         (lambda text: text.rstrip().rpartition(",")[0], "line 51, the last one: the file was cut off: 6 values"),
         (lambda text: text.replace("0.03,", "0.03,oops,", 1), "line 5: 8 values instead of 7"),
         (lambda text: text.replace("\n0.04,", "\nlate,", 1), "line 6, column time: is not a finite number"),
-        (
-            lambda text: text.replace(",", ";"),
-            "line 1: columns are separated by semicolons; separate them by commas",
-        ),
+        (lambda text: text.replace(",", ";"), "line 1: columns are separated by semicolons; separate them by commas"),
     ],
 )
 def test_broken_text_is_named(tmp_path, edit, message):
@@ -249,11 +246,7 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
             "torque_scale_uncertainty should be a number of at least 0",
         ),
         ("[[run]]", "[[walk]]", r"\[\[run\]\] is missing"),
-        (
-            "gear_ratio",
-            "gear_ration",
-            r"\[robot.joint.a\] gear_ration is not known; did you mean gear_r",
-        ),
+        ("gear_ratio", "gear_ration", r"\[robot.joint.a\] gear_ration is not known; did you mean gear_r"),
         (
             "gear_ratio",
             "colour",

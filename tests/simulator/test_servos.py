@@ -106,8 +106,7 @@ def with_gains(tmp_path, model_text, suffix):
 
 
 @pytest.mark.parametrize(
-    "text",
-    [UNDRIVEN, re.sub('<position joint="(.*?)" [^>]*>', r'<motor joint="\1" gear="50"/>', BARE)],
+    "text", [UNDRIVEN, re.sub('<position joint="(.*?)" [^>]*>', r'<motor joint="\1" gear="50"/>', BARE)]
 )
 def test_gains_that_are_told_make_servos_as_those_of_a_model(tmp_path, text):
     data_set, model, own = with_gains(tmp_path, text, ".xml")
