@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import tempfile
 from collections import Counter
 from contextlib import nullcontext
@@ -23,10 +25,60 @@ _TELLING = ("fleet", "import")
 _PATIENCE = {"excite": 2.0, "alarms follow": 2.0, "live controller": 2.0, "serve": 2.0}  # s until Ctrl-C
 _STOPPED = 130  # exit status after Ctrl-C, of what had nothing to keep yet
 MAPPING = Path(__file__).parents[2] / "mappings" / "robot.r2rml.ttl"
-WRITTEN = (
-    *("gap.json", "gap.html", "predicted.parquet", "motion.csv", "plan.csv", "docs.html", "asked.html"),
-    *("all.owl", "closed.ttl", "robot.nq", "kept.zip", "robot.urdf", "taken.parquet"),
-)
+_WRITTEN = r"{>([\w.]+)}"
+_HERE = " --workspace {workspace}"
+_DIAGNOSE = "diagnose {data} --json {>gap.json}"
+COMMANDS = {  # as they are typed; {name}: a place or a word of the case, {>name}: what is to be written in its folder
+    "check": "check {data}",
+    "diagnose": _DIAGNOSE,
+    "diagnose with page and twin": _DIAGNOSE + " --report {>gap.html} --save-twin {folder}/twin.json",
+    "diagnose into workspace": _DIAGNOSE + _HERE,
+    "predict": "predict {folder}/twin.json {run} --out {>predicted.parquet}",
+    "excite": "robot excite {data}/robot.urdf --seconds 2 --out {>motion.csv}",
+    "plan": "plan {data}/robot.urdf --from={start} --to={goal} --out {>plan.csv} --search 2",
+    "robot dh": "robot dh {data} --convention modified",
+    "robot equations": "robot equations {data}",
+    "robot urdf": "robot urdf {data} --out {>robot.urdf}",
+    "robot ros": "robot ros {data} --out {folder}/package",
+    "export for ROS": "export --ros {folder}/ros --robot {robot}" + _HERE,
+    "live replay": "live --replay {run} --robot {robot} --speed 1000" + _HERE,
+    "predict into workspace": "predict {robot} {run} --out {>taken.parquet} --run taken" + _HERE,
+    "improve": "improve {robot} {again}" + _HERE,
+    "import": "import {runs} --robot {data}/robot.urdf --power-at mains --out {folder}/brought",
+    "check of what was imported": "check {folder}/brought",
+    "run of what was imported": "run {folder}/brought" + _HERE,
+    "alarms": "alarms" + _HERE,
+    "alarms of the robot": "alarms --robot {robot}" + _HERE,
+    "alarms follow": "alarms --follow" + _HERE,
+    "fleet diagnose": "diagnose {list} --workers 1 --out {folder}/fleet",
+    "fleet run": "run {list} --workers 1 --out {folder}/fleet_run",
+    "fleet status": "workspace status --workspace {folder}/fleet",
+    "fleet status of runs": "workspace status --workspace {folder}/fleet_run",
+    "run": "run {data} --repair" + _HERE,
+    "query": "query energy_per_joint" + _HERE,
+    "query json": "query 'SELECT * { ?s ?p ?o } LIMIT 20' --format json" + _HERE,
+    "questions": "query" + _HERE,
+    "export": "export --owl {>all.owl}" + _HERE,
+    "live": "live" + _HERE,
+    "live controller": "live --opcua opc.tcp://127.0.0.1:{port} --robot {robot}" + _HERE,
+    "map": "workspace map {mapping} --database sqlite:///{workspace}/irtwin.db --out {>robot.nq}",
+    "reason": "workspace reason {folder}/all.owl --out {>closed.ttl}",
+    "reason into workspace": "workspace reason" + _HERE,
+    "explain": "explain ? irt:Energy_Consumption" + _HERE,
+    "backup": "workspace backup {>kept.zip}" + _HERE,
+    "restore": "workspace restore {archive} --workspace {>restored}",
+    "repair": "workspace repair" + _HERE,
+    "adopt": "improve {robot}" + _HERE,
+    "drop": "workspace drop {robot}" + _HERE,
+    "drop a run": "workspace drop {robot} --run live_20260301T120000000000" + _HERE,
+    "status": "workspace status" + _HERE,
+    "trust": "workspace trust {workspace}",
+    "docs": "docs --ontology {>docs.html} --questions {folder}/asked.html" + _HERE,
+    "optimise": "optimise {robot} {stem} --cycle 20" + _HERE,
+    "plan into workspace": "plan {robot} --from={start} --to={goal} --search 2" + _HERE,
+    "serve": "serve --port 0" + _HERE,
+    "init": "import --robot {data}/robot.urdf --out {>begun}",
+}
 
 
 class Unmade(Exception):
@@ -102,117 +154,30 @@ def _tell(workspace: Path, port: int) -> None:
     )
 
 
-def _workspace(case: Case, folder: Path) -> Path:
-    return folder / ("restored" if "given.zip" in case.sound else "workspace")
-
-
 def _archive(folder: Path) -> Path:
     given = folder / "given.zip"
     return given if given.exists() else folder / "kept.zip"
 
 
 def _arguments(case: Case, command: str, folder: Path, port: int | None) -> tuple[list[str] | None, list[Path]]:
-    """Return a command's arguments, None where there is nothing to try it on, and the files it is to write."""
-    data, workspace, twin = folder / "data", _workspace(case, folder), folder / "twin.json"
-    restored = folder / "restored"
-    out = {name: folder / name for name in WRITTEN}
-    diagnose = ["diagnose", data, "--json", out["gap.json"]]
-    run = min((data / "runs").iterdir(), default=data / "runs")
-    here = ["--workspace", workspace]
-    words, writes = {
-        "check": (["check", data], []),
-        "diagnose": (diagnose, [out["gap.json"]]),
-        "diagnose with page and twin": (
-            [*diagnose, "--report", out["gap.html"], "--save-twin", twin],
-            [out["gap.json"], out["gap.html"]],
-        ),
-        "diagnose into workspace": ([*diagnose, *here], [out["gap.json"]]),
-        "predict": (["predict", twin, run, "--out", out["predicted.parquet"]], [out["predicted.parquet"]]),
-        "excite": (
-            ["robot", "excite", data / "robot.urdf", "--seconds", "2", "--out", out["motion.csv"]],
-            [out["motion.csv"]],
-        ),
-        "plan": (
-            ["plan", data / "robot.urdf", *_ends(case), "--out", out["plan.csv"], "--search", "2"],
-            [out["plan.csv"]],
-        ),
-        "robot dh": (["robot", "dh", data, "--convention", "modified"], []),
-        "robot equations": (["robot", "equations", data], []),
-        "robot urdf": (["robot", "urdf", data, "--out", out["robot.urdf"]], [out["robot.urdf"]]),
-        "robot ros": (["robot", "ros", data, "--out", folder / "package"], []),
-        "export for ROS": (["export", "--ros", folder / "ros", "--robot", _robot(folder), *here], []),
-        "live replay": (["live", "--replay", run, "--robot", _robot(folder), "--speed", "1000", *here], []),
-        "predict into workspace": (
-            ["predict", _robot(folder), run, "--out", out["taken.parquet"], "--run", "taken", *here],
-            [out["taken.parquet"]],
-        ),
-        "improve": (["improve", _robot(folder), _again(run, folder), *here], []),
-        "import": (
-            [
-                *("import", *sorted((data / "runs").iterdir()), "--robot", data / "robot.urdf"),
-                *("--power-at", "mains", "--out", folder / "brought"),
-            ],
-            [],
-        ),
-        "check of what was imported": (["check", folder / "brought"], []),
-        "alarms": (["alarms", *here], []),
-        "alarms of the robot": (["alarms", "--robot", _robot(folder), *here], []),
-        "fleet diagnose": (["diagnose", _many(folder), "--workers", "1", "--out", folder / "fleet"], []),
-        "fleet run": (["run", _many(folder), "--workers", "1", "--out", folder / "fleet_run"], []),
-        "fleet status": (["workspace", "status", "--workspace", folder / "fleet"], []),
-        "fleet status of runs": (["workspace", "status", "--workspace", folder / "fleet_run"], []),
-        "run": (["run", data, "--workspace", workspace, "--repair"], []),
-        "query": (["query", "energy_per_joint", *here], []),
-        "export": (["export", "--owl", out["all.owl"], *here], [out["all.owl"]]),
-        "live": (["live", *here], []),
-        "map": (
-            [
-                "workspace",
-                "map",
-                MAPPING,
-                "--database",
-                f"sqlite:///{workspace / 'irtwin.db'}",
-                "--out",
-                out["robot.nq"],
-            ],
-            [out["robot.nq"]],
-        ),
-        "reason": (["workspace", "reason", out["all.owl"], "--out", out["closed.ttl"]], [out["closed.ttl"]]),
-        "explain": (["explain", "?", "irt:Energy_Consumption", *here], []),
-        "backup": (["workspace", "backup", out["kept.zip"], *here], [out["kept.zip"]]),
-        "restore": (
-            ["workspace", "restore", _archive(folder), "--workspace", restored],
-            [restored] * (not restored.exists()),
-        ),
-        "repair": (["workspace", "repair", *here], []),
-        "adopt": (["improve", _robot(folder), *here], []),
-        "drop": (["workspace", "drop", _robot(folder), *here], []),
-        "drop a run": (["workspace", "drop", _robot(folder), "--run", "live_20260301T120000000000", *here], []),
-        "status": (["workspace", "status", *here], []),
-        "trust": (["workspace", "trust", workspace], []),
-        "query json": (["query", "SELECT * { ?s ?p ?o } LIMIT 20", "--format", "json", *here], []),
-        "questions": (["query", *here], []),
-        "docs": (["docs", "--ontology", out["docs.html"], "--questions", out["asked.html"], *here], [out["docs.html"]]),
-        "reason into workspace": (["workspace", "reason", *here], []),
-        "optimise": (["optimise", _robot(folder), run.stem, "--cycle", "20", *here], []),
-        "plan into workspace": (["plan", _robot(folder), *_ends(case), "--search", "2", *here], []),
-        "alarms follow": (["alarms", "--follow", *here], []),
-        "live controller": (
-            ["live", "--opcua", f"opc.tcp://127.0.0.1:{port or 1}", "--robot", _robot(folder), *here],
-            [],
-        ),
-        "serve": (["serve", "--port", "0", *here], []),
-        "init": (["import", "--robot", data / "robot.urdf", "--out", folder / "begun"], [folder / "begun"]),
-        "run of what was imported": (["run", folder / "brought", *here], []),
-    }[command]
-    if command == "predict" and not twin.exists():
+    """Return a command's arguments, None where there is nothing to try it on, and what it is to write."""
+    if command == "predict" and not (folder / "twin.json").exists():
         return None, []
-    return list(map(str, words)), writes
-
-
-def _ends(case: Case) -> list[str]:
-    """Return the options of a plan's start and goal."""
-    return [f"--{end}={','.join([place] * max(1, _moving(case)))}" for end, place in (("from", "0"), ("to", "0.3"))]
+    data, joints = folder / "data", max(1, _moving(case))
+    runs = sorted((data / "runs").iterdir())
+    run = runs[0] if runs else data / "runs"
+    words = {
+        "folder": folder, "data": data, "run": run, "stem": run.stem, "again": _again(run, folder),
+        "workspace": folder / ("restored" if "given.zip" in case.sound else "workspace"), "robot": _robot(folder),
+        "archive": _archive(folder), "list": _many(folder), "mapping": MAPPING, "port": port or 1,
+        "start": ",".join(["0"] * joints), "goal": ",".join(["0.3"] * joints),
+    }  # fmt: skip
+    writes = [folder / name for name in re.findall(_WRITTEN, COMMANDS[command])]
+    typed = re.sub(_WRITTEN, r"{folder}/\1", COMMANDS[command])
+    arguments: list[str] = []
+    for word in shlex.split(typed):
+        arguments += map(str, runs) if word == "{runs}" else [re.sub(r"{(\w+)}", lambda it: str(words[it[1]]), word)]
+    return arguments, [file for file in writes if not file.is_dir()]
 
 
 def _moving(case: Case) -> int:
