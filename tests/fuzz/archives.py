@@ -112,15 +112,8 @@ def _file(entries: Entries, rng: np.random.Generator) -> None:
     old = hashlib.sha256(entries[name]).hexdigest().encode()
     text = entries[name]
     where = int(rng.integers(len(text)))
-    garbage = [
-        b"",
-        b"[" * 100_000,
-        b"{}",
-        b"null",
-        text[:where],
-        text[:where] + b"\xff\x00" + text[where + 2 :],
-        text * 2,
-    ]
+    begin = text[:where]
+    garbage = [b"", b"[" * 100_000, b"{}", b"null", begin, begin + b"\xff\x00" + text[where + 2 :], text * 2]
     entries[name] = some(rng, [*garbage, _numbers(text, rng)])
     new = hashlib.sha256(entries[name]).hexdigest().encode()
     for rows in [name for name in entries if name.startswith("rows/")]:
@@ -202,9 +195,8 @@ def _link(archive: Path, rng: np.random.Generator) -> None:
     with zipfile.ZipFile(archive, "a") as target:
         entry = zipfile.ZipInfo(some(rng, ["reports/x.html", "series/x.parquet", "live", "rows"]))
         entry.external_attr = (stat.S_IFLNK | 0o777) << 16
-        target.writestr(
-            entry, some(rng, [str(archive.parents[1] / "etc/passwd"), "../../x", str(archive.parents[1] / "x")])
-        )
+        outside = archive.parents[1]
+        target.writestr(entry, some(rng, [str(outside / "etc/passwd"), "../../x", str(outside / "x")]))
 
 
 def _nested(archive: Path, rng: np.random.Generator) -> None:

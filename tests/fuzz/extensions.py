@@ -21,33 +21,11 @@ _TEMPLATES = (
     *('{{ "{:>999999999}".format(1) }}', '{{ "{0.__class__.__mro__}".format(1) }}', "{{ range(10**12) | list }}"),
     *("{{ ''.__class__.__mro__[1].__subclasses__() }}", "{{ cycler.__init__.__globals__.os.popen('id').read() }}"),
     *("{{ self.__init__ }}", '{% include "../../../secret.html.jinja" %}', '{% include "OUTSIDE/secret.html.jinja" %}'),
-    *(
-        '{% include "/etc/passwd" %}',
-        '{% extends "energy/page.html.jinja" %}',
-        '{% include "energy/page.html.jinja" %}',
-    ),
-    *(
-        "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}",
-        "{{ nobody }}",
-        "{{ 1 / 0 }}",
-        "{% if",
-        "{{",
-        "",
-        "\0",
-        "\ud800",
-    ),
-    *(
-        "{{ 'x' | attr('__class__') }}",
-        "{{ [1] | map('nothing') | list }}",
-        "{% import 'energy/mine.html.jinja' as m %}",
-    ),
-    *(
-        "{{ 'a' | center(10**10) }}",
-        "{" * 3000,
-        "{{ " + "(" * 3000 + " }}",
-        "{% set x = 'x' %}" * 3000,
-        "<html>{{ robot }}",
-    ),
+    *('{% include "/etc/passwd" %}', '{% extends "energy/page.html.jinja" %}'),
+    *('{% include "energy/page.html.jinja" %}', "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}", "{{ nobody }}"),
+    *("{{ 1 / 0 }}", "{% if", "{{", "", "\0", "\ud800", "{{ 'x' | attr('__class__') }}"),
+    *("{{ [1] | map('nothing') | list }}", "{% import 'energy/mine.html.jinja' as m %}", "{{ 'a' | center(10**10) }}"),
+    *("{" * 3000, "{{ " + "(" * 3000 + " }}", "{% set x = 'x' %}" * 3000, "<html>{{ robot }}"),
 )
 _QUERY = "PREFIX irt: <https://w3id.org/irtwin#>\n"
 _HEAD = "# title: Mine\n# question: What?\n# theme: run\n# of: plant\n"
@@ -66,14 +44,8 @@ _QUESTIONS = (
     _HEAD + "ASK { ?a ?b ?c }",
     _HEAD + "SELECT ?a { " + "{" * 3000,
     _HEAD + 'SELECT (1/0 AS ?x) ("NaN"^^<http://www.w3.org/2001/XMLSchema#double> AS ?y) {}',
-    *(
-        "# bind: robot, x\nSELECT ?a { ?a ?b ?c } LIMIT 1",
-        "",
-        "\0",
-        "SELECT",
-        "#" * 99999,
-        "SELECT ?a { ?a ?b ?c } LIMIT 2",
-    ),
+    *("# bind: robot, x\nSELECT ?a { ?a ?b ?c } LIMIT 1", "", "\0", "SELECT", "#" * 99999),
+    "SELECT ?a { ?a ?b ?c } LIMIT 2",
 )
 _CONSTRUCT = _TURTLE + ':rule a sh:NodeShape ; rdfs:label "mine" ; sh:targetClass %s ; sh:rule [ a sh:SPARQLRule ; '
 _RULES = (
@@ -100,10 +72,8 @@ _RULES = (
     _TURTLE + ":r a swrl:Imp ; swrl:body [] ; swrl:head ( [ a swrl:ClassAtom ; swrl:classPredicate :r ] ) .",
 )
 _ONTOLOGY = (
-    *(
-        _TURTLE + "owl:Thing rdfs:subClassOf owl:Nothing .",
-        _TURTLE + "irt:Industrial_Robot owl:disjointWith irt:Industrial_Robot .",
-    ),
+    _TURTLE + "owl:Thing rdfs:subClassOf owl:Nothing .",
+    _TURTLE + "irt:Industrial_Robot owl:disjointWith irt:Industrial_Robot .",
     *(_TURTLE + "<urn:x> owl:imports <file:///etc/passwd>, <http://127.0.0.1:1/> .", "[" * 3000, "", "\0", "x"),
     _TURTLE + "irt:has_Joint owl:inverseOf irt:has_Joint ; a owl:TransitiveProperty, owl:IrreflexiveProperty .",
     _TURTLE + "irt:has_Joint owl:propertyChainAxiom ( irt:has_Joint irt:has_Joint ) ; rdfs:subPropertyOf owl:sameAs .",
@@ -129,11 +99,7 @@ _SHAPES = (
             "sh:propertyy 1 .",
         )
     ),
-    "",
-    "\0",
-    "[" * 3000,
-    _TURTLE,
-    _TURTLE + f":x sh:path :l . :l <{_REST}> :l .",
+    *("", "\0", "[" * 3000, _TURTLE, _TURTLE + f":x sh:path :l . :l <{_REST}> :l ."),
 )
 _MAP = (
     ":m rr:logicalTable [ %s ] ; rr:subjectMap [ "
@@ -160,14 +126,8 @@ _MAPPINGS = (
             "",
         )
     ),
-    *(
-        "",
-        "\0",
-        "[" * 3000,
-        _TURTLE,
-        _TURTLE + _MAP % 'rr:tableName "sqlite_master"',
-        _TURTLE + _MAP % 'rr:tableName "nothing"',
-    ),
+    *("", "\0", "[" * 3000, _TURTLE, _TURTLE + _MAP % 'rr:tableName "sqlite_master"'),
+    _TURTLE + _MAP % 'rr:tableName "nothing"',
     *(
         _TURTLE + (_MAP % 'rr:tableName "robot"').replace("{a}", other)
         for other in ("{robot_id}", "{", "{robot_id}{name}")
@@ -210,25 +170,14 @@ def _odd_file(workspace: Path, rng: np.random.Generator) -> None:
     """Put what is no file there: a link, a ring, a pipe, a folder, one that is huge, many."""
     kind = some(rng, FILES)
     folder = workspace / kind
-    file = folder / some(rng, FILES[kind][0])
+    file, outside = folder / some(rng, FILES[kind][0]), workspace.parents[1]
     folder.mkdir(parents=True, exist_ok=True)
     how = rng.integers(7)
     if how == 0:
-        file.symlink_to(
-            some(
-                rng,
-                [
-                    workspace.parents[1] / "secret.toml",
-                    workspace.parents[1] / "etc/passwd",
-                    "/dev/zero",
-                    "nowhere",
-                    file,
-                ],
-            )
-        )
+        file.symlink_to(some(rng, [outside / "secret.toml", outside / "etc/passwd", "/dev/zero", "nowhere", file]))
     elif how == 1:
         folder.rmdir()
-        folder.symlink_to(some(rng, [workspace.parents[1], workspace.parents[1] / "etc", Path("nowhere"), folder]))
+        folder.symlink_to(some(rng, [outside, outside / "etc", Path("nowhere"), folder]))
     elif how == 2:
         os.mkfifo(file)
     elif how == 3:

@@ -20,15 +20,8 @@ _NAMES = (
     *("q_1", "J1 [deg]", "time [ms]", "t", "timestamp", "Zeit / s", "actual_q_0", "/joint_states/position[0]", "q.1"),
     *("a\0b", "\x1b[31m", "x" * 5000, "", " ", "名前", "\u202e", "=1+1", "{{7*7}}", "a\nb", 'a"b', "power;W", "\ufeff"),
 )
-_TIMES = (
-    "2026-03-01 12:00:%09.6f",
-    "2026-03-01T12:00:%06.3fZ",
-    "12:00:%05.2f",
-    "%f s",
-    "1e%f",
-    "%.3f",
-    "1772366%06.2f",
-)
+_TIMES = ("2026-03-01 12:00:%09.6f", "2026-03-01T12:00:%06.3fZ", "12:00:%05.2f", "%f s")
+_TIMES += ("1e%f", "%.3f", "1772366%06.2f")
 _CODES = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "latin-1", "cp037", "shift_jis")
 
 
@@ -201,15 +194,15 @@ def _no_log(runs: Path, rng: np.random.Generator) -> None:
     zipped = io.BytesIO()
     with zipfile.ZipFile(zipped, "w") as target:
         target.writestr("x", b"x")
-    texts = [
-        b"",
-        b"x",
-        b"\0" * 9000,
-        b"PAR1" + b"\xff" * 40 + b"PAR1",
-        zipped.getvalue(),
+    texts = [b"", b"x", b"\0" * 9000, b"PAR1" + b"\xff" * 40 + b"PAR1", zipped.getvalue()]
+    texts += [
         b"SQLite format 3\0" + b"\0" * 84,
+        b"#ROSBAG V2.0\n",
+        b"\x89MCAP0\r\n" + b"\xff" * 90,
+        b"[" * 99_999,
+        b"a,b\n" * 20,
+        b"time,q\n1,2\n",
     ]
-    texts += [b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n" + b"\xff" * 90, b"[" * 99_999, b"a,b\n" * 20, b"time,q\n1,2\n"]
     for file in sorted(runs.iterdir()):
         file.unlink()
         suffix = some(rng, [".csv", ".parquet", ".xlsx", ".mcap", ".bag", ".db3", "", ".txt", ".json"])

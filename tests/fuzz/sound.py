@@ -31,9 +31,8 @@ class Sound:
         """Make a part unless it is there, of those that it is made of."""
         place = self._folder / part
         if not place.exists():
-            {"data": self._data, "workspace": self._watched, "given.zip": self._backup, "fleet": self._fleet}[part](
-                place
-            )
+            made = {"data": self._data, "workspace": self._watched, "given.zip": self._backup, "fleet": self._fleet}
+            made[part](place)
         return place
 
     def _data(self, place: Path) -> None:
