@@ -28,9 +28,9 @@ def test_a_bag_is_read_to_the_last_bit(form: str, tmp_path: Path) -> None:
     assert said == []
     assert np.array_equal(signals.time, np.arange(N) / 100)
     assert np.array_equal(signals.q, Q)
-    assert signals.dq is not None and np.array_equal(signals.dq, Q / 3)
-    assert signals.torque is not None and np.array_equal(signals.torque, TORQUE)
-    assert signals.power is not None and np.array_equal(signals.power, POWER)
+    assert np.array_equal(signals.dq, Q / 3)
+    assert np.array_equal(signals.torque, TORQUE)
+    assert np.array_equal(signals.power, POWER)
 
 
 @pytest.mark.parametrize(("form", "compression"), [("run.bag", "bz2"), ("run.bag", "lz4"), ("run.mcap", "zstd")])
@@ -38,7 +38,7 @@ def test_compressed_chunks_are_inflated(form: str, compression: str, tmp_path: P
     path = write(tmp_path / form, states(Q, effort=TORQUE), numbers("/power", POWER), compression=compression)
     signals, _ = read_signals(path, ROBOT)
     assert np.array_equal(signals.q, Q)
-    assert signals.power is not None and np.array_equal(signals.power, POWER)
+    assert np.array_equal(signals.power, POWER)
 
 
 def test_a_file_of_a_bag_folder_is_a_bag(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_joints_may_have_the_names_that_ros_takes(tmp_path: Path) -> None:
     )
     signals, _ = read_signals(path, odd)
     assert np.array_equal(signals.q, Q)
-    assert signals.current is not None and np.array_equal(signals.current[:, 0], POWER)
+    assert np.array_equal(signals.current[:, 0], POWER)
 
 
 def test_stamps_of_headers_are_the_time_and_recording_joins_the_topics(tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_a_data_set_names_the_folder_of_a_bag_and_its_topics(tmp_path: Path) -> 
     (run,) = read_data_set(tmp_path).runs
     assert run.name == "one"
     assert np.array_equal(run.signals.q, -Q)
-    assert run.signals.power is not None and np.array_equal(run.signals.power, POWER)
+    assert np.array_equal(run.signals.power, POWER)
     before = run.sha256
     (path / "note.txt").write_text("another file")
     (run,) = read_data_set(tmp_path).runs
@@ -165,21 +165,27 @@ def test_a_bag_without_joint_states_is_told(form: str, tmp_path: Path) -> None:
     assert refused(path) == ": holds no joint states (sensor_msgs/JointState); record /joint_states"
 
 
-def test_joints_that_are_missing_are_named(tmp_path: Path) -> None:
-    path = write(tmp_path / "run.bag", states(Q, ["a", "elbow"]))
-    assert refused(path) == (": no message of /joint_states has all joints of two; b is missing (it has a, elbow)")
-
-
-def test_values_that_do_not_fit_the_names_are_told(tmp_path: Path) -> None:
-    path = write(tmp_path / "run.mcap", states(Q), states(np.zeros((1, 3)), step=1))
-    assert refused(path) == ", joint state 2: 3 values of position for 2 joints; record the run again"
-
-
-def test_several_topics_for_a_column_are_told(tmp_path: Path) -> None:
-    path = write(tmp_path / "run.bag", states(Q), numbers("/a/power", POWER), numbers("/b/power", POWER))
-    assert refused(path) == (
-        ': several topics could be power: /a/power, /b/power; say which in dataset.toml: [topics] power = "/a/power"'
-    )
+@pytest.mark.parametrize(
+    ("form", "messages", "said"),
+    [
+        (
+            "run.bag", [states(Q, ["a", "elbow"])],
+            ": no message of /joint_states has all joints of two; b is missing (it has a, elbow)",
+        ),
+        (
+            "run.mcap", [states(Q), states(np.zeros((1, 3)), step=1)],
+            ", joint state 2: 3 values of position for 2 joints; record the run again",
+        ),
+        (
+            "run.bag", [states(Q), numbers("/a/power", POWER), numbers("/b/power", POWER)],
+            ": several topics could be power: /a/power, /b/power; "
+            'say which in dataset.toml: [topics] power = "/a/power"',
+        ),
+    ],
+    ids=["a joint is missing", "values do not fit the names", "several topics for a column"],
+)  # fmt: skip
+def test_messages_that_cannot_be_taken_are_told(form: str, messages: list, said: str, tmp_path: Path) -> None:
+    assert refused(write(tmp_path / form, *messages)) == said
 
 
 def test_a_value_that_is_none_is_told_by_its_message(tmp_path: Path) -> None:

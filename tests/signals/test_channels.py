@@ -79,7 +79,6 @@ def test_a_line_of_the_table_is_all_that_a_new_channel_takes(tmp_path: Path) -> 
     """The line is the one in CONTRIBUTING.md; `added_channel.py` uses the package that has it."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     line = re.search(r"## Add a sensor channel.*?```python\n(.*?)```", text, re.DOTALL)
-    assert line is not None
     package = tmp_path / "irtwin"
     shutil.copytree(
         Path(irtwin.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "demo", "assets")

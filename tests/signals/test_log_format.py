@@ -65,7 +65,6 @@ def test_the_keys_are_those_of_the_code(title: str, known: tuple[str, ...]) -> N
 
 def test_the_example_is_a_data_set(tmp_path: Path) -> None:
     example = re.search(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)
-    assert example is not None
     (tmp_path / "dataset.toml").write_text(example[1], encoding="utf-8")
     (tmp_path / "robot.urdf").write_text(ROBOT.urdf, encoding="utf-8")
     (tmp_path / "runs").mkdir()
@@ -86,13 +85,11 @@ def test_the_example_is_a_data_set(tmp_path: Path) -> None:
 
 def test_the_example_of_a_table_is_a_robot(tmp_path: Path) -> None:
     example = re.search(r"```toml\n(\[robot\.dh\].*?)```", DOCUMENT, re.DOTALL)
-    assert example is not None
     (tmp_path / "dataset.toml").write_text(f'[robot]\nname = "a"\n{example[1]}', encoding="utf-8")
     assert log.read_robot(tmp_path).joint_names == ("joint_1", "slide")
 
 
 def test_the_line_of_a_live_stream_is_understood() -> None:
     example = re.search(r"```json\n(.*?)```", DOCUMENT, re.DOTALL)
-    assert example is not None
     state = StateReader({"Two_Axes": ROBOT.joint_names}).read(example[1].strip().encode())
     assert list(state.of("torque")) == json.loads(example[1])["effort"]

@@ -30,20 +30,8 @@ def feather() -> type[Source]:
     """The worked example of CONTRIBUTING.md."""
     text = CONTRIBUTING.read_text(encoding="utf-8")
     code = re.search(r"## Add a log source.*?```python\n(.*?)```", text, re.DOTALL)
-    assert code is not None
-    names: dict[str, Any] = {
-        "Source": Source,
-        "ClassVar": ClassVar,
-        "Sequence": Sequence,
-        "cached_property": cached_property,
-    }
-    names |= {
-        "pa": pa,
-        "pyarrow": pyarrow,
-        "InputError": InputError,
-        "check_file": check_file,
-        "first_line": first_line,
-    }
+    known = (Source, ClassVar, Sequence, cached_property, InputError, check_file, first_line)
+    names: dict[str, Any] = {one.__name__: one for one in known} | {"pa": pa, "pyarrow": pyarrow}
     exec(code[1], names)
     kind = names["FeatherSource"]
     assert isinstance(kind, type)

@@ -36,7 +36,6 @@ def test_the_si_unit_stands_first_and_changes_nothing(si: str) -> None:
 )
 def test_a_unit_is_read_as_it_is_written(text: str, si: str, value: float, true: float) -> None:
     unit = unit_of(text, (si,))
-    assert unit is not None
     assert unit.to_si(np.array([value])) == pytest.approx([true])
 
 
