@@ -54,10 +54,16 @@ def test_more_play_loses_more():
     assert (np.diff(np.abs(passed - LOAD).sum(axis=(1, 2))) > 0).all()
 
 
-def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():
-    robot = arm(2)
+def loaded(joints):
+    """An arm, a motion, and the load of each joint of an inertia of 2 kg m^2."""
+    robot = arm(joints)
     motion = swing(robot, 5, seconds=4)
-    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    load, inertia = 20 * np.sin(motion.q * 9), np.full_like(motion.dq, 2.0)
+    return robot, motion, Predicted(np.zeros_like(motion.dq), load=load, inertia=inertia)
+
+
+def test_what_the_rotor_has_of_the_inertia_does_not_pass_the_gap():
+    robot, motion, said = loaded(2)
     link = Predicted(said.torque, load=said.load - 0.5 * motion.ddq, inertia=0.75 * said.inertia)
     (passed,) = Backlash(b=6e-4, rotor_share=0.25).samples(robot, motion, said)
     (expected,) = Backlash(b=6e-4).samples(robot, motion, link)
@@ -102,18 +108,14 @@ def test_one_joint_alone_is_as_among_others(effect):
 
 
 def test_a_gap_that_is_known_about_passes_the_mean_of_it_and_of_those_about_it():
-    robot = arm(1)
-    motion = swing(robot, 5, seconds=4)
-    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    robot, motion, said = loaded(1)
     (about,) = Backlash(b=1e-3, about=True).samples(robot, motion, said)
     each = [Backlash(b=1e-3 * 2 ** (2 * k / 3)).samples(robot, motion, said)[0] for k in (-1, 0, 1)]
     np.testing.assert_allclose(about, np.mean(each, axis=0), atol=1e-9)
 
 
 def test_gaps_that_are_tried_together_are_as_each_alone():
-    robot = arm(1)
-    motion = swing(robot, 5, seconds=4)
-    said = Predicted(np.zeros_like(motion.dq), load=20 * np.sin(motion.q * 9), inertia=np.full_like(motion.dq, 2.0))
+    robot, motion, said = loaded(1)
     tried = Backlash().candidates(robot)[3:5]
     for one in tried:
         (alone,) = one.samples(robot, motion, Predicted(said.torque, load=said.load, inertia=said.inertia))

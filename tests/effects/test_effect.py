@@ -35,10 +35,8 @@ def test_effects_are_as_the_contract_says():
         assert effect.channel == entry["channel"]
         if name == "rigid_body":  # its ten per link are beyond the table
             continue
-        assert (
-            units(effect, robot).items()
-            >= {key: value[0] for key, value in entry.get("parameters", {}).items()}.items()
-        )
+        stated = {key: value[0] for key, value in entry.get("parameters", {}).items()}
+        assert units(effect, robot).items() >= stated.items()
         per_joint = all(term.joint for term in effect.terms(robot))
         assert per_joint == (entry["per"] != "robot" or name == "mechanical_power")
     own = {name for name, effect in catalogue().items() if effect.disturbance or isinstance(effect, LocalEffect)}
@@ -46,29 +44,11 @@ def test_effects_are_as_the_contract_says():
 
 
 QUDT_UNITS = {
-    "KiloGM-M2": "kg m^2",
-    "N-M": "Nm",
-    "N-M-SEC-PER-RAD": "Nm s/rad",
-    "RAD-PER-SEC": "rad/s",
-    "UNITLESS": "1",
-    "PER-K": "1/K",
-    "RAD": "rad",
-    "N-M-PER-RAD": "Nm/rad",
-    "PER-REV": "1/rev",
-    "KiloGM": "kg",
-    "M": "m",
-    "N": "N",
-    "W": "W",
-    "OHM": "ohm",
-    "K": "K",
-    "W-SEC-PER-RAD": "W s/rad",
-    "W-SEC2-PER-RAD2": "W s^2/rad^2",
-    "V": "V",
-    "J": "J",
-    "N-M-PER-SEC": "Nm/s",
-    "SEC": "s",
-    "HZ": "Hz",
-}
+    "UNITLESS": "1", "M": "m", "KiloGM": "kg", "KiloGM-M2": "kg m^2", "SEC": "s", "HZ": "Hz", "K": "K", "PER-K": "1/K",
+    "RAD": "rad", "RAD-PER-SEC": "rad/s", "PER-REV": "1/rev", "N": "N", "N-M": "Nm", "N-M-PER-SEC": "Nm/s",
+    "N-M-PER-RAD": "Nm/rad", "N-M-SEC-PER-RAD": "Nm s/rad", "J": "J", "W": "W", "W-SEC-PER-RAD": "W s/rad",
+    "W-SEC2-PER-RAD2": "W s^2/rad^2", "V": "V", "OHM": "ohm",
+}  # fmt: skip
 
 
 def test_effects_are_as_the_ontology_says():
@@ -86,22 +66,17 @@ def test_effects_are_as_the_ontology_says():
         one = individuals[name]
         assert str(graph.value(one, irt.has_Channel)).rpartition("/")[2] == effect.channel
         assert family_of[str(one)].rpartition("/")[2] == effect.family
-        stated = {
-            str(graph.value(parameter, irt.Parameter_Name)): QUDT_UNITS[
-                str(graph.value(parameter, unit_of)).rpartition("/")[2]
-            ]
-            for parameter in graph.objects(one, irt.has_Effect_Parameter)
-        }
-        assert units(effect, robot).items() >= stated.items(), name
+        own = units(effect, robot)
+        for parameter in graph.objects(one, irt.has_Effect_Parameter):
+            unit = QUDT_UNITS[str(graph.value(parameter, unit_of)).rpartition("/")[2]]
+            assert own[str(graph.value(parameter, irt.Parameter_Name))] == unit, name
 
 
 def units(effect, robot):
     """The names and units of an effect's parameters, "N m" as "Nm"; parts of a vector ("f_x") under the whole's."""
     terms = [term for term in effect.terms(robot) if not term.fixed]
-    known = {("coulomb_friction", j, "Fc"): 1.0 for j in robot.joint_names}
-    known |= {("viscous_friction", j, "Fv"): 1.0 for j in robot.joint_names}
-    known |= {("rotor_inertia", j, "Ia"): 1.0 for j in robot.joint_names}
-    known |= {("copper_loss", j, "R"): 1.0 for j in robot.joint_names}
+    names = {"coulomb_friction": "Fc", "viscous_friction": "Fv", "rotor_inertia": "Ia", "copper_loss": "R"}
+    known = {(effect, joint, name): 1.0 for effect, name in names.items() for joint in robot.joint_names}
     found = effect.parameters(robot, Coefficients(np.ones(len(terms)), np.eye(len(terms)), known)) if terms else ()
     return {each.name.partition("_")[0]: each.unit.replace("N m", "Nm") for each in found}
 
@@ -243,11 +218,15 @@ def test_a_contribution_is_columns_by_coefficients(name):
     np.testing.assert_allclose(effect.contribution(robot, motion, values, predicted), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_columns_by_joint_are_those_of_torque_without_zeros():
-    robot = arm(3)
-    told = replace(swing(robot, 1, seconds=0.5), payload_mass=2.0)
-    contact = catalogue()["external_contact"]
-    stack = Stack(robot, [*BASELINE, "load_dependent_friction", "presliding_hysteresis", replace(contact, runs=("x",))])
+@pytest.fixture(scope="module")
+def various():
+    """The baseline with effects of a load, of the past, and of some runs."""
+    contact = replace(catalogue()["external_contact"], runs=("x",))
+    return Stack(arm(3), [*BASELINE, "load_dependent_friction", "presliding_hysteresis", contact])
+
+
+def test_columns_by_joint_are_those_of_torque_without_zeros(various):
+    stack, told = various, replace(swing(arm(3), 1, seconds=0.5), payload_mass=2.0)
     for motion in (told, told.part(10, 30)):
         dense = stack.torque_columns(motion)
         columns = stack.columns_by_joint(motion)
@@ -257,12 +236,8 @@ def test_columns_by_joint_are_those_of_torque_without_zeros():
         assert stack.shift_torque(motion).any()
 
 
-def test_what_columns_carry_is_their_sum_over_joints():
-    robot = arm(3)
-    told = swing(robot, 1, seconds=0.5)
-    contact = catalogue()["external_contact"]
-    others = ["load_dependent_friction", "presliding_hysteresis", replace(contact, runs=("x",))]
-    stack = Stack(robot, [*BASELINE, *others])
+def test_what_columns_carry_is_their_sum_over_joints(various):
+    stack, told = various, swing(arm(3), 1, seconds=0.5)
     for motion in (told, told.part(10, 30)):
         expected = np.einsum("njk,nj->nk", stack.torque_columns(motion), motion.dq)[:, stack.real]
         np.testing.assert_allclose(stack.carried(motion, motion.dq), expected, rtol=1e-9, atol=1e-9)
