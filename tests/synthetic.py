@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from irtwin.robot.description import Robot
 from irtwin.robot.model import inverse_dynamics
 from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.channels import Signals
-from irtwin.signals.log import Run
+from irtwin.signals.log import DataSet, Run
 from irtwin.signals.motion import Motion
 
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0", "0 1 0")
@@ -88,9 +89,23 @@ def measure(robot: Robot, motion: Motion, noise: float = 0.0, constant: float = 
     )
 
 
+def with_torque(robot: Robot, shown: Motion, added: np.ndarray, constant: float = 8.0) -> Motion:
+    """Return what is shown with some more joint torque, (N, n) N m, and the power that this takes; without current."""
+    heat = truth(robot)["R"] * (2 * shown.current + added / constant) * added / constant
+    power = shown.power + (added * shown.dq + heat).sum(axis=1)
+    return replace(shown, torque=shown.torque + added, power=power, current=None)
+
+
 def with_constants(robot: Robot, constant: float = 8.0) -> Robot:
     """Give every joint the torque constant that `measure` takes."""
     return replace(robot, joints=tuple(replace(joint, torque_constant=constant) for joint in robot.joints))
+
+
+def data_set(
+    robot: Robot, runs: Iterable[Run], effects: Sequence[str] | None = None, power_at: str | None = "mains"
+) -> DataSet:
+    """A data set of a robot that a simulator logged."""
+    return DataSet(Path("arm"), robot, tuple(runs), effects, None, power_at, True, {})
 
 
 def as_run(motion: Motion, **changes: np.ndarray | None) -> Run:

@@ -62,9 +62,8 @@ def test_a_share_is_as_unsure_as_its_parameters(more, set_to):
         each = zip(twin.parameters, moved, strict=True)
         other = replace(twin, parameters=tuple(replace(one, value=one.value + by) for one, by in each))
         drawn.append([entry.energy for entry in other.ledger(motion)])
-    spread = dict(
-        zip([(one.effect, one.joint) for one in twin.ledger(motion)], 1.96 * np.std(drawn, axis=0), strict=True)
-    )
+    keys = [(one.effect, one.joint) for one in twin.ledger(motion)]
+    spread = dict(zip(keys, 1.96 * np.std(drawn, axis=0), strict=True))
     for entry in account(twin, motion):
         for share in entry.shares:
             assert share.upper - share.energy == pytest.approx(spread[share.effect, share.joint], rel=0.4, abs=0.05)

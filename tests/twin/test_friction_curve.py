@@ -110,7 +110,6 @@ def test_a_curve_is_odd_unless_friction_differs_by_direction():
 
 def test_measured_points_lie_on_the_true_curve_though_the_twin_lacks_an_effect():
     for joint, curve in enumerate(curves_of(sticking)):
-        assert curve.measured is not None
         speed = np.array(curve.measured.speed)
         told = np.abs(speed) > 0.02  # in the bins next to standstill the truth bends
         left = np.array(curve.measured.torque) - sliding(speed, joint) - stribeck(speed)

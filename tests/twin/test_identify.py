@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth, with_constants
+from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth, with_constants, with_torque
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.errors import InputError
@@ -63,15 +63,7 @@ def test_friction_that_the_twin_lacks_is_no_heat_of_drives():
 
     def rubbing(seed):
         measured = measure(robot, swing(robot, seed), noise=0.1, seed=seed)
-        real = measured.torque - true["c"]
-        more = 0.1 * np.abs(real) * np.sign(measured.dq)
-        heat = (true["R"] * ((real + more) ** 2 - real**2) / 8.0**2).sum(axis=1)
-        return replace(
-            measured,
-            torque=measured.torque + more,
-            current=None,
-            power=measured.power + (more * measured.dq).sum(axis=1) + heat,
-        )
+        return with_torque(robot, measured, 0.1 * np.abs(measured.torque - true["c"]) * np.sign(measured.dq))
 
     twin = identify(robot, [rubbing(seed) for seed in range(4)], ALL)
     np.testing.assert_allclose(values(twin, "copper_loss")[:2], true["R"][:2], rtol=0.03)
@@ -166,10 +158,8 @@ def test_torque_constants_come_from_the_balance_of_power():
 @pytest.mark.slow
 def test_torque_can_be_found_through_power_alone():
     robot = arm(3)
-    motions = [
-        replace(measure(robot, swing(robot, seed, seconds=30), noise=0.5, seed=seed), torque=None, current=None)
-        for seed in range(3)
-    ]
+    whole = [measure(robot, swing(robot, seed, seconds=30), noise=0.5, seed=seed) for seed in range(3)]
+    motions = [replace(motion, torque=None, current=None) for motion in whole]
     twin = identify(with_constants(robot), motions, ALL)
     np.testing.assert_allclose(values(twin, "viscous_friction")[:2], truth(robot)["Fv"][:2], rtol=0.1)
     assert twin.unidentified == ("torque_offset",)

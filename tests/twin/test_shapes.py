@@ -34,9 +34,8 @@ def test_an_effect_that_is_named_gets_the_shape_that_the_motions_show():
 
 
 def test_a_shape_lies_between_those_that_are_tried_where_motions_say_so():
-    effects = of_stribeck(
-        shaped(ROBOT, [[sticking(1, 0.14, 1.4), sticking(2, 0.14, 1.4)]], [*BASELINE, "stribeck_friction"])
-    )
+    side = [sticking(seed, 0.14, 1.4) for seed in (1, 2)]
+    effects = of_stribeck(shaped(ROBOT, [side], [*BASELINE, "stribeck_friction"]))
     assert {name for one in effects for name in one.joints} == set(ROBOT.joint_names)
     assert all(one.vs == pytest.approx(0.14, rel=0.1) and one.d == pytest.approx(1.4, rel=0.1) for one in effects)
 

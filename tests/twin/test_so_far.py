@@ -29,14 +29,11 @@ def columns(since: float = 1.7e9, **changes: np.ndarray) -> dict[str, np.ndarray
 
 
 def fed(of: EnergySoFar, samples: dict[str, np.ndarray], size: int) -> list:
-    count = len(samples["time"])
-    return [
-        stretch
-        for start in range(0, count, size)
-        for stretch in of.feed(
-            {name: values[start : start + size] for name, values in samples.items()}, last=start + size >= count
-        )
-    ]
+    count, stretches = len(samples["time"]), []
+    for start in range(0, count, size):
+        piece = {name: values[start : start + size] for name, values in samples.items()}
+        stretches += of.feed(piece, last=start + size >= count)
+    return stretches
 
 
 @pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.nightly), 7, 100, 10**6])

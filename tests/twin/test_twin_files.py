@@ -20,25 +20,41 @@ from irtwin.twin.twin import Choice
 ROBOT = arm(3)
 MOTION = measure(ROBOT, swing(ROBOT, 1), noise=0.3)
 # from currents: the robot then carries torque constants that its URDF lacks
-TWIN = identify(
-    ROBOT, [type(MOTION)(**{**vars(MOTION), "torque": None})], ("rigid_body", "copper_loss", "torque_offset")
+TWIN = identify(ROBOT, [replace(MOTION, torque=None)], ("rigid_body", "copper_loss", "torque_offset"))
+KEPT = (
+    "effects",
+    "parameters",
+    "base_parameters",
+    "cutoff",
+    "unidentified",
+    "condition_number",
+    "fitted",
+    "body_change",
 )
+MORE = {
+    "odd_stretches": (OddStretch(run="run", start=1.0, stop=2.5, joints=("joint_2",)),),
+    "torque_scale": FittedTorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants"),
+    "choices": (
+        Choice("copper_loss", ("joint_1",), True, 0.9, ("inverter_loss",), "W", 6.0, 3.0, 2.0, 1.0),
+        Choice("iron_loss", (), False, 0.4),
+    ),
+}
+
+
+def saved(folder, twin, change=lambda document: None):
+    """The file of a twin, whose document is changed."""
+    document = json.loads(to_json(twin))
+    change(document)
+    (folder / "twin.json").write_text(json.dumps(document))
+    return folder / "twin.json"
 
 
 def test_a_saved_twin_is_the_same_twin(tmp_path):
     (tmp_path / "twin.json").write_text(to_json(TWIN))
     again = load(tmp_path / "twin.json")
-    for name in (
-        "effects",
-        "parameters",
-        "base_parameters",
-        "cutoff",
-        "unidentified",
-        "condition_number",
-        "fitted",
-        "body_change",
-    ):
+    for name in (*KEPT, "body_change"):
         assert getattr(again, name) == getattr(TWIN, name)
+    np.testing.assert_allclose(again.covariance, TWIN.covariance)
     assert again.robot.joints == TWIN.robot.joints
     np.testing.assert_array_equal(again.torque(MOTION), TWIN.torque(MOTION))
     np.testing.assert_array_equal(again.power(MOTION), TWIN.power(MOTION))
@@ -47,35 +63,13 @@ def test_a_saved_twin_is_the_same_twin(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.json", "twin.json"]
 
 
-def test_a_saved_twin_says_which_stretches_counted_for_little(tmp_path):
-    twin = replace(TWIN, odd_stretches=(OddStretch(run="run", start=1.0, stop=2.5, joints=("joint_2",)),))
-    (tmp_path / "twin.json").write_text(to_json(twin))
-    assert load(tmp_path / "twin.json").odd_stretches == twin.odd_stretches
+@pytest.mark.parametrize("name", MORE)
+def test_a_saved_twin_says_more_where_it_is_known(tmp_path, name):
+    assert getattr(TWIN, name) != MORE[name]
+    assert getattr(load(saved(tmp_path, replace(TWIN, **{name: MORE[name]}))), name) == MORE[name]
 
 
-def test_a_saved_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path):
-    scale = FittedTorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants")
-    (tmp_path / "twin.json").write_text(to_json(replace(TWIN, torque_scale=scale)))
-    again = load(tmp_path / "twin.json")
-    assert again.torque_scale == scale and TWIN.torque_scale is None
-    np.testing.assert_allclose(again.covariance, TWIN.covariance)
-    document = json.loads((tmp_path / "twin.json").read_text())
-    document["torque_scale"]["low"] = "small"
-    (tmp_path / "twin.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"twin\.torque_scale\.low must be a finite number; save the twin again"):
-        load(tmp_path / "twin.json")
-
-
-def test_a_saved_twin_says_which_effects_were_chosen(tmp_path):
-    shown = Choice("copper_loss", ("joint_1",), True, 0.9, ("inverter_loss",), "W", 6.0, 3.0, 2.0, 1.0)
-    left_open = Choice("iron_loss", (), False, 0.4)
-    (tmp_path / "twin.json").write_text(to_json(replace(TWIN, choices=(shown, left_open))))
-    assert load(tmp_path / "twin.json").choices == (shown, left_open)
-    document = json.loads((tmp_path / "twin.json").read_text())
-    document["choices"][1]["chosen"] = "no"
-    (tmp_path / "twin.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"twin.choices\[1\].chosen must be a boolean"):
-        load(tmp_path / "twin.json")
+CONTACT = {"id": "external_contact", "joints": None, "runs": None}
 
 
 def spoil(document, *keys, value=None, drop=False):
@@ -107,14 +101,14 @@ def spoil(document, *keys, value=None, drop=False):
         (("covariance", 1), {"value": "1.0 x"}, "twin.covariance[1] must be 2 finite numbers"),
         (("covariance", 1), {"value": "1.0 nan"}, "twin.covariance[1] must be 2 finite numbers"),
         (("parameters", 0), {"drop": True}, 'parameter m of effect "rigid_body" on link_1 is missing'),
+        (("torque_scale", "low"), {"value": "small"}, "torque_scale.low must be a finite number; save the twin again"),
+        (("choices", 1, "chosen"), {"value": "no"}, "twin.choices[1].chosen must be a boolean"),
+        (("effects", 0), {"value": CONTACT | {"shape": {}}}, "twin.effects[0].shape"),
+        (("effects", 0), {"value": CONTACT | {"shape": {"start": "early", "stop": 1.0}}}, "twin.effects[0].shape"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_named(tmp_path, keys, change, message):
-    path = tmp_path / "twin.json"
-    path.write_text(to_json(TWIN))
-    document = json.loads(path.read_text())
-    spoil(document, *keys, **change)
-    path.write_text(json.dumps(document))
+    path = saved(tmp_path, replace(TWIN, **MORE), lambda document: spoil(document, *keys, **change))
     with pytest.raises(InputError) as error:
         load(path)
     assert message in str(error.value)
@@ -122,55 +116,33 @@ def test_what_is_wrong_with_a_file_is_named(tmp_path, keys, change, message):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff\xfe"])
-def test_files_that_are_no_twin(tmp_path, content):
-    path = tmp_path / "twin.json"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"twin\.json.*(name a twin that irtwin saved|not UTF-8 text)"):
-        load(path)
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        *((content, ".*name a twin that irtwin saved") for content in (b"", b"{", b"[]")),
+        (b"\xff\xfe", ".*not UTF-8 text"),
+        (b"[" * 200_000, ": not JSON"),
+    ],
+    ids=["empty", "cut off", "a list", "bytes", "JSON in JSON without end"],
+)
+def test_files_that_are_no_twin(tmp_path, content, said):
+    (tmp_path / "twin.json").write_bytes(content)
+    with pytest.raises(InputError, match=rf"twin\.json{said}"):
+        load(tmp_path / "twin.json")
     with pytest.raises(InputError, match=r"none\.json: cannot be read"):
         load(tmp_path / "none.json")
 
 
-def test_json_in_json_without_end_is_told(tmp_path):
-    path = tmp_path / "twin.json"
-    path.write_text("[" * 200_000)
-    with pytest.raises(InputError, match=r"twin\.json: not JSON"):
-        load(path)
-
-
 def test_an_effect_of_a_shape_is_written_with_it(tmp_path):
     shaped = ExternalContact(start=-np.inf, stop=4.0, joints=("joint_2",), runs=("swing_1",))
-    twin = identify(ROBOT, [MOTION], (*BASELINE, shaped))
-    (tmp_path / "twin.json").write_text(to_json(twin))
-    written = json.loads((tmp_path / "twin.json").read_text())["effects"]
-    assert written[:-1] == list(BASELINE)
-    assert written[-1] == {
-        "id": "external_contact",
-        "joints": ["joint_2"],
-        "runs": ["swing_1"],
-        "shape": {"start": "-inf", "stop": 4.0},
-    }
-    assert load(tmp_path / "twin.json").effects[-1] == shaped
+    path = saved(tmp_path, identify(ROBOT, [MOTION], (*BASELINE, shaped)))
+    shape = {"start": "-inf", "stop": 4.0}
+    said = {"id": "external_contact", "joints": ["joint_2"], "runs": ["swing_1"], "shape": shape}
+    assert json.loads(path.read_text())["effects"] == [*BASELINE, said]
+    assert load(path).effects[-1] == shaped
 
 
 def test_brakes_of_a_former_release_open_as_a_joint_moves(tmp_path):
-    path = tmp_path / "twin.json"
     braked = ("standby_power", "mechanical_power", "rigid_body", HoldingBrakes(delay=0.3))
-    path.write_text(to_json(identify(ROBOT, [MOTION], braked)))
-    document = json.loads(path.read_text())
-    brakes = next(effect for effect in document["effects"] if not isinstance(effect, str) and effect["shape"])
-    del brakes["shape"]["lead"]
-    path.write_text(json.dumps(document))
+    path = saved(tmp_path, identify(ROBOT, [MOTION], braked), lambda said: said["effects"][-1]["shape"].pop("lead"))
     assert HoldingBrakes(delay=0.3, lead=0.0) in load(path).stack.effects
-
-
-@pytest.mark.parametrize("shape", [{}, {"start": "early", "stop": 1.0}])
-def test_a_wrong_shape_is_named(tmp_path, shape):
-    path = tmp_path / "twin.json"
-    path.write_text(to_json(TWIN))
-    document = json.loads(path.read_text())
-    document["effects"][0] = {"id": "external_contact", "joints": None, "runs": None, "shape": shape}
-    path.write_text(json.dumps(document))
-    with pytest.raises(InputError, match=r"twin.effects\[0\].shape"):
-        load(path)
