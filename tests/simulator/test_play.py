@@ -27,19 +27,25 @@ def test_a_controller_that_damps_its_error_leads_by_the_speed_of_its_commands(tm
     np.testing.assert_allclose(led - plain, [[0.0, 0.04 * 50 / 99]] * len(begin), atol=1e-12)
 
 
-def test_a_servo_settles_where_its_load_lets_it(tmp_path):
+@pytest.fixture
+def still(tmp_path):
+    """The servos of an arm without dry friction, and a run in which it is told to stay."""
     text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))
-    q = play(own, [own.numbers], [whole(data_set.runs[0])])[0][0][-1, 0]
+    return own, whole(data_set.runs[0])
+
+
+def test_a_servo_settles_where_its_load_lets_it(still):
+    own, run = still
+    q = play(own, [own.numbers], [run])[0][0][-1, 0]
     sags = 9.81 * 0.1 * 0.1 * np.cos(q.sum()) / 15
     assert q[1] == pytest.approx(sags, rel=1e-3)
 
 
-def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(tmp_path):
-    text = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"')
-    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((150, 2))}, text))
+def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(still):
+    own, run = still
     numbers = [own.numbers, servo_arm.changed(own, dead_band=(0.0, 0.03)), servo_arm.changed(own, torque_limit=(5, 0))]
-    tight, loose, weak = (q[0][-1, 0] for q in play(own, numbers, [whole(data_set.runs[0])]))
+    tight, loose, weak = (q[0][-1, 0] for q in play(own, numbers, [run]))
     assert loose[1] - tight[1] == pytest.approx(0.03, rel=0.02)
     assert weak[1] > 0.5
 
@@ -54,14 +60,8 @@ def test_stretches_do_not_overlap_and_are_spread(tmp_path):
 def test_a_joint_by_itself_plays_nearly_as_the_whole_model(tmp_path):
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(6, 1)}))
     data_set = servo_arm.played(data_set, own, own.numbers, noise=0.0)
-    numbers = servo_arm.changed(
-        own,
-        stiffness=(22.0, 14.0),
-        friction=(0.1, 0.02),
-        delay=(0.0, 0.02),
-        torque_limit=(3.0, 5.0),
-        dead_band=(0, 0.02),
-    )
+    differs = {"stiffness": (22.0, 14.0), "friction": (0.1, 0.02), "torque_limit": (3.0, 5.0)}
+    numbers = servo_arm.changed(own, **differs, delay=(0.0, 0.02), dead_band=(0, 0.02))
     stretches = each(data_set.runs[0], 2.0, 2)
     single, whole_ = alone(own, stretches, 0.005).play([numbers])[0], play(own, [numbers], stretches)[0]
     far = max(np.abs(one.measured - own_).max() for one, own_ in zip(stretches, whole_, strict=True))

@@ -120,7 +120,6 @@ def test_a_simulator_that_is_right_agrees():
 
 
 @pytest.mark.nightly
-@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_small_change_is_told_beside_a_joint_that_falls(tmp_path):
     numbers = {"torque_limit": (0.52, 30 * np.pi), "armature": (0.02, 0.06)}
@@ -143,14 +142,6 @@ def without_commands(table):
     return table.drop_columns(["cmd_lift", "cmd_elbow"])
 
 
-def refused(folder, *more, change=None, text=servo_arm.MODEL):
-    data, model = logs(folder, change, text)
-    said = irtwin("diagnose", data, "--simulator", model, *more)
-    assert said.status == 2
-    assert said.err.strip().count("\n") <= 3  # the lines of its steps, and one of the error
-    return said.err
-
-
 def stuck(table):
     place, told = table.column_names.index("q_lift"), table["cmd_lift"].to_numpy()
     jitter = 0.1 * np.random.default_rng(1).standard_normal(len(told))
@@ -163,23 +154,31 @@ def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     assert said.status == 0, said.err
 
 
-def test_commands_in_degrees_are_refused(tmp_path):
-    assert "a.parquet: column cmd_lift is in degrees beside positions in rad" in refused(tmp_path, change=in_degrees)
-
-
-def test_logs_without_commands_are_refused(tmp_path):
-    told = "has neither torque nor power; log tau_, i_ or power, or cmd_, the commands that the model is to play"
-    assert told in refused(tmp_path, change=without_commands)
-
-
-def test_what_needs_torque_is_refused(tmp_path):
-    said = refused(tmp_path, "--save-twin", tmp_path / "twin.json")
-    assert "has commands and no torque: a twin's file is of no use for it; leave that out" in said
-
-
-def test_a_model_of_other_joints_is_refused(tmp_path):
-    said = refused(tmp_path, text=servo_arm.MODEL.replace('"elbow"', '"knee"'))
-    assert "has no joint elbow; its joints are lift, knee: say what it calls the robot's: --joints lift,knee" in said
+@pytest.mark.parametrize(
+    ("change", "calls", "options", "told"),
+    [
+        (in_degrees, "elbow", (), "a.parquet: column cmd_lift is in degrees beside positions in rad"),
+        (
+            without_commands, "elbow", (),
+            "has neither torque nor power; log tau_, i_ or power, or cmd_, the commands that the model is to play",
+        ),
+        (
+            None, "elbow", ("--save-twin", "twin.json"),
+            "has commands and no torque: a twin's file is of no use for it; leave that out",
+        ),
+        (
+            None, "knee", (),
+            "has no joint elbow; its joints are lift, knee: say what it calls the robot's: --joints lift,knee",
+        ),
+    ],
+    ids=["commands in degrees", "logs without commands", "what needs torque", "a model of other joints"],
+)  # fmt: skip
+def test_what_cannot_be_played_is_refused(change, calls, options, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data, model = logs(tmp_path, change, servo_arm.MODEL.replace('"elbow"', f'"{calls}"'))
+    said = irtwin("diagnose", data, "--simulator", model, *options)
+    assert (said.status, told in said.err) == (2, True)
+    assert said.err.strip().count("\n") <= 3  # the lines of its steps, and one of the error
 
 
 def test_without_a_model_a_log_of_commands_is_told_what_it_is_good_for(tmp_path):
@@ -217,7 +216,6 @@ def with_torque(folder, **numbers):
     return servo_arm.played(data_set, own, servo_arm.changed(own, **numbers), torque_noise=5e-3), model
 
 
-@pytest.mark.nightly
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_torque_says_what_motion_leaves_open(tmp_path):

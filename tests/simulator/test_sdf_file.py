@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests import servo_arm
 from tests.synthetic import arm
 from tests.twin.test_described import fitted, of, states, torque
 
@@ -210,11 +211,10 @@ def test_a_controller_that_does_not_pull_to_a_position_is_no_servo(tmp_path, oth
 
 def test_gains_are_written_into_their_controller(tmp_path):
     own = servos(read(tmp_path, CONTROLLED))
-    robots, differs = own.numbers.copy(), np.zeros(own.numbers.shape, dtype=bool)
-    assert own.written(own.numbers, differs) == CONTROLLED.encode()
+    assert own.written(own.numbers, np.zeros(own.numbers.shape, dtype=bool)) == CONTROLLED.encode()
     changed = {"stiffness": 120.0, "damping": 5.0, "friction": 0.75, "torque_limit": 20.0}
-    for name, value in (changed | {"delay": 0.1, "offset": 0.2, "armature": 0.1}).items():
-        robots[NAMES.index(name)], differs[NAMES.index(name)] = value, True
+    robots = servo_arm.changed(own, **changed, delay=0.1, offset=0.2, armature=0.1)
+    differs = robots != own.numbers
     text = own.written(robots, differs).decode()
     assert own.unwritten(differs) == ["armature of pan", "offset of pan", "delay of pan"]
     again = dict(zip(NAMES, servos(read(tmp_path, text)).numbers[:, 0], strict=True))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import servo_arm
 from tests.simulator.test_sdf_file import ONE, pull
 from tests.synthetic import arm
 from tests.twin.test_described import fitted, of, states, torque
@@ -93,8 +94,7 @@ def test_a_written_twin_is_read_back_to_single_precision(tmp_path, slides):
 def test_units_of_the_stage_become_metres_newtons_and_radians(tmp_path):
     model = read(tmp_path)
     assert pull(model) == pytest.approx(9.81)
-    numbers = {"armature": 0.0, "damping": 0.25, "frictionloss": 0.5}
-    assert model.numbers("pan") == pytest.approx(numbers | {"frictionloss": 0.5, "damping": 0.25})
+    assert model.numbers("pan") == pytest.approx({"armature": 0.0, "damping": 0.25, "frictionloss": 0.5})
     assert model.compiled.body("/arm/rod").inertia == pytest.approx([0.1, 0.1, 0.01])
     assert model.compiled.jnt_range[0] == pytest.approx([-np.pi / 2, np.pi])
     own = servos(model)
@@ -105,12 +105,10 @@ def test_units_of_the_stage_become_metres_newtons_and_radians(tmp_path):
 
 def test_an_unchanged_model_is_the_same_bytes_and_a_changed_one_a_layer_over_it(tmp_path):
     own = servos(read(tmp_path))
-    none = np.zeros(own.numbers.shape, dtype=bool)
-    assert own.written(own.numbers, none) == (tmp_path / "arm.usda").read_bytes()
-    robots, differs = own.numbers.copy(), none.copy()
+    assert own.written(own.numbers, np.zeros(own.numbers.shape, dtype=bool)) == (tmp_path / "arm.usda").read_bytes()
     changed = {"stiffness": 120.0, "damping": 2.0, "friction": 0.75, "armature": 0.03, "torque_limit": 6.0}
-    for name, value in (changed | {"delay": 0.1, "offset": 0.2}).items():
-        robots[NAMES.index(name)], differs[NAMES.index(name)] = value, True
+    robots = servo_arm.changed(own, **changed, delay=0.1, offset=0.2)
+    differs = robots != own.numbers
     layer = tmp_path / "better.usda"
     layer.write_bytes(own.written(robots, differs))
     assert own.unwritten(differs) == ["offset of pan", "delay of pan"]
@@ -146,11 +144,7 @@ def test_names_that_usd_does_not_allow_are_kept_for_show(tmp_path):
     [
         ("#usda 1.0", "#usd 7", r"is no USD that can be read \("),
         ("def Xform", "def Xform {", r"is no USD that can be read \("),
-        (
-            "(\n    metersPerUnit",
-            "(\n    subLayers = [@../o.usda@]\n    metersPerUnit",
-            r"names \.\./o\.usda, which is out",
-        ),
+        ("(\n", "(\n    subLayers = [@../o.usda@]\n", r"names \.\./o\.usda, which is out"),
         ('"arm"\n', '"arm" (references = @/etc/passwd@)\n', r"names /etc/passwd, which is outside the folder"),
         ('"arm"\n', '"arm" (payload = @m.usda@)\n', r"names m\.usda, which is missing; put it there"),
         ("body1 = </arm/rod>", "body1 = </arm/none>", r'joint "pan" names /arm/none, which is missing'),

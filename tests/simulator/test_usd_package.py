@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests import servo_arm
 from tests.simulator.test_sdf_file import ONE, pull
 from tests.simulator.test_usd_file import PENDULUM, read
 
@@ -56,15 +57,12 @@ def test_a_package_is_read_as_what_is_in_it(package, tmp_path):
 
 def test_an_unchanged_one_is_the_same_bytes_and_a_changed_one_has_its_files_under_a_layer(package, tmp_path):
     own = servos(read_model(package, ONE))
-    none = np.zeros(own.numbers.shape, dtype=bool)
-    assert own.written(own.numbers, none) == package.read_bytes()
-    robots, differs = own.numbers.copy(), none.copy()
+    assert own.written(own.numbers, np.zeros(own.numbers.shape, dtype=bool)) == package.read_bytes()
     changed = {"stiffness": 120.0, "friction": 0.75, "armature": 0.03, "torque_limit": 6.0}
-    for name, value in changed.items():
-        robots[NAMES.index(name)], differs[NAMES.index(name)] = value, True
+    robots = servo_arm.changed(own, **changed)
     (tmp_path / "away").mkdir()
     better = tmp_path / "away" / "better.usdz"
-    better.write_bytes(own.written(robots, differs))
+    better.write_bytes(own.written(robots, robots != own.numbers))
     layer, *before = held(better).items()
     assert dict(before) == held(package)
     assert layer[0] == "changed_1.usda" and b"newton:armature" in layer[1] and b"physics:mass" not in layer[1]
