@@ -148,10 +148,8 @@ def _make(case: Case, folder: Path) -> None:
 
 def _tell(workspace: Path, port: int) -> None:
     """Have alarms told to who answers at a port."""
-    (workspace / "alarms.toml").write_text(
-        f'[[mqtt]]\nhost = "127.0.0.1"\nport = {port}\ntopic = "x"\ntimeout_s = 0.3\n'
-        f'[[mqtt]]\nhost = "127.0.0.1"\nport = {port}\ntopic = "x"\ntimeout_s = 0.3\n'
-    )
+    broker = f'[[mqtt]]\nhost = "127.0.0.1"\nport = {port}\ntopic = "x"\ntimeout_s = 0.3\n'
+    (workspace / "alarms.toml").write_text(2 * broker)
 
 
 def _archive(folder: Path) -> Path:

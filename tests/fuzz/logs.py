@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -141,26 +142,20 @@ def _torque(robot: str, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.nd
     return inverse_dynamics(model, q, dq, ddq)
 
 
-_CHANNELS = ("zero", "constant", "random", "huge", "tiny", "one dead", "last only")
+_CHANNELS: dict[str, Callable[[np.ndarray, np.random.Generator], np.ndarray]] = {  # what is logged of values, (N, n)
+    "zero": lambda values, rng: np.zeros_like(values),
+    "constant": lambda values, rng: np.full_like(values, 1.25),
+    "random": lambda values, rng: rng.standard_normal(values.shape),
+    "huge": lambda values, rng: values * 1e4,
+    "tiny": lambda values, rng: values * 1e-12,
+    "one dead": lambda values, rng: np.where(np.arange(values.shape[1]) > 0, values, 0.0),
+    "last only": lambda values, rng: np.where(np.arange(len(values))[:, None] == len(values) - 1, values, 0.0),
+}
 
 
 def _channel(how: str, model: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
     values = np.nan_to_num(model) + noise * rng.standard_normal(model.shape)
-    if how == "zero":
-        values[:] = 0.0
-    elif how == "constant":
-        values[:] = 1.25
-    elif how == "random":
-        values = rng.standard_normal(model.shape)
-    elif how == "huge":
-        values = values * 1e4
-    elif how == "tiny":
-        values = values * 1e-12
-    elif how == "one dead":
-        values[:, :1] = 0.0
-    elif how == "last only":
-        values[:-1] = 0.0
-    return np.clip(values, -9e5, 9e5)
+    return np.clip(_CHANNELS[how](values, rng) if how in _CHANNELS else values, -9e5, 9e5)
 
 
 def _quoted(text: str) -> str:

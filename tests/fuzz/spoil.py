@@ -82,24 +82,18 @@ def _column(folder: Path, rng: np.random.Generator) -> None:
 
     def change(values: pa.ChunkedArray) -> pa.ChunkedArray:
         numbers = np.array(values.cast(pa.float64()))
-        how = rng.integers(9)
-        if how == 0:
-            return pa.array(numbers[::-1])
-        if how == 1:
-            return pa.array(np.rad2deg(numbers))
-        if how == 2:
-            return pa.array(np.where(rng.random(len(numbers)) < 0.05, rng.choice([np.nan, 1e300, 0.0]), numbers))
-        if how == 3:
-            return values.cast(pa.string())
-        if how == 4:
-            return pa.array([[number] for number in numbers])
-        if how == 5:
-            return values.cast(pa.string()).dictionary_encode()
-        if how == 6:
-            return pa.array([int(abs(number) * 1000) % 30000 for number in numbers], pa.date32())
-        if how == 7:
-            return pa.array([str(round(float(number), 3)) for number in numbers]).cast(pa.decimal128(30, 3))
-        return pa.array([number > 0 for number in numbers])
+        ways = (
+            lambda: pa.array(numbers[::-1]),
+            lambda: pa.array(np.rad2deg(numbers)),
+            lambda: pa.array(np.where(rng.random(len(numbers)) < 0.05, rng.choice([np.nan, 1e300, 0.0]), numbers)),
+            lambda: values.cast(pa.string()),
+            lambda: pa.array([[number] for number in numbers]),
+            lambda: values.cast(pa.string()).dictionary_encode(),
+            lambda: pa.array([int(abs(number) * 1000) % 30000 for number in numbers], pa.date32()),
+            lambda: pa.array([str(round(float(number), 3)) for number in numbers]).cast(pa.decimal128(30, 3)),
+            lambda: pa.array([number > 0 for number in numbers]),
+        )
+        return ways[rng.integers(len(ways))]()
 
     file, table = _table(folder, rng)
     place = int(rng.integers(table.num_columns))
