@@ -54,6 +54,20 @@ def refused(*arguments: object) -> str:
     return line
 
 
+def irtwin_does(*arguments: object) -> Said:
+    """Call the command line, which is to do what it is asked."""
+    said = irtwin(*arguments)
+    assert said.status == 0, said.err
+    return said
+
+
+def irtwin_refuses(*arguments: object) -> Said:
+    """Call the command line, which is to refuse."""
+    said = irtwin(*arguments)
+    assert said.status == 2, said.out
+    return said
+
+
 def write(folder: Path, robot: Robot, runs: Iterable[Run], head: str = "", tail: str = "") -> Path:
     """Write runs as a data set; `head` goes into [robot], `tail` to the end of dataset.toml."""
     (folder / "runs").mkdir(parents=True)

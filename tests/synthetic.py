@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +37,12 @@ def arm(joints: int, slides: tuple[int, ...] = ()) -> Robot:
     flange = f'<link name="flange"/><joint name="flange" type="fixed"><parent link="link_{joints}"/>'
     flange += '<child link="flange"/><origin xyz="0.05 0 0.1" rpy="0.3 0 0"/></joint>'
     return parse_urdf(f'<robot name="arm_{joints}">{"".join(parts)}{flange}</robot>')
+
+
+def heavier(robot: Robot, *times: float) -> Robot:
+    """The robot, each of whose links weighs so many times as much as it does, in turn."""
+    each = cycle(times)
+    return parse_urdf(re.sub(r'mass value="(.*?)"', lambda it: f'mass value="{next(each) * float(it[1])}"', robot.urdf))
 
 
 def swing(robot: Robot, seed: int, seconds: float = 20.0, rate: float = 100.0) -> Motion:

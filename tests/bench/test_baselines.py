@@ -3,17 +3,15 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, data_set, measure, swing
 
 from blind.baselines import THRESHOLD, answers, majority, thresholded
 from blind.compare import table
 from irtwin.gap.data.case import case_of
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.signals.log import DataSet
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +29,7 @@ def logged(added):
         power = shown.power + (extra * motion.dq).sum(axis=1)
         run = as_run(replace(shown, torque=shown.torque + extra, power=power, current=None))
         runs.append(replace(run, repeat_of=f"run_{seed - 1}" if seed % 2 else None))
-    return DataSet(Path("arm"), ROBOT, tuple(runs), None, None, "mains", True, {})
+    return data_set(ROBOT, runs)
 
 
 def sticking(motion):

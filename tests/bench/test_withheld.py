@@ -1,17 +1,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from tests import gap_cases
-from tests.synthetic import arm, as_run, measure, swing, truth
+from tests.synthetic import arm, as_run, data_set, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import DataSet
 from irtwin.twin.identify import identify
 from sham import circular_blocks, sham
 from withheld import Adopted, Answer, Robot, page, where_it_matters
@@ -29,11 +27,11 @@ def logged(added=None, count=4):
         noise = np.stack([np.convolve(column, np.ones(10) / 10, "valid") for column in white.T], axis=1)
         extra = 0.0 if added is None else added(motion)
         runs.append(as_run(replace(shown, torque=shown.torque + noise + extra, current=None, power=None)))
-    return DataSet(Path("arm"), ROBOT, tuple(runs), None, None, "mains", True, {})
+    return data_set(ROBOT, runs)
 
 
-def fitted(data_set):
-    return identify(ROBOT, [condition(run, ROBOT) for run in data_set.runs], BASELINE)
+def fitted(logs):
+    return identify(ROBOT, [condition(run, ROBOT) for run in logs.runs], BASELINE)
 
 
 def test_blocks_follow_on_and_close_the_circle():
@@ -63,9 +61,9 @@ def test_a_sham_keeps_what_noise_remembers_and_loses_what_is_missing():
 
 
 def test_a_centred_sham_has_no_mean_of_its_own():
-    data_set = logged()
-    full = fitted(data_set)
-    for run, before in zip(sham(data_set, full, full, seed=2, centred=True).runs, data_set.runs, strict=True):
+    healthy = logged()
+    full = fitted(healthy)
+    for run, before in zip(sham(healthy, full, full, seed=2, centred=True).runs, healthy.runs, strict=True):
         left = run.signals.torque - full.torque(condition(before, ROBOT, full.cutoff))
         assert left.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-9)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.check.test_check import exchanged, found, healthy, one, spoilt
+from tests.check.test_check import exchanged, found, healthy, late, one, spoilt
 from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.check.check import check
@@ -19,10 +19,6 @@ from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 
 ROBOT = arm(4)
-
-
-def late(values: np.ndarray) -> np.ndarray:
-    return np.concatenate([values[:2], values[:-2]])  # 20 ms
 
 
 def said(data_set: DataSet) -> list[LogFinding]:

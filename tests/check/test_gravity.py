@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.check.test_check import ROBOT, Change, healthy, one, spoilt
+from tests.synthetic import heavier
 
 from irtwin.check.check import check
 from irtwin.check.gravity import gravity_findings
 from irtwin.check.moving import moving
-from irtwin.robot.description import Robot
-from irtwin.robot.urdf import parse_urdf
+from irtwin.signals.channels import Signals
 from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
 
@@ -40,41 +40,27 @@ def test_the_check_says_so_where_free_bodies_explain_the_torques() -> None:
     assert "which no masses explain" in finding.say
 
 
-def heavier() -> Robot:
-    """The arm, each of whose links weighs another."""
-    factors = iter((0.4, 3.0, 1.0, 0.3, 2.0, 5.0))
-    return parse_urdf(
-        re.sub(r'mass value="([^"]*)"', lambda it: f'mass value="{float(it[1]) * next(factors)}"', ROBOT.urdf)
-    )
+def balanced(angle: Callable[[np.ndarray], np.ndarray]) -> DataSet:
+    """The log of an arm whose second joint a spring holds more than gravity does, by an angle of positions (N, n)."""
 
-
-def balanced(data_set: DataSet) -> DataSet:
-    """The log of an arm whose second joint a spring holds more than gravity does."""
-
-    def change(signals):  # type: ignore[no-untyped-def]
+    def change(signals: Signals) -> Signals:
         torque = signals.torque.copy()
-        torque[:, 1] += 2 * np.ptp(torque[:, 1]) * np.sin(signals.q[:, 1] + 0.7)
+        torque[:, 1] += 2 * np.ptp(torque[:, 1]) * np.sin(angle(signals.q))
         return replace(signals, torque=torque)
 
-    return spoilt(data_set, change)
+    return spoilt(healthy(), change)
 
 
 def test_other_masses_a_balancer_a_zero_that_is_off_and_a_sign_are_of_this_robot() -> None:
-    assert said(replace(healthy(), robot=heavier())) == []
-    assert said(balanced(healthy())) == []
+    assert said(replace(healthy(), robot=heavier(ROBOT, 0.4, 3.0, 1.0, 0.3))) == []
+    assert said(balanced(lambda q: q[:, 1] + 0.7)) == []
     assert said(spoilt(healthy(), counted_from(2, 0.1))) == []
     assert said(spoilt(healthy(), one("torque", 2, np.negative))) == []  # of this robot, too
 
 
 def test_a_load_further_out_that_hangs_as_it_should_speaks_for_those_before() -> None:
     """What the second joint shows by itself is a load that hangs elsewhere; the third's torque is right."""
-
-    def change(signals):  # type: ignore[no-untyped-def]
-        torque = signals.torque.copy()
-        torque[:, 1] += 2 * np.ptp(torque[:, 1]) * np.sin(signals.q[:, 1] + signals.q[:, 2] + 1.0)
-        return replace(signals, torque=torque)
-
-    assert said(spoilt(healthy(), change)) == []
+    assert said(balanced(lambda q: q[:, 1] + q[:, 2] + 1.0)) == []
 
 
 def test_what_gravity_does_not_turn_says_nothing() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import signal
 from dataclasses import replace
 
@@ -11,18 +10,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.data_sets import irtwin, write
+from tests.data_sets import irtwin_does, irtwin_refuses, write
 from tests.forks import Command
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, heavier, measure, swing
 
-from irtwin.robot.urdf import parse_urdf
 from irtwin.signals.log import Run
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
 ROBOT = arm(3)
 SIX = arm(6)
-HEAVY = parse_urdf(re.sub(r'mass value="(.*?)"', lambda found: f'mass value="{6 * float(found[1])}"', SIX.urdf))
+HEAVY = heavier(SIX, 6.0)
 
 
 def runs(role: str = "observed", seeds: range = range(4), robot=ROBOT, noise: float = 0.3, **changes) -> list[Run]:
@@ -89,8 +87,7 @@ def test_what_cannot_be_diagnosed_is_refused(fault, tmp_path):
     data = write(tmp_path / "data", arm(listed[0].signals.q.shape[1]), listed)
     out = tmp_path / "out"
     files = ["--json", out / "out.json", "--report", out / "out.html", "--save-twin", out / "twin.json"]
-    said = irtwin("diagnose", data, *files, "--workspace", out / "workspace")
-    assert said.status == 2
+    said = irtwin_refuses("diagnose", data, *files, "--workspace", out / "workspace")
     assert message in said.err.splitlines()[-1]
     assert str(data) in said.err.splitlines()[-1]
     assert not out.exists()
@@ -115,8 +112,7 @@ def test_what_cannot_be_diagnosed_is_refused(fault, tmp_path):
 )
 def test_an_unknown_effect_is_refused(tail, options, message, tmp_path):
     data = write(tmp_path / "data", ROBOT, runs(seeds=range(2)), tail=tail)
-    said = irtwin("diagnose", data, "--json", tmp_path / "out.json", *options)
-    assert said.status == 2
+    said = irtwin_refuses("diagnose", data, "--json", tmp_path / "out.json", *options)
     assert message in said.err.splitlines()[-1]
     assert not (tmp_path / "out.json").exists()
 
@@ -126,8 +122,7 @@ def test_a_reference_run_with_other_joints_is_refused(tmp_path):
     file = data / "runs" / "reference_0.parquet"
     renamed = pq.read_table(file)
     pq.write_table(renamed.rename_columns([n.replace("joint_3", "elbow") for n in renamed.column_names]), file)
-    said = irtwin("diagnose", data, "--json", tmp_path / "out.json")
-    assert said.status == 2
+    said = irtwin_refuses("diagnose", data, "--json", tmp_path / "out.json")
     assert 'reference_0.parquet: column q_elbow: the robot has no moving joint "elbow"' in said.err
 
 
@@ -135,23 +130,23 @@ def test_bad_samples_are_named_and_repaired(tmp_path):
     holed = runs(seeds=range(2), power=nothing)
     holed[0].signals.torque[[5, 700], 1] = [np.nan, 1e282]
     data = write(tmp_path / "data", ROBOT, holed)
-    said = irtwin("diagnose", data, "--json", tmp_path / "out.json")
-    assert said.status == 2
-    assert (
-        "observed_0.parquet, row 5, column tau_joint_2: is not a finite number; correct it, or use --repair" in said.err
-    )
-    said = irtwin("diagnose", data, "--json", tmp_path / "out.json", "--repair")
-    assert said.status == 0
+    said = irtwin_refuses("diagnose", data, "--json", tmp_path / "out.json")
+    assert "observed_0.parquet, row 5, column tau_joint_2: is not a finite number; correct it, or use" in said.err
+    said = irtwin_does("diagnose", data, "--json", tmp_path / "out.json", "--repair")
     assert "samples dropped, column tau_joint_2 is not a finite number: row 5" in said.err
     assert "samples dropped, column tau_joint_2 is beyond 1e+06, which no robot reaches: row 700" in said.err
     assert json.loads((tmp_path / "out.json").read_text())["gap"]["torque"]["joint_2"]["rmse"] < 1.0
 
 
+def diagnosed(folder, made):
+    """The document of a diagnosis of these runs."""
+    irtwin_does("diagnose", write(folder / "data", ROBOT, made), "--json", folder / "out.json")
+    return json.loads((folder / "out.json").read_text())
+
+
 def test_what_was_not_measured_is_not_testable(tmp_path):
     made = [*runs("reference"), *runs(seeds=range(5, 9), power=nothing)]
-    said = irtwin("diagnose", write(tmp_path / "data", ROBOT, made), "--json", tmp_path / "out.json")
-    assert said.status == 0
-    document = json.loads((tmp_path / "out.json").read_text())
+    document = diagnosed(tmp_path, made)
     assert document["gap"].get("power") is None
     why = {one["effect"]: one["why"] for one in document["not_testable"]}
     assert why["copper_loss"] == "no power was measured"
@@ -160,11 +155,7 @@ def test_what_was_not_measured_is_not_testable(tmp_path):
 
 
 def test_one_run_shows_no_effect_that_differs_between_runs(tmp_path):
-    said = irtwin(
-        "diagnose", write(tmp_path / "data", ROBOT, runs(seeds=range(1), power=nothing)), "--json", tmp_path / "o.json"
-    )
-    assert said.status == 0
-    document = json.loads((tmp_path / "o.json").read_text())
+    document = diagnosed(tmp_path, runs(seeds=range(1), power=nothing))
     assert document["verdict"] == "no_gap"
     assert "payload" in {one["effect"] for one in document["not_testable"]}
 
@@ -174,8 +165,7 @@ def test_places_are_checked_before_the_work(option, tmp_path):
     (tmp_path / "file").write_text("")
     data = write(tmp_path / "data", ROBOT, runs(seeds=range(1)))
     places = {"--json": tmp_path / "out.json"} | {option: tmp_path / "file" / "out"}
-    said = irtwin("diagnose", data, *[part for pair in places.items() for part in pair])
-    assert said.status == 2
+    said = irtwin_refuses("diagnose", data, *[part for pair in places.items() for part in pair])
     assert f"{tmp_path}/file/out: cannot be written" in said.err
     assert "Reading" not in said.err
     assert not (tmp_path / "out.json").exists()
@@ -202,6 +192,5 @@ def test_the_time_column_of_nulls_is_no_traceback(tmp_path):
     table = pq.read_table(file)
     pq.write_table(table.set_column(0, "time", pa.nulls(table.num_rows, pa.float64())), file)
     for options in ([], ["--repair"]):
-        said = irtwin("diagnose", data, "--json", tmp_path / "out.json", *options)
-        assert said.status == 2
+        said = irtwin_refuses("diagnose", data, "--json", tmp_path / "out.json", *options)
         assert "observed_0.parquet" in said.err.splitlines()[-1]

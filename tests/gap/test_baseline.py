@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing, truth
+from tests.synthetic import arm, as_run, data_set, measure, swing, truth
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.friction import StribeckFriction
 from irtwin.errors import InputError
 from irtwin.gap.data.baseline import baseline, said_of_twin
 from irtwin.gap.diagnosis import diagnose
-from irtwin.signals.log import DataSet
 from irtwin.twin.files import from_json, to_json
 from irtwin.twin.identify import identify
 
@@ -41,7 +40,7 @@ def logged(first, cable=0.0, grease=1.0):
         power += 2 * np.random.default_rng(seed).standard_normal(len(power))
         run = as_run(replace(shown, torque=shown.torque + added, power=power, current=None))
         made.append(replace(run, repeat_of=f"run_{seed - 1}" if (seed - first) % 2 else None))
-    return DataSet(Path("arm"), ROBOT, tuple(made), None, None, "mains", True, {})
+    return data_set(ROBOT, made)
 
 
 @pytest.fixture(scope="module")

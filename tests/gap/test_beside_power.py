@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, measure, swing, truth, with_constants
+from tests.synthetic import arm, measure, swing, truth, with_constants, with_torque
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.stack import Stack
@@ -46,11 +46,9 @@ def case(
         more = np.zeros_like(motion.dq)
         more[:, 1] = real * observed
         more[:, 0] = cable * motion.q[:, 0]
-        current = plain.current
-        loss = truth(ROBOT)["R"] * ((2 * current + more / 8.0) * more / 8.0)
-        power = gain * (plain.power + (more * motion.dq + loss).sum(axis=1))
-        torque = plain.torque + more + np.array([0.0, shown * observed])
-        motions[motion.run] = replace(plain, current=None, torque=torque, power=power)
+        loaded = with_torque(ROBOT, plain, more)
+        torque = loaded.torque + np.array([0.0, shown * observed])
+        motions[motion.run] = replace(loaded, torque=torque, power=gain * loaded.power)
         signals = Signals(motion.time, motion.q)
         role = "observed" if observed else "reference"
         runs.append(Run(motion.run, motion.run, "", role, 0.0, (0.0, 0.0, 0.0), None, None, {}, signals))
@@ -82,14 +80,11 @@ def pausing(held: float) -> Case:
         still = {name: np.where(rests[:, None], 0.0, getattr(motion, name)) for name in ("dq", "ddq")}
         stands = replace(swing(ROBOT, k, seconds=5.0), run=run, **still)
         stands = replace(stands, q=np.where(rests[:, None], motion.q[rests][0], motion.q))
-        quiet = measure(ROBOT, stands, seed=k)
-        more = np.zeros_like(motion.dq)
-        more[rests, 1] = held * (-1) ** k
-        loss = (truth(ROBOT)["R"] * (2 * quiet.current + more / 8.0) * more / 8.0).sum(axis=1)
+        shown = with_torque(ROBOT, measure(ROBOT, stands, seed=k), np.outer(rests, [0.0, held * (-1) ** k]))
         noise = NOISE * np.random.default_rng(k).standard_normal((len(rests), 3))
         standing = np.repeat(rests[:, None], 2, axis=1)
-        shown = replace(quiet, torque=quiet.torque + more + noise[:, :2], power=quiet.power + loss + noise[:, 2])
-        motions[run] = replace(shown, current=None, standing=standing)
+        torque, power = shown.torque + noise[:, :2], shown.power + noise[:, 2]
+        motions[run] = replace(shown, torque=torque, power=power, standing=standing)
     return replace(plain, motions=motions, given=(ROBOT, motions))
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing, with_constants
+from tests.synthetic import arm, as_run, data_set, measure, swing, with_constants
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.choice import begin, elsewhere, identified
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import DataSet
 from irtwin.twin.validate import validate
 
 ROBOT = arm(2)
@@ -26,7 +24,7 @@ def logged(change=lambda shown: shown, **said):
     for seed in range(6):
         shown = measure(robot, swing(robot, seed, seconds=10.0), noise=0.2, seed=seed)
         runs.append(as_run(change(replace(shown, current=None))))
-    data = replace(DataSet(Path("arm"), robot, tuple(runs), None, None, "dc_bus", False, {}, cutoff=10.0), **said)
+    data = replace(data_set(robot, runs, None, "dc_bus"), **{"simulated": False, "cutoff": 10.0, **said})
     return data, [condition(run, robot, 10.0) for run in data.runs]
 
 

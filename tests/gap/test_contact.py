@@ -87,18 +87,16 @@ def test_beside_reference_runs_what_acts_in_some_runs_is_a_change():
     ]
 
 
-def test_a_shape_that_a_change_alone_has_is_not_missing():
-    standing, change = TemperatureDependentFriction(), ChangedFrictionWithTemperature()
-    variants = tuple(Variant(one, (k,), ()) for k, one in enumerate((standing, change)))
+@pytest.mark.parametrize(
+    ("standing", "changes", "both"),
+    [
+        (TemperatureDependentFriction(), [ChangedFrictionWithTemperature()], slice(None)),
+        (CableDrag(), CableDrag().changes(), slice(1, None)),  # its standing shape never changes
+    ],
+    ids=["a shape that a change alone has", "a shape that gives way to that of its changes"],
+)
+def test_what_is_missing_has_no_shape_of_a_change(standing, changes, both):
+    variants = tuple(Variant(one, (k,), ()) for k, one in enumerate((standing, *changes)))
     tried = [Hypothesis(standing.id, "joint_1", scope, variants) for scope in (MISSING, CHANGED)]
     missing, changed = in_scope(tried, both=True)
-    assert [one.effect for one in missing.variants] == [standing]
-    assert changed == tried[1]
-
-
-def test_a_shape_that_never_changes_gives_way_to_that_of_its_changes():
-    standing = CableDrag()
-    variants = tuple(Variant(one, (k,), ()) for k, one in enumerate((standing, *standing.changes())))
-    tried = [Hypothesis(standing.id, "joint_1", scope, variants) for scope in (MISSING, CHANGED)]
-    missing, changed = in_scope(tried, both=True)
-    assert [missing.variants, changed.variants] == [variants[:1], variants[1:]]
+    assert [missing.variants, changed.variants] == [variants[:1], variants[both]]

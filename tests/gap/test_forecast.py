@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.synthetic import swing
 
+import diagnosis_speed
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.forecast import Forecast, forecast
 from irtwin.robot.urdf import parse_urdf
@@ -19,22 +20,8 @@ SECONDS = {6: 13.3, 12: 48.2, 20: 96.9, 30: 146.7, 40: 278.7}  # of processor
 BYTES = {6: 473e6, 12: 954e6, 30: 2368e6}
 
 
-def chain(joints: int):
-    links, last = ['<link name="base"/>'], "base"
-    for k in range(joints):
-        links.append(
-            f'<link name="link_{k}"><inertial><origin xyz="0.02 0.01 0.05"/><mass value="{20 / (k + 2)}"/><inertia '
-            'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="joint_{k}" type="revolute"><parent link="{last}"/><child link="link_{k}"/>'
-            f'<origin xyz="0.02 0.01 0.12"/><axis xyz="{"0 0 1" if k % 2 else "0 1 0"}"/>'
-            '<limit lower="-2.5" upper="2.5" velocity="3" effort="500"/></joint>'
-        )
-        last = f"link_{k}"
-    return parse_urdf(f'<robot name="chain">{"".join(links)}</robot>')
-
-
 def data_set(joints: int, seconds: float = 10.0, *, power: bool = True) -> DataSet:
-    robot = chain(joints)
+    robot = parse_urdf(diagnosis_speed.chain(joints))
     runs = []
     for k in range(RUNS):
         motion = swing(robot, k, seconds)

@@ -62,7 +62,6 @@ def checked(robot: Robot, made: list[Run], tmp_path: Path) -> str:
     data = data_set(robot, made)
     found = diagnose(data)
     json.dumps([valid(found), found.evidence], allow_nan=False)
-    assert found.twin is not None
     from_json(to_json(found.twin), Path("twin.json"))
     render_alone(data, found.document, found.curves, tmp_path / "page.html")
     return found.verdict

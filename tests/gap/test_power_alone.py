@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing, truth
+from tests.synthetic import arm, as_run, data_set, measure, swing, with_torque
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
-from irtwin.signals.log import DataSet
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_experiment")]
 
@@ -19,33 +17,21 @@ ROBOT = arm(2)
 WITH_LOSS = (*BASELINE, "copper_loss")
 
 
-def data_set(runs, effects=WITH_LOSS):
-    return DataSet(Path("arm"), ROBOT, tuple(runs), effects, None, "mains", True, {})
-
-
 def runs(shows, role="observed", added=None, first=0, count=6):
     """Runs that show "torque", "power" or both, in turn; `added` gives N m to joint 1's torque."""
     made = []
     for k in range(count):
         motion = replace(swing(ROBOT, first + k // 2, seconds=10.0), run=f"{role}_{first + k}")
-        shown = measure(ROBOT, motion, noise=0.3, seed=first + k)
         more = np.zeros_like(motion.dq) if added is None else np.outer(added(motion), [1.0, 0])
-        loss = truth(ROBOT)["R"] / 8.0**2 * ((2 * shown.current * 8.0 + more) * more)
-        kept = shows[k % len(shows)]
-        run = as_run(
-            replace(
-                shown,
-                current=None,
-                torque=shown.torque + more if "torque" in kept else None,
-                power=shown.power + (more * motion.dq + loss).sum(axis=1) if "power" in kept else None,
-            )
-        )
+        shown = with_torque(ROBOT, measure(ROBOT, motion, noise=0.3, seed=first + k), more)
+        hidden = dict.fromkeys({"torque", "power"}.difference(shows[k % len(shows)]))
+        run = as_run(replace(shown, **hidden))
         made.append(replace(run, role=role, repeat_of=f"{role}_{first + k - 1}" if k % 2 else None))
     return made
 
 
 def test_power_alone_shows_no_gap_where_there_is_none():
-    diagnosis = diagnose(data_set(runs([["power"]])))
+    diagnosis = diagnose(data_set(ROBOT, runs([["power"]]), WITH_LOSS))
     assert diagnosis.verdict == "no_gap"
     document = diagnosis.to_json()
     assert document["gap"].get("torque") is None
@@ -55,7 +41,7 @@ def test_power_alone_shows_no_gap_where_there_is_none():
 
 
 def test_power_alone_lacks_the_loss_in_the_windings():
-    diagnosis = diagnose(data_set(runs([["power"]])), withhold=["copper_loss"])
+    diagnosis = diagnose(data_set(ROBOT, runs([["power"]]), WITH_LOSS), withhold=["copper_loss"])
     channel, cause = diagnosis.causes[0]
     assert channel.name == "power"
     assert "copper_loss" in (cause.effect, *cause.rivals)
@@ -65,7 +51,7 @@ def test_power_alone_lacks_the_loss_in_the_windings():
 
 
 def test_power_alone_lacks_what_stands_by():
-    diagnosis = diagnose(data_set(runs([["power"]]), BASELINE), withhold=["standby_power"])
+    diagnosis = diagnose(data_set(ROBOT, runs([["power"]]), BASELINE), withhold=["standby_power"])
     assert diagnosis.causes[0][1].effect == "standby_power"
 
 
@@ -73,7 +59,7 @@ def test_power_alone_lacks_what_stands_by():
 def test_torque_in_some_runs_and_power_in_others():
     split = [["torque"], ["torque"], ["power"], ["power"]]
     grease = [*runs(split, "reference", count=8), *runs(split, added=lambda m: 3 * m.dq[:, 0], first=20, count=8)]
-    diagnosis = diagnose(data_set(grease))
+    diagnosis = diagnose(data_set(ROBOT, grease, WITH_LOSS))
     named = {(channel.name, cause.effect, cause.scope, cause.joints) for channel, cause in diagnosis.causes}
     assert named == {("torque", "viscous_friction", "changed", ("joint_1",))}
     power = diagnosis.to_json()["shrink"]["power_rmse"]
@@ -83,11 +69,11 @@ def test_torque_in_some_runs_and_power_in_others():
 
 def test_torque_in_the_reference_runs_alone():
     reference = runs([["torque", "power"]], "reference")
-    diagnosis = diagnose(data_set([*reference, *runs([["power"]], first=20)]))
+    diagnosis = diagnose(data_set(ROBOT, [*reference, *runs([["power"]], first=20)], WITH_LOSS))
     assert [channel.name for channel in diagnosis.channels] == ["power"]
     assert diagnosis.verdict == "no_gap"
 
 
 def test_no_gap_is_told_of_power_where_torque_alone_was_measured():
-    document = diagnose(data_set(runs([["torque"]]))).to_json()
+    document = diagnose(data_set(ROBOT, runs([["torque"]]), WITH_LOSS)).to_json()
     assert document["shrink"]["torque_rmse"] is not None and document["shrink"]["power_rmse"] is None

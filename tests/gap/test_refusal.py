@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, data_set, measure, swing
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import NOTHING_STATED, Possible, Quantity, Stated
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.refusal import _beyond
-from irtwin.signals.log import DataSet
 
 pytestmark = pytest.mark.usefixtures("no_experiment")
 
@@ -28,7 +26,7 @@ def logged(change):
         shown = measure(ROBOT, replace(swing(ROBOT, seed, seconds=10.0), run=f"run_{seed}"), noise=0.3, seed=seed)
         torque = shown.torque if role == "reference" else change(shown.dq, shown.torque)
         made.append(replace(as_run(replace(shown, torque=torque, power=None, current=None)), role=role))
-    return DataSet(Path("arm"), ROBOT, tuple(made), None, None, "mains", True, {})
+    return data_set(ROBOT, made)
 
 
 def named(diagnosis):

@@ -15,6 +15,8 @@ from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.repeats.disturbances import disturbances
 from irtwin.gap.repeats.lines import lines
 from irtwin.gap.repeats.series import EvenSeries, correlation_samples
+from irtwin.gap.repeats.slow import creep
+from irtwin.gap.repeats.switching import saved
 from irtwin.gap.thresholds import DEFAULT
 
 ROBOT = arm(3)
@@ -211,3 +213,39 @@ def test_a_line_is_no_sensors_noise():
     quiet = repeated()
     loud, still = (noise_floor(one.runs, one.motions, DEFAULT.data) for one in (case, quiet))
     assert loud.sensor_torque[1] < 2 * still.sensor_torque[1] < 0.3
+
+
+TIME = np.arange(1000) / 100
+COPPER = 1 + np.sin(2.2 * TIME) ** 2
+
+
+@pytest.mark.parametrize("course", [TIME, 10 * (1 - np.exp(-TIME / 2.5))])
+@pytest.mark.parametrize("loss", [np.ones(1000), COPPER / COPPER.mean()])
+def test_a_drift_is_followed_and_is_by_so_much_a_second(course, loss):
+    drift = 3.0 * loss * course
+    noise = 0.1 * np.random.default_rng(0).standard_normal(1000)
+    series = EvenSeries(TIME, 7.0 + drift + noise, np.column_stack([np.ones(1000), TIME - TIME.mean(), COPPER]))
+    found = creep(series, COPPER[:, None])
+    assert np.std(found.left()) == pytest.approx(0.1, rel=0.1)
+    assert found.coefficients()[1] == pytest.approx(np.polyfit(TIME, drift, 1)[0], rel=0.1)
+
+
+def test_noise_is_no_exponential():
+    noise = np.random.default_rng(1).standard_normal(1000)
+    found = creep(EvenSeries(TIME, noise, np.column_stack([np.ones(1000), TIME - TIME.mean()])), None)
+    assert np.allclose(np.diff(found.beside[:, 1]), TIME[1])
+
+
+def test_white_noise_is_worth_its_likelihood():
+    after = np.random.default_rng(0).standard_normal(2000)
+    assert saved([2 * after], [after]) == pytest.approx(2000 / 2 * np.log(4), rel=0.1)
+
+
+def test_each_series_saves_by_itself():
+    after = np.random.default_rng(0).standard_normal(500)
+    assert saved([2 * after, after], [after, after]) == pytest.approx(saved([2 * after], [after]))
+
+
+def test_what_remembers_says_less():
+    after = np.convolve(np.random.default_rng(0).standard_normal(2000), np.ones(20), "valid")
+    assert saved([2 * after], [after]) < 0.1 * len(after) / 2 * np.log(4)

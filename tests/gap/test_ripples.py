@@ -38,6 +38,7 @@ def test_what_is_found_is_faster_than_the_orders_that_are_all_tried():
 
 def test_runs_that_are_not_observed_say_nothing():
     assert fast_ripples(ROBOT, remainders(60.0, 0.7, observed=False)) == []
+    assert known_ripples(ROBOT, remainders(60.0, 0.0, observed=False)) == []
 
 
 def test_a_joint_that_stands_still_has_none():
@@ -58,7 +59,3 @@ def test_a_known_order_is_tried_at_the_joints_that_move_through_a_period_of_it()
     joints = {one.N: one.joints for one in known_ripples(ROBOT, left)}
     assert joints[1.0] == joints[2.0] == ("joint_1",)
     assert joints[3.0] == joints[24.0] == ("joint_1", "joint_3")
-
-
-def test_without_observed_runs_no_order_is_tried():
-    assert known_ripples(ROBOT, remainders(60.0, 0.0, observed=False)) == []

@@ -29,7 +29,6 @@ def share(offsets: list[list[float]], observed: int) -> float | None:
     motions = []
     for number, of_run in enumerate(offsets):
         motion = measure(ROBOT, swing(ROBOT, number, rate=100.0), noise=0.02, seed=number)
-        assert motion.torque is not None
         motions.append(replace(motion, run=f"run_{number}", torque=motion.torque + of_run))
     names = [motion.run for motion in motions]
     stack = Stack(ROBOT, [*EXCITED, *(OffsetOfRun(runs=(run,)) for run in names[1:])])
@@ -67,7 +66,6 @@ def diagnosed(folder: Path, changed: float) -> Document:
     differs, runs = np.random.default_rng(5), []
     for number, role in enumerate(["reference"] * 3 + ["observed"] * 3):
         motion = measure(ROBOT, swing(ROBOT, number, rate=100.0), noise=0.05, seed=number)
-        assert motion.torque is not None
         offset = 0.1 * differs.standard_normal(2) + [0.0, changed if role == "observed" else 0.0]
         logged = replace(motion, torque=motion.torque + offset, current=None, power=None)
         runs.append(replace(as_run(logged), name=f"run_{number}", role=role))
@@ -80,8 +78,6 @@ def test_an_offset_that_changed_by_more_than_runs_differ_is_told_and_closes_the_
         ("torque_offset", ("joint_2",), "changed")
     ]
     assert found.verdict == "attributed"
-    assert found.shrink is not None
-    assert found.shrink.closed_fraction is not None
     assert found.shrink.closed_fraction.value > 0.8
 
 

@@ -74,7 +74,6 @@ def test_rows_are_multiplied_by_the_inverse_root_of_their_covariance() -> None:
     found = RunToRun.of(equations, sides(6))
     run = [k for k, block in enumerate(equations.blocks) if block.run == "run_2"]
     friction = found.frictions[0]
-    assert friction is not None
     before = np.concatenate([equations.blocks[k].factors[0] for k in run])
     after = np.concatenate([found.steadied(equations).blocks[k].factors[0] for k in run])
     columns = before[:, friction.places] * friction.values * list(found.shares.values())

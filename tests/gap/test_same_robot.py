@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.synthetic import arm, as_run, measure, swing
+from tests.synthetic import arm, as_run, data_set, heavier, measure, swing
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Term
@@ -20,20 +18,11 @@ from irtwin.gap.data.same_robot import _opposed
 from irtwin.gap.search import Search
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.robot.description import Robot
-from irtwin.robot.urdf import parse_urdf
-from irtwin.signals.log import DataSet, Run
+from irtwin.signals.log import Run
 from irtwin.signals.motion import Motion
 
 DRAWN = arm(6)
-
-
-def heavier(times: float) -> Robot:
-    return parse_urdf(
-        re.sub(r'mass value="(.*?)"', lambda found: f'mass value="{times * float(found[1])}"', DRAWN.urdf)
-    )
-
-
-BUILT = heavier(1.5)
+BUILT = heavier(DRAWN, 1.5)
 
 
 def run(role: str, motion: Motion, robot: Robot = BUILT) -> Run:
@@ -43,8 +32,8 @@ def run(role: str, motion: Motion, robot: Robot = BUILT) -> Run:
 
 def checked(references: list[Run]) -> None:
     observed = [run("observed", swing(DRAWN, seed)) for seed in (11, 12)]
-    data = DataSet(Path("arm"), DRAWN, (*references, *observed), BASELINE, None, None, False, {})
-    assert Search(case_of(data, (), DEFAULT)).twin
+    data = data_set(DRAWN, [*references, *observed], BASELINE, None)
+    assert Search(case_of(replace(data, simulated=False), (), DEFAULT)).twin
 
 
 def one_moving(seed: int, joint: int) -> Motion:
@@ -60,7 +49,7 @@ def test_references_that_move_one_joint_are_of_the_robot(joint: int) -> None:
 
 def test_references_of_other_bodies_are_refused() -> None:
     with pytest.raises(InputError, match="is nothing like that of the observed runs"):
-        checked([run("reference", swing(DRAWN, seed), heavier(6.0)) for seed in (1, 2)])
+        checked([run("reference", swing(DRAWN, seed), heavier(DRAWN, 6.0)) for seed in (1, 2)])
 
 
 @pytest.mark.parametrize(("drives", "opposed"), [(-1e-5, False), (-0.5, True)])

@@ -22,8 +22,10 @@ from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
 
 ROBOT, CUTOFF, NOISE = arm(2), 12.0, 2e-4
+MOTION = measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
 
 
 def logged(seed: int, noise: float = NOISE) -> Run:
@@ -31,6 +33,19 @@ def logged(seed: int, noise: float = NOISE) -> Run:
     motion = measure(ROBOT, swing(ROBOT, seed, rate=200.0), noise=0.05, seed=seed)
     noisy = motion.q + noise * np.random.default_rng(seed).standard_normal(motion.q.shape)
     return replace(as_run(motion, q=noisy), name=f"run_{seed}", role="observed")
+
+
+def rounded(motion: Motion, step: float, q: np.ndarray) -> Run:
+    """The motion's log with these positions, (N, 2) rad, as an encoder of some step, rad, tells them."""
+    return replace(as_run(motion, q=np.round(q / step) * step), name="rounded", role="observed")
+
+
+def shaken_beside(run: Run) -> tuple[Motion, Motion]:
+    """A run as it is taken, and with the noise of its positions put in once more."""
+    taken = condition_for_fit(run, ROBOT, CUTOFF)
+    ((same, again),) = shaken([run], {run.name: taken}, ROBOT, DEFAULT.data)
+    assert same is taken
+    return taken, again
 
 
 def equations(runs: list[Run], *, told: bool) -> System:
@@ -52,11 +67,8 @@ def blamed(system: System) -> list[str]:
 
 
 def test_shaking_adds_as_much_noise_as_there_is() -> None:
-    run = logged(1)
-    motion = condition_for_fit(run, ROBOT, CUTOFF)
+    motion, again = shaken_beside(logged(1))
     clean = condition_for_fit(logged(1, noise=0.0), ROBOT, CUTOFF)
-    ((same, again),) = shaken([run], {run.name: motion}, ROBOT, DEFAULT.data)
-    assert same is motion
     for name in ("q", "dq", "ddq"):
         added, there = (np.std(getattr(a, name) - getattr(motion, name), axis=0) for a in (again, clean))
         assert added == pytest.approx(there, rel=0.15)
@@ -65,31 +77,21 @@ def test_shaking_adds_as_much_noise_as_there_is() -> None:
 
 def test_of_a_coarse_encoder_shaking_adds_what_its_filter_passes() -> None:
     """Shaken positions lie on no grid; filtered as if their encoder were fine they would be several times as noisy."""
-    step = 2e-3
-    motion = measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
-    run = replace(as_run(motion, q=np.round(motion.q / step) * step), name="coarse", role="observed")
-    taken = condition_for_fit(run, ROBOT, CUTOFF)
-    ((_, again),) = shaken([run], {"coarse": taken}, ROBOT, DEFAULT.data)
-    added, there = (np.std(one.dq - other.dq, axis=0) for one, other in ((again, taken), (taken, motion)))
+    taken, again = shaken_beside(rounded(MOTION, 2e-3, MOTION.q))
+    added, there = (np.std(one.dq - other.dq, axis=0) for one, other in ((again, taken), (taken, MOTION)))
     assert added == pytest.approx(there, rel=0.3)
 
 
 def test_rounding_at_a_steady_speed_is_noise_though_it_makes_lines() -> None:
-    step, motion = 2e-4, measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
-    q = np.repeat(0.03 * motion.time[:, None], 2, axis=1)
-    run = replace(as_run(motion, q=np.round(q / step) * step), name="steady", role="observed")
-    taken = condition_for_fit(run, ROBOT, CUTOFF)
-    ((_, again),) = shaken([run], {"steady": taken}, ROBOT, DEFAULT.data)
+    step = 2e-4
+    taken, again = shaken_beside(rounded(MOTION, step, np.repeat(0.03 * MOTION.time[:, None], 2, axis=1)))
     assert np.all(np.std(again.q - taken.q, axis=0) > 0.4 * step / np.sqrt(12))
 
 
 def test_rounding_of_what_stands_still_is_no_noise() -> None:
-    motion = measure(ROBOT, swing(ROBOT, 1, rate=200.0), noise=0.05, seed=1)
-    second = len(motion.time) // 2
-    q = np.concatenate([motion.q[:second], np.repeat(motion.q[second : second + 1], len(motion.q) - second, axis=0)])
-    run = replace(as_run(motion, q=np.round(q / 2e-4) * 2e-4), name="halts", role="observed")
-    taken = condition_for_fit(run, ROBOT, CUTOFF)
-    ((_, again),) = shaken([run], {"halts": taken}, ROBOT, DEFAULT.data)
+    second = len(MOTION.time) // 2
+    q = np.where(MOTION.time[:, None] < MOTION.time[second], MOTION.q, MOTION.q[second])
+    taken, again = shaken_beside(rounded(MOTION, 2e-4, q))
     at_rest = slice(second + 100, None)
     np.testing.assert_allclose(again.dq[at_rest], taken.dq[at_rest], atol=1e-9)
     assert np.std(again.dq[:second] - taken.dq[:second], axis=0).min() > 1e-4
@@ -119,14 +121,10 @@ def test_noise_of_positions_is_no_elastic_joint() -> None:
 
 def test_noise_of_positions_explains_no_more_than_what_is_left() -> None:
     system = equations([logged(seed) for seed in range(1, 6)], told=True).by_speed
-    assert system.shaken is not None
-    assert system.shaken_twin is not None
     coefficients = np.append(-system.solution((), Summed(system.group_moments(system.noise_before))), 1.0)
     ten_times = {name: tuple(100 * each for each in getattr(system, name)) for name in ("shaken", "shaken_twin")}
     more = replace(system, **ten_times)
     own, of_more = (one.shaken_products(coefficients, one.noise_before) for one in (system, more))
-    assert own is not None
-    assert of_more is not None
     made = coefficients @ of_more.sum(axis=0)
     assert made <= 1.001 * system.rows.sum()
     assert np.all(np.abs(own) <= 1.001 * np.abs(of_more))

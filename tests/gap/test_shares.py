@@ -1,4 +1,4 @@
-"""Shares of causes in systems whose squares are known."""
+"""Shares of causes, and what reference runs leave over one another, in systems whose squares are known."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.gap.test_structure_search import block, equation
 
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
-from irtwin.gap.isolation.apart import Apart, closed_squares, shares
+from irtwin.gap.isolation.apart import Apart, closed_squares, shares, spread
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.structure_search import Attribution
 from irtwin.gap.regression.held_out import held_out
 from irtwin.gap.regression.hypotheses import MISSING, CandidateColumn, Variant
-from irtwin.gap.regression.normal_equations import System
-from irtwin.identification.accumulate import Block, triangle
 
 ROWS, RUNS = 400, 5
 EFFECT = catalogue()["cable_drag"]
@@ -28,15 +27,10 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
     for run in range(RUNS):
         independent = np.linalg.qr(generator.standard_normal((ROWS, len(mix[0]))))[0] * np.sqrt(ROWS)
         columns = size * independent @ np.array(mix).T
-        constant = np.ones((ROWS, 1))
         measured = columns @ coefficients + noise * generator.standard_normal(ROWS)
-        factor = triangle(np.column_stack([constant, columns, measured]))
-        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
-    names = [f"k{k}" for k in range(len(mix))]
-    columns = tuple(CandidateColumn(EFFECT, k, Term(name, "1")) for k, name in enumerate(names))
-    terms = ((EFFECT, Term("constant", "1")),)
-    pattern = np.ones((1, 1 + len(mix)), dtype=bool)
-    system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
+        blocks.append(block(run, np.ones(ROWS), columns, measured))
+    columns = [CandidateColumn(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix))]
+    system = equation(blocks, [(EFFECT, Term("constant", "1"))], columns)
     causes = tuple(
         FoundCause(f"effect_{k}", MISSING, (), (Variant(EFFECT, (1 + k,), (column.term,)),), 1.0, 9.0, 0.0)
         for k, column in enumerate(columns)
@@ -98,3 +92,32 @@ def test_what_each_closes_adds_up_to_what_all_close():
     judged = held_out(system, system.noise_before, attribution.noise, chosen)
     closed = closed_squares(apart(system, attribution))
     assert closed.sum(axis=0) == pytest.approx(judged.before - judged.after)
+
+
+def of_squares(*squares, observed=1):
+    """Groups whose mean squares (g,) no fit changes, those of the reference runs first."""
+    of_group = np.array(squares)
+
+    def rms(chosen, noise, fitted, of):
+        return np.sqrt(of_group[list(of)].mean(axis=0))
+
+    seen = np.arange(len(of_group)) >= len(of_group) - observed
+    noise = np.ones(len(of_group[0]))
+    return SimpleNamespace(noise_before=noise, group_observed=seen, of_group=of_group, rms=rms)
+
+
+def test_runs_that_are_alike_leave_nothing_over_one_another():
+    assert spread(of_squares(*[[2.0, 3.0]] * 5), np.ones(2), slice(None)) == pytest.approx(0.0)
+
+
+def test_the_loudest_half_counts_at_its_worst_joint_and_observed_runs_do_not():
+    squares = [[1.0, 1.0], [1.0, 1.0], [1.0, 5.0], [1.0, 5.0], [100.0, 100.0]]
+    assert spread(of_squares(*squares), np.ones(2), slice(None)) == pytest.approx(4.0)
+
+
+def test_below_the_floor_all_are_alike():
+    assert spread(of_squares([0.1], [0.2], [0.3], [0.4], [9.0]), np.ones(1), slice(None)) < 0
+
+
+def test_three_groups_have_no_halves():
+    assert spread(of_squares([1.0], [1.0], [1.0], [9.0]), np.ones(1), slice(None)) is None

@@ -33,7 +33,6 @@ WIDTH = 0.01  # rad/s
 def run(seed: int, role: str, width: float, stronger: float) -> Run:
     """A run whose dry friction turns over some speed, `stronger` times the truth's at the first joint."""
     motion = measure(ROBOT, swing(ROBOT, seed), noise=0.05, seed=seed)
-    assert motion.torque is not None
     dry = truth(ROBOT)["Fc"]
     now = dry * [stronger, 1.0]
     torque = motion.torque + now * np.tanh(motion.dq / width) - dry * np.sign(motion.dq)
@@ -64,7 +63,6 @@ def diagnosed(folder: Path, law: Callable[[np.ndarray], np.ndarray], way: float 
         moved, part = swing(ROBOT, seed), np.array([1.0, way])
         moved = replace(moved, q=part * moved.q, dq=part * moved.dq, ddq=part * moved.ddq)
         motion = measure(ROBOT, moved, noise=0.05, seed=seed)
-        assert motion.torque is not None
         torque = motion.torque + truth(ROBOT)["Fc"] * (law(motion.dq) - np.sign(motion.dq))
         runs.append(as_run(replace(motion, torque=torque, current=None, power=None)))
     return diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document

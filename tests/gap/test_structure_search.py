@@ -25,6 +25,25 @@ from irtwin.identification.accumulate import Block, triangle
 ROWS, RUNS = 300, 12
 NOISE = 0.6
 EFFECT = catalogue()["torque_drift"]
+CONSTANT = (catalogue()["torque_offset"], Term("constant", "1"))
+
+
+def block(run, *columns):
+    """The rows of a run, (N,) or (N, k): the twin's terms, candidate columns, what was measured."""
+    return Block(f"run_{run}", 0.0, 1.0, np.array([len(columns[-1])]), (triangle(np.column_stack(columns)),))
+
+
+def equation(blocks, terms, columns, observed=slice(None)):
+    """One equation of terms and columns; all runs are observed unless said which."""
+    seen = np.zeros(len(blocks), dtype=bool)
+    seen[observed] = True
+    pattern = np.ones((1, len(terms) + len(columns)), dtype=bool)
+    return System(tuple(terms), tuple(columns), pattern, tuple(blocks), np.arange(len(blocks)), seen)
+
+
+def alone(effect, place, column, scope=MISSING, joint=None):
+    """The hypothesis that an effect of one column, at a place, is there."""
+    return Hypothesis(effect, joint, scope, (Variant(column.effect, (place,), (column.term,)),))
 
 
 def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
@@ -39,17 +58,10 @@ def system_of(mix, coefficients, size=10.0, silent=(), sparse=1):
         independent[:, :sparse] *= run not in silent
         columns = size * independent @ np.array(mix).T
         measured = size * independent @ coefficients + generator.standard_normal(ROWS)
-        factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
-        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
-    columns = tuple(CandidateColumn(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix)))
-    pattern = np.ones((1, 1 + len(mix)), dtype=bool)
-    terms = ((EFFECT, Term("constant", "1")),)
-    system = System(terms, columns, pattern, tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool))
-    candidates = [
-        Hypothesis(f"effect_{k}", None, MISSING, (Variant(EFFECT, (1 + k,), (column.term,)),))
-        for k, column in enumerate(columns)
-    ]
-    return system, candidates
+        blocks.append(block(run, np.ones(ROWS), columns, measured))
+    columns = [CandidateColumn(EFFECT, k, Term(f"k{k}", "1")) for k in range(len(mix))]
+    candidates = [alone(f"effect_{k}", 1 + k, column) for k, column in enumerate(columns)]
+    return equation(blocks, [(EFFECT, Term("constant", "1"))], columns), candidates
 
 
 def causes(system, candidates):
@@ -68,18 +80,11 @@ def changing(before, now, twin=()):
         column = generator.standard_normal((ROWS, 1))
         size = before if run < RUNS // 2 else now
         measured = size * column[:, 0] + generator.standard_normal(ROWS)
-        own = [column] if twin else [np.ones((ROWS, 1))]
-        factor = triangle(np.column_stack([*own, column, measured]))
-        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+        blocks.append(block(run, column if twin else np.ones(ROWS), column, measured))
     column = CandidateColumn(EFFECT, 0, Term("k", "1"))
-    observed = np.arange(RUNS) >= RUNS // 2
-    known = (catalogue()["torque_offset"], Term("constant", "1"))
-    terms = (twin or known,)
-    system = System(terms, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), np.arange(RUNS), observed)
+    system = equation(blocks, [twin or CONSTANT], [column], slice(RUNS // 2, None))
     scopes = [(CHANGED, system.changed)] if twin else [(MISSING, system.base), (CHANGED, system.changed)]
-    candidates = [
-        Hypothesis("torque_drift", None, scope, (Variant(EFFECT, (place,), (column.term,)),)) for scope, place in scopes
-    ]
+    candidates = [alone("torque_drift", place, column, scope) for scope, place in scopes]
     return [cause.scope for cause in causes(system, candidates)]
 
 
@@ -97,18 +102,11 @@ def frictions(joint):
         sign, size = np.sign(speed), np.abs(speed)
         columns = np.column_stack([sign, speed, sign * size**0.5, sign * np.exp(-size / 0.1)])
         measured = columns @ [3.0, 4.5, 0.0, 0.0] + NOISE * generator.standard_normal(ROWS)
-        factor = triangle(np.column_stack([np.ones((ROWS, 1)), columns, measured]))
-        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+        blocks.append(block(run, np.ones(ROWS), columns, measured))
     names = ("coulomb", "viscous", "nonlinear", "stribeck")
-    columns = tuple(CandidateColumn(EFFECT, k, Term(name, "N m", spread=5.0)) for k, name in enumerate(names))
-    known = ((catalogue()["torque_offset"], Term("constant", "1")),)
-    system = System(
-        known, columns, np.ones((1, 5), dtype=bool), tuple(blocks), np.arange(RUNS), np.ones(RUNS, dtype=bool)
-    )
-    return system, [
-        Hypothesis(name, joint, MISSING, (Variant(EFFECT, (1 + k,), (column.term,)),))
-        for k, (name, column) in enumerate(zip(names, columns, strict=True))
-    ]
+    columns = [CandidateColumn(EFFECT, k, Term(name, "N m", spread=5.0)) for k, name in enumerate(names)]
+    candidates = [alone(column.term.name, 1 + k, column, joint=joint) for k, column in enumerate(columns)]
+    return equation(blocks, [CONSTANT], columns), candidates
 
 
 def test_two_effects_of_a_joint_are_found_though_another_explains_most_by_itself():
@@ -125,20 +123,14 @@ def changed_frictions(joint):
         sign, softly = np.sign(speed), np.arctan(speed / 0.05) * 2 / np.pi
         columns = np.column_stack([sign, speed, sign * np.abs(speed) ** 0.5, softly - sign])
         measured = columns @ [10.0, 2.0 + 3.0 * (run >= RUNS // 2), 0.0, 2.0] + NOISE * generator.standard_normal(ROWS)
-        factor = triangle(np.column_stack([np.ones((ROWS, 1)), sign, speed, columns, measured]))
-        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+        blocks.append(block(run, np.ones(ROWS), sign, speed, columns, measured))
     effects = {"coulomb": EFFECT, "viscous": EFFECT, "nonlinear": EFFECT, "turn": FrictionTurn()}
-    columns = tuple(
-        CandidateColumn(one, k, Term(name, "N m", spread=5.0)) for k, (name, one) in enumerate(effects.items())
-    )
-    known = tuple((EFFECT, Term(name, "N m", spread=5.0)) for name in ("constant", "dry", "viscous"))
-    observed = np.arange(RUNS) >= RUNS // 2
-    system = System(known, columns, np.ones((1, 7), dtype=bool), tuple(blocks), np.arange(RUNS), observed)
-    scopes = [(CHANGED, system.changed)] * 3 + [(MISSING, system.base)]
-    return system, [
-        Hypothesis(name, joint, scope, (Variant(effects[name], (first + k,), (columns[k].term,)),))
-        for k, (name, (scope, first)) in enumerate(zip(effects, scopes, strict=True))
-    ]
+    columns = [CandidateColumn(one, k, Term(name, "N m", spread=5.0)) for k, (name, one) in enumerate(effects.items())]
+    known = [(EFFECT, Term(name, "N m", spread=5.0)) for name in ("constant", "dry", "viscous")]
+    system = equation(blocks, known, columns, slice(RUNS // 2, None))
+    *changes, turn = columns
+    candidates = [alone(one.term.name, system.changed + k, one, CHANGED, joint) for k, one in enumerate(changes)]
+    return system, [*candidates, alone("turn", system.base + 3, turn, joint=joint)]
 
 
 def test_a_change_and_a_nuisance_are_looked_for_together():
@@ -193,14 +185,10 @@ def test_groups_that_disagree_speak_against_an_effect():
         for run, size in enumerate(sizes):
             column = generator.standard_normal((ROWS, 1))
             measured = size * column[:, 0] + generator.standard_normal(ROWS)
-            factor = triangle(np.column_stack([np.ones((ROWS, 1)), column, measured]))
-            blocks.append(Block(f"run_{run}", 0.0, 1.0, np.array([ROWS]), (factor,)))
+            blocks.append(block(run, np.ones(ROWS), column, measured))
         column = CandidateColumn(EFFECT, 0, Term("k", "1"))
-        known = ((catalogue()["torque_offset"], Term("constant", "1")),)
-        every = np.arange(len(sizes)), np.ones(len(sizes), dtype=bool)
-        system = System(known, (column,), np.ones((1, 2), dtype=bool), tuple(blocks), *every)
-        one = Hypothesis("torque_drift", None, MISSING, (Variant(EFFECT, (1,), (column.term,)),))
-        return [cause.log_odds for cause in causes(system, [one])]
+        system = equation(blocks, [CONSTANT], [column])
+        return [cause.log_odds for cause in causes(system, [alone("torque_drift", 1, column)])]
 
     (agreed,), mixed = odds([3.0] * 8), odds([4.0, -1.0] * 4)
     assert agreed > 5
@@ -215,16 +203,9 @@ def test_what_the_reference_runs_show_as_well_is_missing_and_has_not_changed():
 def test_a_change_takes_nothing_from_what_was_not_there():
     friction = catalogue()["coulomb_friction"]
     assert changing(before=0.0, now=-3.0, twin=(friction, Term("Fc", "1"))) == [CHANGED]
-    lowest = replace_lowest(0.0)
-    assert [cause.effect for cause in causes(*lowest)] == []
-
-
-def replace_lowest(lowest):
-    """A column that can only add, where it would have to take away."""
-    system, candidates = system_of(np.eye(2), [-0.5, 0.0])
-    terms = (replace(candidates[0].variants[0].terms[0], lowest=lowest),)
-    candidates[0] = replace(candidates[0], variants=(replace(candidates[0].variants[0], terms=terms),))
-    return system, candidates[:1]
+    system, _ = system_of(np.eye(2), [-0.5, 0.0])
+    only_adds = replace(system.columns[0], term=replace(system.columns[0].term, lowest=0.0))
+    assert not causes(system, [alone("effect_0", 1, only_adds)])
 
 
 def test_what_few_runs_show_is_found_where_it_is_much():

@@ -24,7 +24,6 @@ def diagnosed(folder: Path, lags: tuple[float, ...]) -> Document:
     runs = []
     for seed in (1, 2, 3):
         motion = measure(ROBOT, swing(ROBOT, seed, rate=250.0), noise=0.05, seed=seed)
-        assert motion.torque is not None
         late = [np.interp(motion.time - lag, motion.time, one) for lag, one in zip(lags, motion.torque.T, strict=True)]
         runs.append(as_run(replace(motion, torque=np.array(late).T, current=None, power=None)))
     return diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document
@@ -33,7 +32,6 @@ def diagnosed(folder: Path, lags: tuple[float, ...]) -> Document:
 def test_a_lag_of_all_joints_is_taken_out_and_said(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, (1.5e-3,) * 3)
     assert found.causes == ()
-    assert found.cutoff is not None
     assert "1.5 ms later than positions" in found.cutoff.why
 
 
@@ -45,7 +43,6 @@ def test_a_lag_of_all_joints_is_taken_out_and_said(tmp_path: Path) -> None:
 def test_another_delay_is_told(tmp_path: Path, lags: tuple[float, ...], joints: set[str]) -> None:
     found = diagnosed(tmp_path, lags)
     assert [(cause.effect, set(cause.joints)) for cause in found.causes] == [("time_delay", joints)]
-    assert found.cutoff is not None
     assert "later than positions" not in found.cutoff.why
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from tests.synthetic import arm, as_run, measure, rigid_torque, swing, truth
+from tests.synthetic import arm, as_run, data_set, measure, rigid_torque, swing, truth, with_torque
 
 from irtwin.effects.catalogue import BASELINE
 from irtwin.gap.diagnosis import diagnose
@@ -16,7 +15,6 @@ from irtwin.gap.isolation.finding import quantities
 from irtwin.robot.kinematics import flange
 from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.conditioning import condition
-from irtwin.signals.log import DataSet
 from irtwin.twin.torque_scale import torque_scale
 
 pytestmark = pytest.mark.usefixtures("no_experiment")
@@ -40,13 +38,11 @@ def logged(gain, *, power):
     for seed in range(6):
         role, mass = ("reference", 0.0) if seed < 3 else ("observed", LOAD)
         motion = replace(swing(ROBOT, seed, seconds=10.0), run=f"run_{seed}")
-        shown = measure(ROBOT, motion, noise=0.3, seed=seed)
         added = loaded_torque(motion, mass) if mass else np.zeros_like(motion.dq)
-        heat = (truth(ROBOT)["R"] * ((shown.current + added / 8) ** 2 - shown.current**2)).sum(axis=1)
-        taken = shown.power + (added * motion.dq).sum(axis=1) + heat if power else None
-        run = as_run(replace(shown, torque=gain * (shown.torque + added), power=taken, current=None))
+        shown = with_torque(ROBOT, measure(ROBOT, motion, noise=0.3, seed=seed), added)
+        run = as_run(replace(shown, torque=gain * shown.torque, power=shown.power if power else None))
         made.append(replace(run, role=role))
-    return DataSet(Path("arm"), ROBOT, tuple(made), (*BASELINE, "copper_loss"), None, "dc_bus", False, {})
+    return replace(data_set(ROBOT, made, (*BASELINE, "copper_loss"), "dc_bus"), simulated=False)
 
 
 def mass_of(diagnosis):
