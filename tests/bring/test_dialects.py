@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from tests.bring.dialects import NAME, assert_same, good, per_joint, robot, signals, write_text
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin_does
 from tests.signals.bags import of_run, write
 
 from irtwin.bring.bring import Options, bring
@@ -139,8 +139,7 @@ def test_a_log_in_a_dialect_comes_back_in_si_units(
 @pytest.mark.parametrize("form", ["run.bag", "run.mcap", "run"])
 def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
     write(tmp_path / form, *of_run(robot(), signals(good())))
-    said = irtwin("import", tmp_path / form, "--robot", NAME, "--power-at", "mains", "--out", tmp_path / "set")
-    assert said.status == 0
+    irtwin_does("import", tmp_path / form, "--robot", NAME, "--power-at", "mains", "--out", tmp_path / "set")
     assert_same(read_data_set(tmp_path / "set"), "q dq torque power temperature", tolerance=0)
 
 
@@ -190,8 +189,7 @@ def recording_of_rtde(folder: Path, delimiter: str = " ") -> Path:
 
 @pytest.mark.parametrize("delimiter", [" ", ","])  # UR's writer, and that of ur_rtde
 def test_a_recording_of_rtde_needs_no_word(tmp_path: Path, delimiter: str) -> None:
-    said = irtwin("import", recording_of_rtde(tmp_path, delimiter), "--robot", NAME, "--out", tmp_path / "set")
-    assert said.status == 0
+    said = irtwin_does("import", recording_of_rtde(tmp_path, delimiter), "--robot", NAME, "--out", tmp_path / "set")
     assert re.search(r"not used, what the controller wanted.*: target_q_0,", said.out)
     data_set = read_data_set(tmp_path / "set")
     assert_same(data_set, "q dq power temperature")
@@ -217,7 +215,6 @@ def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None
     ):
         for joint, of in enumerate(true.robot.joint_names):
             columns[f"{name}_{joint}"] = columns_of(run.signals, true.robot.joint_names)[f"{prefix}_{of}"]
-    assert run.signals.power is not None
     log = write_text(tmp_path / "run.csv", columns | {"actual_robot_current": run.signals.power / 48.0}, " ")
     bring([log], tmp_path / "set", str(MEASURED / "ur3_power"), Options())
     (found,) = read_data_set(tmp_path / "set").runs

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests.bring.dialects import NAME, good, per_joint, write_text
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin_does
 
 from irtwin.bring.bring import import_logs
 from irtwin.bring.told import roles
@@ -46,8 +46,7 @@ def test_a_role_of_nothing_is_refused(said, message):
 def test_a_simulators_logs_are_brought_beside_the_robots(tmp_path):
     columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "trq{}")
     files = [write_text(tmp_path / f"{name}.csv", columns) for name in ("robot", "sim")]
-    said = irtwin("import", *files, "--robot", NAME, "--role", "sim.csv=simulated", "--out", tmp_path / "set")
-    assert said.status == 0, said.err
+    said = irtwin_does("import", *files, "--robot", NAME, "--role", "sim.csv=simulated", "--out", tmp_path / "set")
     assert f"; then: irtwin diagnose {tmp_path / 'set'}\n" in said.err
     runs = {run.name: run.role for run in read_data_set(tmp_path / "set").runs}
     assert runs == {"robot": "observed", "sim": "simulated"}

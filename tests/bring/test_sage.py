@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import servo_arm
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin_does
 
 from irtwin.bring.recording import read_recording
 from irtwin.errors import InputError
@@ -55,8 +55,7 @@ def test_it_is_imported_from_a_simulator_in_s_and_from_a_robot_in_us(
 ) -> None:
     folder = motion(tmp_path / "wave", kind, begin, scale)
     (tmp_path / "arm.urdf").write_text(servo_arm.URDF)
-    said = irtwin("import", folder, "--robot", tmp_path / "arm.urdf", "--out", tmp_path / "set")
-    assert said.status == 0, said.err
+    irtwin_does("import", folder, "--robot", tmp_path / "arm.urdf", "--out", tmp_path / "set")
     (run,) = servo_arm.read_data_set(tmp_path / "set", commanded=True).runs
     assert run.name == "wave"
     assert np.ptp(run.signals.time) == pytest.approx(np.ptp(TIME), abs=1e-5)

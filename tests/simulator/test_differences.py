@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from tests import data_sets, mujoco_models, synthetic
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, irtwin_refuses
 
 from irtwin.simulator.model import read_model
 
@@ -59,8 +59,7 @@ def test_draws_of_it_lie_where_its_numbers_could(told):
 
 
 def test_a_file_for_the_model_needs_a_model(tmp_path):
-    said = irtwin("diagnose", tmp_path, "--save-simulator", tmp_path / "new.xml")
-    assert said.status == 2
+    said = irtwin_refuses("diagnose", tmp_path, "--save-simulator", tmp_path / "new.xml")
     assert "--save-simulator writes the model of --simulator: give that too" in said.err
     said = irtwin("diagnose", tmp_path, "--draws", 2)
     assert (said.status, "--draws writes models beside that of --save-simulator" in said.err) == (2, True)

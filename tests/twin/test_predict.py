@@ -9,7 +9,7 @@ import pinocchio as pin
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.data_sets import irtwin, write
+from tests.data_sets import irtwin, irtwin_does, irtwin_refuses, write
 from tests.synthetic import arm, as_run, measure, rigid_torque, swing
 
 from irtwin.effects.rigid_body import flange_frame
@@ -48,8 +48,7 @@ def folder(tmp_path_factory):
 def error(folder, run, *options):
     """The median error of the first joint's predicted torque, over its deviation."""
     out = folder / "out.parquet"
-    said = irtwin("predict", folder / "twin.json", run, "--out", out, *options)
-    assert said.status == 0, said.err
+    irtwin_does("predict", folder / "twin.json", run, "--out", out, *options)
     found, measured = pq.read_table(out), pq.read_table(run)
     assert found.num_rows == measured.num_rows
     torque = measured["tau_joint_2"].to_numpy()
@@ -104,8 +103,7 @@ def broken(folder, tmp_path, fault):
 @pytest.mark.parametrize("fault", ["another robot", "no twin", "no run", "a bad sample", "no place"])
 def test_a_fault_is_one_line_and_leaves_nothing(folder, tmp_path, fault):
     arguments, message = broken(folder, tmp_path, fault)
-    said = irtwin("predict", *arguments)
-    assert said.status == 2
+    said = irtwin_refuses("predict", *arguments)
     assert message in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]
 
@@ -122,8 +120,9 @@ def test_a_fault_is_one_line_and_leaves_nothing(folder, tmp_path, fault):
     ],
 )
 def test_a_payload_that_cannot_be_is_refused(folder, tmp_path, options, message):
-    said = irtwin("predict", folder / "twin.json", folder / "data/runs/bare.parquet", "--out", tmp_path / "o", *options)
-    assert said.status == 2
+    said = irtwin_refuses(
+        "predict", folder / "twin.json", folder / "data/runs/bare.parquet", "--out", tmp_path / "o", *options
+    )
     assert message in said.err.splitlines()[-1]
     assert not (tmp_path / "o").exists()
 
@@ -131,6 +130,5 @@ def test_a_payload_that_cannot_be_is_refused(folder, tmp_path, options, message)
 def test_a_motion_of_another_robot_is_refused(folder, tmp_path):
     run = pq.read_table(folder / "data/runs/bare.parquet")
     pq.write_table(run.drop_columns(["q_joint_2", "tau_joint_2"]), tmp_path / "short.parquet")
-    said = irtwin("predict", folder / "twin.json", tmp_path / "short.parquet", "--out", tmp_path / "o")
-    assert said.status == 2
+    said = irtwin_refuses("predict", folder / "twin.json", tmp_path / "short.parquet", "--out", tmp_path / "o")
     assert "short.parquet: column q_joint_2 is missing" in said.err.splitlines()[-1]
