@@ -69,7 +69,6 @@ def of_others(robot: Robot, fitted: list[Run], judged: Run, cutoff: float) -> np
     motion = condition(judged, robot, cutoff)
     values = np.array([twin.value(effect.id, term) for effect, term in twin.stack.torque_terms])
     torque = judged.signals.torque
-    assert torque is not None
     return np.asarray(np.sqrt(np.mean((torque - twin.stack.shown_torque(motion, values)) ** 2, axis=0)))
 
 

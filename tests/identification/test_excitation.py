@@ -220,15 +220,17 @@ def test_missing_or_contradictory_limits_are_told(robot: Robot, message: str) ->
         excite(robot, 5.0)
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_motion_needs_a_sensible_time(seconds: float) -> None:
-    with pytest.raises(InputError, match=r"give 0\.5 to 3600 s"):
-        excite(TWO, seconds)
-
-
-def test_a_rate_must_be_sensible() -> None:
-    with pytest.raises(InputError, match="give 1 to 10000 Hz"):
-        excite(TWO, 5.0, rate=0.0)
+@pytest.mark.parametrize(
+    ("seconds", "rate", "message"),
+    [
+        *((seconds, 100.0, r"give 0\.5 to 3600 s") for seconds in (0.0, -1.0, float("nan"), float("inf"))),
+        (5.0, 0.0, "give 1 to 10000 Hz"),
+        (3600.0, 10_000.0, "are 36000000 samples of 2 joints; ask for at most 3125000"),
+    ],
+)
+def test_time_and_rate_of_a_motion_must_be_sensible(seconds: float, rate: float, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        excite(TWO, seconds, rate=rate)
 
 
 @pytest.mark.parametrize(
@@ -259,10 +261,7 @@ def test_small_robots_are_excited(joints: int, slides: tuple[int, ...]) -> None:
 @pytest.mark.parametrize(
     ("limit", "message"),
     [
-        (
-            'lower="-2" upper="2" velocity="1e300"',
-            "has a speed limit of 1e+300, which is not plausible; correct its <limit>",
-        ),
+        ('lower="-2" upper="2" velocity="1e300"', "has a speed limit of 1e+300, which is not plausible; correct its <"),
         ('lower="-2" upper="2" velocity="1e-300"', "has a speed limit of 1e-300"),
         ('lower="-1e300" upper="1e300" velocity="3"', "has a range of 2e+300"),
         ('lower="0" upper="1e-9" velocity="3"', "has a range of 1e-09"),
@@ -283,11 +282,6 @@ def test_a_robot_that_reaches_to_the_stars_is_refused() -> None:
 def test_fast_joints_of_a_long_range_are_slowed_until_the_way_is_clear() -> None:
     found = excite(two_joints('<limit lower="-2000" upper="2000" velocity="5000" effort="9"/>'), 5.0, iterations=1)
     assert found.clearance > 0
-
-
-def test_a_motion_too_long_to_hold_is_refused() -> None:
-    with pytest.raises(InputError, match="are 36000000 samples of 2 joints; ask for at most 3125000"):
-        excite(TWO, 3600.0, rate=10_000.0)
 
 
 def test_without_a_box_only_the_floor_is_blamed() -> None:

@@ -38,9 +38,7 @@ def measured(law: Law | None, width: float, seed: int) -> Motion:
     if law is None:
         return motion
     dry = truth(ROBOT)["Fc"]
-    torque = motion.torque
-    assert torque is not None
-    return replace(motion, torque=torque + dry * (law(motion.dq / width) - np.sign(motion.dq)))
+    return replace(motion, torque=motion.torque + dry * (law(motion.dq / width) - np.sign(motion.dq)))
 
 
 def left(robot: Robot, motions: list[Motion]) -> np.ndarray:
@@ -70,16 +68,13 @@ def test_sharp_friction_stays_sharp() -> None:
 )
 def test_sharp_friction_that_bends_as_the_joint_speeds_up_stays_sharp(law: Law) -> None:
     motions = [measured(None, 1.0, seed) for seed in (1, 2)]
-    bent = [
-        replace(motion, torque=motion.torque + 4.0 * law(motion.dq)) for motion in motions if motion.torque is not None
-    ]
+    bent = [replace(motion, torque=motion.torque + 4.0 * law(motion.dq)) for motion in motions]
     robot, _ = with_friction_near_zero(ROBOT, bent, EFFECTS)
     assert all((joint.friction_width or 0.0) < 0.002 for joint in robot.joints)
 
 
 def test_joints_have_laws_of_their_own() -> None:
     sharp, soft = measured(None, 1.0, 3), measured(LAWS["root"], 0.01, 3)
-    assert sharp.torque is not None and soft.torque is not None
     mixed = replace(sharp, torque=np.column_stack([sharp.torque[:, 0], soft.torque[:, 1]]))
     first, second = with_friction_near_zero(ROBOT, [mixed], EFFECTS)[0].joints
     assert (first.friction_width or 0.0) < 0.003

@@ -22,7 +22,6 @@ EFFECTS = ("rigid_body", "coulomb_friction", "viscous_friction", "nonlinear_visc
 def measured(soft: bool) -> Motion:
     """Return a motion with the truth's torque; dry friction of the second joint turns over 0.01 rad/s where `soft`."""
     motion = measure(ROBOT, swing(ROBOT, 1), noise=0.02)
-    assert motion.torque is not None
     torque, dq = motion.torque.copy(), motion.dq[:, 1]
     torque[:, 1] += soft * truth(ROBOT)["Fc"][1] * (turn(dq, 0.01, 2.0) - np.sign(dq))
     return replace(motion, torque=torque)
@@ -46,7 +45,6 @@ def test_shapes_that_were_open_are_among_its_columns_unless_friction_turns_other
         motions = [measured(soft)]
         robot, reduced = with_friction_near_zero(ROBOT, motions, EFFECTS)
         stack = Stack(robot, [shape.on("joint_2") if effect == shape.id else effect for effect in EFFECTS])
-        assert reduced is not None
         assert (reduced.of(stack) is None) == soft
         found, read = fit_torque(stack, motions, reduced)[1], fit_torque(stack, motions)[1]
         np.testing.assert_allclose(found.values, read.values, rtol=1e-8, atol=1e-9)

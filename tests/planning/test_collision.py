@@ -47,12 +47,9 @@ def test_a_box_of_no_size_is_refused(size):
         Obstacle((0, 0, 0), size)
 
 
-def test_a_shape_of_no_size_is_refused():
+def test_a_shape_of_no_size_and_too_many_are_refused():
     with pytest.raises(InputError, match=r'collision shape of link "link_1": a cylinder of 0 0\.3 m has no size'):
         CollisionModel(parse_urdf(ROBOT.urdf.replace('radius="0.04" length="0.3"', 'radius="0" length="0.3"')))
-
-
-def test_more_shapes_than_can_be_checked_are_refused():
     with pytest.raises(InputError, match="503 collision shapes and boxes cannot be checked; give at most 500"):
         CollisionModel(ROBOT, [Obstacle((5, 0, 0), (1, 1, 1))] * 500)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pyarrow.parquet as pq
 import pytest
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, irtwin_does, irtwin_refuses
 from tests.planning.boxes import arm, folded, twin_of
 
 from irtwin.errors import InputError
@@ -19,12 +19,14 @@ from irtwin.planning.poses import Pose, read_target
 from irtwin.planning.timing import MotionLimits
 from irtwin.robot.collision import CollisionModel, Obstacle
 from irtwin.robot.kinematics import placements
+from irtwin.signals.motion import Motion
 from irtwin.twin.files import load, to_json
 
 pytestmark = pytest.mark.slow
 
 SIX = arm(6)
 START, GOAL = np.array([-0.9, 1.0, 0.6, 0.0, 0.5, 0.0]), np.array([0.9, 1.0, 0.6, 0.0, 0.5, 0.0])
+BOX = Obstacle((0.104, -0.132, 0.408), (0.1, 0.1, 0.1))
 WALL = Obstacle((0.6, 0.0, 0.4), (0.5, 0.1, 0.8))
 
 
@@ -44,11 +46,17 @@ def test_a_plan_goes_around_a_box():
     assert made.price is None
 
 
-def test_a_plan_starts_and_ends_at_rest_and_keeps_all_limits():
-    made, limits = around_the_wall().motion, MotionLimits.of(SIX)
+def assert_rests_and_limits(made: Motion) -> None:
+    """Of speed and acceleration."""
+    limits = MotionLimits.of(SIX)
     for state, limit in ((made.dq, limits.speed), (made.ddq, limits.acceleration)):
         assert np.abs(state[[0, -1]]).max() < 1e-9
         assert (np.abs(state) <= limit).all()
+
+
+def test_a_plan_starts_and_ends_at_rest_and_keeps_all_limits():
+    made, limits = around_the_wall().motion, MotionLimits.of(SIX)
+    assert_rests_and_limits(made)
     jerk = np.diff(made.ddq, axis=0) * made.rate
     assert (np.abs(jerk) <= limits.jerk).all()
     assert np.allclose(np.diff(made.q, axis=0) * made.rate, (made.dq[1:] + made.dq[:-1]) / 2, atol=1e-2)
@@ -64,27 +72,33 @@ def test_torque_limits_bind():
     assert np.abs(nominal_twin(weak).joint_torque(made.motion)).max() <= 60.0
 
 
-def test_the_flange_goes_along_a_line():
+def along_a_line() -> Task:
+    """A move of the flange by 5, 20 and -10 cm, without a turn."""
     start = np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
-    goal = pin.SE3(placements(SIX, start[None])[0])
-    goal.translation = goal.translation + np.array([0.05, 0.2, -0.1])
-    angles = tuple(pin.rpy.matrixToRpy(goal.rotation))
-    made = plan(nominal_twin(SIX), Task(start, Pose(tuple(goal.translation), angles), line=True))
+    place = pin.SE3(placements(SIX, start[None])[0])
+    goal = place.translation + np.array([0.05, 0.2, -0.1])
+    return Task(start, Pose(tuple(goal), tuple(pin.rpy.matrixToRpy(place.rotation))), line=True)
+
+
+def way_along_the_line(made: Plan, goal: np.ndarray) -> np.ndarray:
+    """How far the flange has come, m, which never leaves its line to the goal."""
     places = placements(SIX, made.motion.q)[:, :3, 3]
-    along = (goal.translation - places[0]) / np.linalg.norm(goal.translation - places[0])
-    away = (places - places[0]) - np.outer((places - places[0]) @ along, along)
-    assert np.linalg.norm(away, axis=1).max() < 1e-4
-    np.testing.assert_allclose(places[-1], goal.translation, atol=1e-5)
+    gone, along = places - places[0], (goal - places[0]) / np.linalg.norm(goal - places[0])
+    assert np.linalg.norm(gone - np.outer(gone @ along, along), axis=1).max() < 1e-4
+    np.testing.assert_allclose(places[-1], goal, atol=1e-5)
+    return gone @ along
+
+
+def test_the_flange_goes_along_a_line():
+    task = along_a_line()
+    assert way_along_the_line(plan(nominal_twin(SIX), task), np.array(task.goal.place))[-1] > 0.2
 
 
 @pytest.mark.parametrize(
     ("task", "message"),
     [
         (Task(START, folded(SIX)), "the goal is in collision: link_1 touches link_3"),
-        (
-            Task(START, GOAL, [Obstacle((0.104, -0.132, 0.408), (0.1, 0.1, 0.1))]),
-            "the start is in collision: link_2 touches",
-        ),
+        (Task(START, GOAL, [BOX]), "the start is in collision: link_2 touches"),
         (Task(START, np.array([3.0, 0, 0, 0, 0, 0])), "the goal: joint_1 at 3 rad is outside its limits"),
         (Task(START, Pose((2.3, 0, 0.3), (0, 0, 0))), "is out of reach: the flange stays 1[0-9]{3} mm"),
         (Task(START, START), "start and goal are the same pose"),
@@ -128,11 +142,9 @@ ENDS = ("--from", "-0.9,0.5,0.6", "--to", "0.9,1.0,-0.6")
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_a_plan_is_a_log_that_predict_prices_alike(folder, ending):
     out, predicted = folder / f"plan.{ending}", folder / "predicted.parquet"
-    planned = irtwin("plan", folder / "twin.json", *ENDS, "--seconds", "2", "--out", out)
-    assert planned.status == 0, planned.err
+    planned = irtwin_does("plan", folder / "twin.json", *ENDS, "--seconds", "2", "--out", out)
     assert "2.000 s" in planned.out and "mm least clearance; energy" in planned.out
-    priced = irtwin("predict", folder / "twin.json", out, "--out", predicted)
-    assert priced.status == 0, priced.err
+    priced = irtwin_does("predict", folder / "twin.json", out, "--out", predicted)
     found = [float(said.split("energy ")[1].split(" ")[0]) for said in (planned.out, priced.out)]
     assert found[0] == pytest.approx(found[1], rel=0.01)
     assert "95 % interval" in priced.out
@@ -151,29 +163,18 @@ def test_least_energy_costs_no_more_than_the_slowed_motion(folder):
 
 @pytest.mark.nightly
 def test_least_energy_along_a_line_changes_its_timing_alone():
-    twin, start = twin_of(SIX), np.array([0.0, 0.6, 1.2, 0.0, 0.7, 0.0])
-    goal = pin.SE3(placements(SIX, start[None])[0])
-    goal.translation = goal.translation + np.array([0.05, 0.2, -0.1])
-    task = Task(start, Pose(tuple(goal.translation), tuple(pin.rpy.matrixToRpy(goal.rotation))), line=True, seconds=1.0)
+    twin, task = twin_of(SIX), replace(along_a_line(), seconds=1.0)
     slowed, least = plan(twin, task), plan(twin, replace(task, least_energy=True))
     assert least.price.energy.value < 0.999 * slowed.price.energy.value
     assert least.seconds == pytest.approx(slowed.seconds)
-    places = placements(twin.robot, least.motion.q)[:, :3, 3]
-    along = (goal.translation - places[0]) / np.linalg.norm(goal.translation - places[0])
-    way = (places - places[0]) @ along
-    assert np.linalg.norm(places - places[0] - np.outer(way, along), axis=1).max() < 1e-4
-    assert (np.diff(way) > -1e-9).all()
-    limits = MotionLimits.of(twin.robot)
-    for state, limit in ((least.motion.dq, limits.speed), (least.motion.ddq, limits.acceleration)):
-        assert np.abs(state[[0, -1]]).max() < 1e-9
-        assert (np.abs(state) <= limit).all()
+    assert (np.diff(way_along_the_line(least, np.array(task.goal.place))) > -1e-9).all()
+    assert_rests_and_limits(least.motion)
 
 
 def test_what_is_not_known_is_not_shown(folder):
     said = irtwin("plan", folder / "no_power.json", *ENDS, "--out", folder / "p.csv")
     assert "energy and power are not known" in said.out
-    said = irtwin("plan", folder / "bare.urdf", *ENDS, "--out", folder / "p.csv")
-    assert said.status == 0
+    said = irtwin_does("plan", folder / "bare.urdf", *ENDS, "--out", folder / "p.csv")
     assert "no collision shapes, so it was not checked whether the robot meets itself" in said.err
 
 
@@ -186,8 +187,7 @@ def test_what_is_not_known_is_not_shown(folder):
     ],
 )
 def test_bad_options_are_told(folder, options, message):
-    said = irtwin("plan", folder / "twin.json", *options, "--out", folder / "none.csv")
-    assert said.status == 2
+    said = irtwin_refuses("plan", folder / "twin.json", *options, "--out", folder / "none.csv")
     assert message in said.err
     assert not (folder / "none.csv").exists()
     said = irtwin("plan", folder / "twin.json", *ENDS, "--out", folder / "none.txt")
@@ -195,27 +195,20 @@ def test_bad_options_are_told(folder, options, message):
 
 
 @pytest.mark.parametrize(
-    ("column", "value", "message"),
+    ("positions", "message"),
     [
-        ("q_joint_3", lambda q: np.linspace(0, 2.9, len(q)), "joint_3 is at .* outside its limits"),
-        ("fold", None, "s link_1 meets link_3"),
-        ("fast", None, "moves at .* above its limit of 3 rad/s"),
+        (lambda time: time / 3 * [0.1, 0.1, 2.9], "joint_3 is at .* outside its limits"),
+        (lambda time: time / 3 * folded(arm(3)), "s link_1 meets link_3"),
+        (lambda time: 0.5 * np.sin(9 * time) * np.ones(3), "moves at .* above its limit of 3 rad/s"),
     ],
+    ids=["too far", "folded", "too fast"],
 )
-def test_a_motion_that_cannot_be_is_refused_with_its_time(folder, tmp_path, column, value, message):
+def test_a_motion_that_cannot_be_is_refused_with_its_time(folder, tmp_path, positions, message):
     time = np.linspace(0, 3, 301)
-    share = np.clip(time / 3, 0, 1)[:, None]
-    q = share * np.array([0.1, 0.1, 0.1])
-    if column == "fold":
-        q = share * folded(arm(3))
-    elif column == "fast":
-        q = 0.5 * np.sin(9 * time)[:, None] * np.ones(3)
-    else:
-        q[:, 2] = value(time)
+    q = positions(time[:, None])
     rows = ["time,q_joint_1,q_joint_2,q_joint_3", *(",".join(map(str, row)) for row in np.column_stack([time, q]))]
     (tmp_path / "motion.csv").write_text("\n".join(rows))
-    said = irtwin("predict", folder / "twin.json", tmp_path / "motion.csv", "--out", tmp_path / "out.parquet")
-    assert said.status == 2
+    said = irtwin_refuses("predict", folder / "twin.json", tmp_path / "motion.csv", "--out", tmp_path / "out.parquet")
     assert "motion.csv: at " in said.err
     assert re.search(message, said.err), said.err
     assert not (tmp_path / "out.parquet").exists()
@@ -225,8 +218,7 @@ def test_a_plan_for_another_robot_is_refused(folder, tmp_path):
     irtwin("plan", folder / "twin.json", *ENDS, "--out", tmp_path / "plan.csv")
     text = (tmp_path / "plan.csv").read_text()
     (tmp_path / "plan.csv").write_text(text.replace("joint_3", "elbow"))
-    said = irtwin("predict", folder / "twin.json", tmp_path / "plan.csv", "--out", tmp_path / "o.parquet")
-    assert said.status == 2
+    said = irtwin_refuses("predict", folder / "twin.json", tmp_path / "plan.csv", "--out", tmp_path / "o.parquet")
     assert "plan.csv: column q_elbow: the robot has no moving joint" in said.err
 
 

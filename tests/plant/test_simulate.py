@@ -11,6 +11,7 @@ from irtwin.demo.plant.thermal import Thermal
 
 pytestmark = pytest.mark.slow
 
+LADEN = PlantPayload(2.0)
 MOVES = [
     {"to": [40, -60, 90, 30, 40, 60], "profile": "trapezoid", "pause": 0.2},
     {"to": [-30, -100, 70, -20, -40, 0], "pause": 0.2},
@@ -21,8 +22,10 @@ def _motion(machine: Machine) -> PlantMotion:
     return programme(MOVES, machine.drawings.limits, machine.drawings.step)
 
 
-def _run(machine: Machine, seed: int = 1) -> PlantRecording:
-    return simulate(machine, _motion(machine), PlantPayload(2.0), Thermal(machine.drawings.thermal), seed)
+def _run(
+    machine: Machine, seed: int = 1, motion: PlantMotion | None = None, payload: PlantPayload = LADEN
+) -> PlantRecording:
+    return simulate(machine, motion or _motion(machine), payload, Thermal(machine.drawings.thermal), seed)
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +40,11 @@ def test_energy_is_accounted_for(recording: PlantRecording) -> None:
 
 
 def test_energy_is_accounted_for_while_the_arm_ends_higher(machine: Machine) -> None:
-    up = programme(
-        [{"to": [0, -30, 60, 0, 0, 0]}, {"to": [0, -90, 60, 0, 0, 0], "pause": 0.1}], machine.drawings.limits, 5e-4
-    )
-    second = len(up.q) // 2
-    up = PlantMotion(up.q[second:], up.dq[second:], up.ddq[second:])
-    book = simulate(machine, up, PlantPayload(), Thermal(machine.drawings.thermal), 1).book
+    moves = [{"to": [0, -30, 60, 0, 0, 0]}, {"to": [0, -90, 60, 0, 0, 0], "pause": 0.1}]
+    both = programme(moves, machine.drawings.limits, 5e-4)
+    second = slice(len(both.q) // 2, None)
+    up = PlantMotion(both.q[second], both.dq[second], both.ddq[second])
+    book = _run(machine, motion=up, payload=PlantPayload()).book
     assert book.mechanical > 50
     assert abs(book.residual()) < 2e-3 * (book.grid - book.standby)
 
@@ -73,17 +75,14 @@ def test_log_is_what_plausible_sensors_see(machine: Machine, recording: PlantRec
 
 def test_power_at_rest_is_standby_and_holding(machine: Machine) -> None:
     rows = np.repeat(np.radians([[0.0, -60, 60, 0, 0, 0]]), 2000, axis=0)
-    rest = simulate(
-        machine, PlantMotion(rows, 0 * rows, 0 * rows), PlantPayload(), Thermal(machine.drawings.thermal), 1
-    )
+    rest = _run(machine, motion=PlantMotion(rows, 0 * rows, 0 * rows), payload=PlantPayload())
     assert rest.power.mean() == pytest.approx(115, abs=6)
     assert rest.power.std() < 3
 
 
 def test_stops_where_the_drives_cannot_follow(machine: Machine) -> None:
-    motion = _motion(machine)
     with pytest.raises(RuntimeError, match="cannot follow"):
-        simulate(machine, motion, PlantPayload(60.0, (0.1, 0, 0)), Thermal(machine.drawings.thermal), 1)
+        _run(machine, payload=PlantPayload(60.0, (0.1, 0, 0)))
 
 
 def test_robots_of_one_drawing_differ(machine: Machine, recording: PlantRecording) -> None:

@@ -46,7 +46,6 @@ def test_inertia_is_in_the_axes_of_the_link():
     base, body, _ = structure_of(robot).bodies
     assert (base.mass, base.com, base.inertia) == (None, None, None)
     assert (body.mass, body.com) == (3.0, (0.1, 0.0, 0.0))
-    assert body.inertia is not None
     assert body.inertia[:3] == pytest.approx((0.2, 0.1, 0.25))
     assert np.asarray(robot.model.inertias[1].inertia) == pytest.approx(np.diag(body.inertia[:3]), abs=1e-12)
 
