@@ -110,9 +110,8 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
 
 
 def test_a_motion_without_torque_asks_which_columns_are_it(tmp_path: Path) -> None:
-    log = write_text(
-        tmp_path / "run.csv", {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
-    )
+    columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
+    log = write_text(tmp_path / "run.csv", columns)
     said = irtwin("import", log, "--robot", NAME, "--out", tmp_path / "set")
     assert (said.status, (tmp_path / "set").exists()) == (2, False)
     assert "no column was taken for torque, motor current or power" in said.err
@@ -200,14 +199,16 @@ def test_a_robot_is_known_by_name_where_its_package_is_installed(
     assert origin == "arm6 of example-robot-data"
 
 
+def of_joints(folder: Path, *numbers: int) -> Path:
+    """A log of the positions and torques of some joints."""
+    columns = [f"{kind}_joint_a{number}" for number in numbers for kind in ("q", "tau")]
+    return write_text(folder / "run.csv", {name: good()[name] for name in ("time", *columns)})
+
+
 def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
-    columns = {"time": good()["time"]} | {f"q_joint_a{k}": good()[f"q_joint_a{k}"] for k in range(1, 6)}
-    log = write_text(
-        tmp_path / "run.csv", columns | {f"tau_joint_a{k}": good()[f"tau_joint_a{k}"] for k in range(1, 6)}
-    )
-    with pytest.raises(
-        InputError, match=r"--map COLUMN=q_joint_a6, or, where they stood still, --fixed joint_a6 .there"
-    ):
+    log = of_joints(tmp_path, *range(1, 6))
+    told = r"--map COLUMN=q_joint_a6, or, where they stood still, --fixed joint_a6 .there"
+    with pytest.raises(InputError, match=told):
         bring([log], tmp_path / "set", NAME, Options())
     bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a6",)))
     data_set = read_data_set(tmp_path / "set")
@@ -218,17 +219,12 @@ def test_a_joint_that_is_not_logged_can_be_fixed(tmp_path: Path) -> None:
 
 
 def test_all_joints_that_are_missing_are_told_at_once_and_held_by_a_pattern(tmp_path: Path) -> None:
-    wanted = ("joint_a1", "joint_a2", "joint_a3")
-    columns = {"time": good()["time"]} | {
-        f"{kind}_{joint}": good()[f"{kind}_{joint}"] for joint in wanted for kind in ("q", "tau")
-    }
-    log = write_text(tmp_path / "run.csv", columns)
-    with pytest.raises(
-        InputError, match=r"the position of joint_a4 and 2 other joints; .* --fixed joint_a4 --fixed joint_a5 --fixed"
-    ):
+    log = of_joints(tmp_path, 1, 2, 3)
+    told = r"the position of joint_a4 and 2 other joints; .* --fixed joint_a4 --fixed joint_a5 --fixed"
+    with pytest.raises(InputError, match=told):
         bring([log], tmp_path / "set", NAME, Options())
     bring([log], tmp_path / "set", NAME, Options(fixed=("joint_a[456]",)))
-    assert read_data_set(tmp_path / "set").robot.joint_names == wanted
+    assert read_data_set(tmp_path / "set").robot.joint_names == robot().joint_names[:3]
 
 
 def test_a_joint_that_mimics_another_is_held_already(tmp_path: Path) -> None:
@@ -275,7 +271,7 @@ def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:
     text = (tmp_path / "set" / "dataset.toml").read_text()
     for key in (*ROBOT_KEYS, *RUN_KEYS, *SHEET_KEYS, *TWIN_KEYS, *DATA_SET_KEYS):
         assert key in text or key == "dh"
-    (tmp_path / "set" / "runs" / "NAME.csv").write_bytes(plain_of_the_format(tmp_path).read_bytes())
+    write_text(tmp_path / "set" / "runs" / "NAME.csv", good())
     filled = re.sub(
         r"(?m)^# (\[\[run\]\]|file|role|payload_\w+|started|gear_ratio|weight|\[twin\]|effects)", r"\1", text
     )
@@ -285,7 +281,3 @@ def test_an_empty_data_set_explains_each_key(tmp_path: Path) -> None:
     assert irtwin("import", "--out", tmp_path / "set").status == 2
     init(tmp_path / "bare", None, None)
     assert "# [robot.joint.NAME]" in (tmp_path / "bare" / "dataset.toml").read_text()
-
-
-def plain_of_the_format(folder: Path) -> Path:
-    return write_text(folder / "log.csv", good())

@@ -97,9 +97,8 @@ def test_an_effect_withheld_from_a_twin_is_named_again(twin):
 @pytest.mark.parametrize("robot", OTHERS.values(), ids=OTHERS)
 def test_a_twin_of_another_robot_is_refused(robot, bare):
     foreign = replace(bare, robot=robot)
-    with pytest.raises(
-        InputError, match=r"dataset\.toml: the twin is of another robot, arm_\d with the joints joint_1"
-    ):
+    told = r"dataset\.toml: the twin is of another robot, arm_\d with the joints joint_1"
+    with pytest.raises(InputError, match=told):
         baseline(logged(0), (), 0.2, foreign)
 
 

@@ -45,15 +45,11 @@ def logged(gain, *, power):
     return replace(data_set(ROBOT, made, (*BASELINE, "copper_loss"), "dc_bus"), simulated=False)
 
 
-def mass_of(diagnosis):
-    cause = next(cause for cause in diagnosis.document.causes if cause.effect == "payload")
-    return next(one for one in cause.parameters if one.name == "m")
-
-
 @pytest.mark.slow
 def test_a_mass_weighed_by_drives_that_read_high_lies_in_its_interval():
     found = diagnose(logged(GAIN, power=False))
-    mass = mass_of(found)
+    (load,) = (one for one in found.document.causes if one.effect == "payload")
+    mass = next(one for one in load.parameters if one.name == "m")
     assert mass.value == pytest.approx(GAIN * LOAD, rel=0.03)
     assert mass.interval95[0] < LOAD < mass.interval95[1]
     said = found.document.torque_scale

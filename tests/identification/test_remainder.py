@@ -41,7 +41,8 @@ def test_what_coefficients_are_unsure_by_is_no_remainder():
 
 
 def test_of_one_run_stretches_of_time_tell():
-    long = [block for k, block in enumerate(blocks(10, 2.0, 0.1)) for block in [replaced(block, k)]]
+    runs = enumerate(blocks(10, 2.0, 0.1))
+    long = [Block("one", k * SECONDS, (k + 1) * SECONDS, block.rows, block.factors) for k, block in runs]
     assert left(long).mean > 0.5
     assert left(long[:3]) is None
 
@@ -60,10 +61,6 @@ def left(some: list[Block]) -> Remainder | None:
 def shifted(block: Block, watts: float) -> Block:
     (factor,) = block.factors
     return Block(block.run, block.start, block.stop, block.rows, (factor + watts * factor[:, :1] * [0, 0, 1],))
-
-
-def replaced(block: Block, place: int) -> Block:
-    return Block("one", place * SECONDS, (place + 1) * SECONDS, block.rows, block.factors)
 
 
 def test_it_lasts_a_motion_and_is_noise_in_a_shorter_one():

@@ -84,7 +84,6 @@ def test_a_program_is_written_by_the_ending(tmp_path: Path) -> None:
 def test_what_has_not_six_turning_joints_has_no_program() -> None:
     seven = Motion(np.arange(3.0), *np.zeros((3, 3, 7)), run="r")
     for program, language in ((urscript, "URScript"), (krl, "KRL")):
-        with pytest.raises(
-            InputError, match=rf"{language} is written for six turning joints; write the motion as .csv"
-        ):
+        told = rf"{language} is written for six turning joints; write the motion as .csv"
+        with pytest.raises(InputError, match=told):
             program(seven, robot(7), "r")

@@ -209,7 +209,6 @@ def test_too_many_values_are_refused_before_they_are_read(tmp_path: Path, monkey
 def test_without_rosbags_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "run.bag", states(Q))
     monkeypatch.setitem(__import__("sys").modules, "rosbags.rosbag1", None)
-    with pytest.raises(
-        InputError, match=r'bags need the package rosbags; install it with: pip install "irtwin\[ros\]"'
-    ):
+    told = r'bags need the package rosbags; install it with: pip install "irtwin\[ros\]"'
+    with pytest.raises(InputError, match=told):
         read_signals(path, ROBOT)

@@ -131,9 +131,8 @@ def test_what_is_fixed_to_a_link_keeps_its_body_where_that_can_be() -> None:
 def test_inconsistent_bodies_are_refused() -> None:
     twin = fitted()
     spoilt = [replace(one, value=-1.0) if one.name == "m" else one for one in twin.parameters]
-    with pytest.raises(
-        InputError, match="the body that joint_1 moves is not physically consistent; identify the twin again"
-    ):
+    told = "the body that joint_1 moves is not physically consistent; identify the twin again"
+    with pytest.raises(InputError, match=told):
         text_of(replace(twin, parameters=tuple(spoilt)), "sdf")
 
 
