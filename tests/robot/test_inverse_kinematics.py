@@ -18,17 +18,13 @@ from irtwin.robot.kinematics import placements
 from irtwin.robot.urdf import read_urdf
 
 KR6 = read_urdf(resources.folder("ontology") / "robots" / "kuka_kr6_r700.urdf")
-SCARA = from_table(
-    "scara",
-    ChainTable(
-        (
-            Row(0.325, 0.0, 0.0, lower=-2.0, upper=2.0),
-            Row(0.275, np.pi, 0.0, lower=-2.5, upper=2.5),
-            Row(0.0, 0.0, 0.0, kind="prismatic", lower=0.0, upper=0.2),
-            Row(0.0, 0.0, 0.0),
-        )
-    ),
+ROWS = (
+    Row(0.325, 0.0, 0.0, lower=-2.0, upper=2.0),
+    Row(0.275, np.pi, 0.0, lower=-2.5, upper=2.5),
+    Row(0.0, 0.0, 0.0, kind="prismatic", lower=0.0, upper=0.2),
+    Row(0.0, 0.0, 0.0),
 )
+SCARA = from_table("scara", ChainTable(ROWS))
 
 
 def pose(robot: Robot, q: list[float]) -> pin.SE3:
@@ -66,10 +62,8 @@ def test_an_arm_of_seven_joints_stays_near_its_start() -> None:
 
 
 def test_limits_may_lie_beyond_a_half_turn() -> None:
-    far = ChainTable(
-        (Row(0.3, 0.0, 0.0, lower=4.0, upper=5.0), Row(0.2, 0.0, 0.0, kind="prismatic", lower=7.0, upper=7.5))
-    )
-    robot = from_table("far", far)
+    turns, slides = (Row(0.3, 0, 0, lower=4.0, upper=5.0), Row(0.2, 0, 0, kind="prismatic", lower=7.0, upper=7.5))
+    robot = from_table("far", ChainTable((turns, slides)))
     solution, *_ = found(robot, [4.5, 7.2], [0.0, 0.0])  # brought within the limits
     assert solution == pytest.approx([4.5, 7.2], abs=1e-6)
     assert max(deviation(robot, table_of(robot))) < 1e-12

@@ -84,15 +84,9 @@ def test_a_joint_that_mimics_another_is_held_and_its_mass_stays():
         (ARM.replace('lower="-2"', 'lower="2"'), "lies above its upper limit"),
         (ARM.replace('type="continuous"', 'type="floating"'), 'type "floating" cannot be modelled'),
         (ARM.replace('<child link="upper"/>', '<child link="tool"/>'), "child of two joints"),
-        (
-            ARM.replace('<parent link="base"/>', '<parent link="fore"/>'),
-            r'the joints around link "(upper|fore)" form a loop',
-        ),
+        (ARM.replace('<parent link="base"/>', '<parent link="fore"/>'), 'around link "(upper|fore)" form a loop'),
         (ARM.replace('name="elbow"', 'name="shoulder"'), "is defined twice"),
-        (
-            ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="wrist"/>'),
-            'mimics "wrist", which is no other',
-        ),
+        (ARM.replace('<axis xyz="0 0 1"/>', '<mimic joint="wrist"/>'), 'mimics "wrist", which is no other'),
     ],
 )
 def test_faults_are_named(text, message):
@@ -109,12 +103,7 @@ def test_an_unreadable_file_is_a_users_mistake(tmp_path):
 
 
 def test_many_entities_end_at_once():
-    bomb = (
-        '<!DOCTYPE r [<!ENTITY a "'
-        + "x" * 1000
-        + '">'
-        + "".join(f'<!ENTITY a{k} "{"&a;" * 10}">' for k in range(10))
-        + "]><robot name='&a9;'/>"
-    )
+    entities = "".join(f'<!ENTITY a{k} "{"&a;" * 10}">' for k in range(10))
+    bomb = f'<!DOCTYPE r [<!ENTITY a "{"x" * 1000}">{entities}]><robot name="&a9;"/>'
     with pytest.raises(InputError, match="DTD"):
         parse_urdf(bomb)
