@@ -169,17 +169,14 @@ def test_a_format_that_a_package_brings_is_imported(tmp_path: Path, monkeypatch:
 
 def recording_of_rtde(folder: Path, delimiter: str = " ") -> Path:
     """A recording as UR's record.py writes it, by the csv module: the variables of a recipe, vectors numbered."""
-    columns = (
-        {"timestamp": 7321.5 + good()["time"]} | per_joint("q", "target_q_{}", 0) | per_joint("q", "actual_q_{}", 0)
-    )
+    columns = {"timestamp": 7321.5 + good()["time"]}
+    columns |= per_joint("q", "target_q_{}", 0) | per_joint("q", "actual_q_{}", 0)
     columns |= per_joint("dq", "actual_qd_{}", 0) | per_joint("tau", "actual_current_{}", 0, factor=0.1)
     columns |= per_joint("tau", "target_moment_{}", 0) | per_joint("temp", "joint_temperatures_{}", 0)
-    columns |= {
-        "actual_robot_voltage": np.full(len(good()["time"]), 48.0),
-        "actual_robot_current": good()["power"] / 48,
-    }
-    columns |= {"payload": np.full(len(good()["time"]), 2.5), "speed_scaling": np.ones(len(good()["time"]))}
-    columns |= {f"payload_cog_{axis}": np.full(len(good()["time"]), 0.01 * axis) for axis in range(3)}
+    steady = np.ones(len(good()["time"]))
+    columns |= {"actual_robot_voltage": 48.0 * steady, "actual_robot_current": good()["power"] / 48}
+    columns |= {"payload": 2.5 * steady, "speed_scaling": steady}
+    columns |= {f"payload_cog_{axis}": 0.01 * axis * steady for axis in range(3)}
     with (folder / "robot_data.csv").open("w", newline="") as file:
         writer = csv.writer(file, delimiter=delimiter)
         writer.writerow(columns)
@@ -207,12 +204,8 @@ def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None
     true = read_data_set(MEASURED / "ur3_power")
     (run,) = true.runs
     columns = {"timestamp": run.signals.time, "actual_robot_voltage": np.full(len(run.signals.time), 48.0)}
-    for prefix, name in (
-        ("q", "actual_q"),
-        ("dq", "actual_qd"),
-        ("i", "actual_current"),
-        ("temp", "joint_temperatures"),
-    ):
+    names = {"q": "actual_q", "dq": "actual_qd", "i": "actual_current", "temp": "joint_temperatures"}
+    for prefix, name in names.items():
         for joint, of in enumerate(true.robot.joint_names):
             columns[f"{name}_{joint}"] = columns_of(run.signals, true.robot.joint_names)[f"{prefix}_{of}"]
     log = write_text(tmp_path / "run.csv", columns | {"actual_robot_current": run.signals.power / 48.0}, " ")

@@ -70,11 +70,8 @@ def _text(runs: Path, rng: np.random.Generator) -> None:
         end = some(rng, ["\n", "\r\n", "\r", "\n\n"])
         code = some(rng, _CODES) if rng.integers(3) == 0 else "utf-8"
         content = end.join(lines).encode(code, "replace")
-        _put(
-            file,
-            some(rng, [".csv", ".txt", ".log", ".tsv", "", ".CSV"]),
-            lambda out, content=content: out.write(content),
-        )
+        suffix = some(rng, [".csv", ".txt", ".log", ".tsv", "", ".CSV"])
+        _put(file, suffix, lambda out, content=content: out.write(content))
 
 
 def _names(runs: Path, rng: np.random.Generator) -> None:

@@ -114,11 +114,7 @@ def test_odd_signals_are_diagnosed(changes, tmp_path, no_experiment):
 @pytest.mark.parametrize(
     ("changes", "seconds", "message"),
     [
-        (
-            {"torque": np.zeros_like, "power": nothing},
-            6.0,
-            "run_0.csv: the torque of joint_1, by column tau_joint_1 or",
-        ),
+        ({"torque": np.zeros_like, "power": nothing}, 6.0, "run_0.csv: the torque of joint_1, by column tau_joint_1"),
         ({"torque": lambda t: t * [1, 0], "power": nothing}, 6.0, "run_0.csv: the torque of joint_2, by column"),
         ({"power": lambda power: np.full_like(power, 80.0)}, 6.0, "run_0.csv: column power does not change"),
         ({"power": nothing}, 0.2, "the observed runs last 0.19 s together, too short to tell a gap from none"),

@@ -105,11 +105,8 @@ def test_a_run_of_no_age(folder, year):
 
 def test_files_that_lead_nowhere(folder):
     (folder / "round.csv").symlink_to(folder / "round.csv")
-    for name, message in (
-        ("round.csv", "no such file|usable path"),
-        ("x" * 5000, "usable path"),
-        ("runs", "no such file"),
-    ):
+    said = {"round.csv": "no such file|usable path", "x" * 5000: "usable path", "runs": "no such file"}
+    for name, message in said.items():
         rewrite(folder, "^file.*$", f'file = "{name}"')
         assert re.search(message, refused(folder))
 

@@ -241,7 +241,7 @@ def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
         (
             "payload_mass",
             "pieces = 0\npayload_mass",
-            r"\[\[run\]\] 1 pieces should be a whole number of 1 or more, not 0",
+            r"\[run\]\] 1 pieces should be a whole number of 1 or more, not 0",
         ),
         ("payload_mass", "cycles = 2.5\npayload_mass", r"\[\[run\]\] 1 cycles should be a whole number .*, not 2.5"),
         ("payload_mass", "product = 12\npayload_mass", r"\[\[run\]\] 1 product should be"),

@@ -21,16 +21,7 @@ ROBOT = arm(3)
 MOTION = measure(ROBOT, swing(ROBOT, 1), noise=0.3)
 # from currents: the robot then carries torque constants that its URDF lacks
 TWIN = identify(ROBOT, [replace(MOTION, torque=None)], ("rigid_body", "copper_loss", "torque_offset"))
-KEPT = (
-    "effects",
-    "parameters",
-    "base_parameters",
-    "cutoff",
-    "unidentified",
-    "condition_number",
-    "fitted",
-    "body_change",
-)
+KEPT = ("effects", "parameters", "base_parameters", "cutoff", "unidentified", "condition_number", "fitted")
 MORE = {
     "odd_stretches": (OddStretch(run="run", start=1.0, stop=2.5, joints=("joint_2",)),),
     "torque_scale": FittedTorqueScale(0.1, "assumed", 0.95, 1.05, "torque of drives comes from nominal constants"),
