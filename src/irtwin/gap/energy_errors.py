@@ -30,7 +30,8 @@ class EnergyErrors:
     def change(self) -> Change:
         """The change, with its 95 % interval over groups."""
         before, after = self.mean
-        half = half_width(after, self.after, np.ones(len(self.after)))
+        ones = np.ones(len(self.after))
+        half = half_width(after, self.after, ones, ones)
         ends = max(after - half, 0.0), after + half
         return Change(before=before, after=after, noise_floor=None, interval95_after=ends)
 

@@ -240,7 +240,7 @@ def _change(finding: ChannelFinding) -> document.Change:
     judged = finding.held_out
     squares, rows = judged.after.sum(axis=1), judged.rows.sum(axis=1)
     after = float(squares.sum() / rows.sum())
-    half = half_width(after, squares, rows)
+    half = half_width(after, squares, rows, rows)
     return document.Change(
         before=float(np.sqrt(judged.before.sum() / rows.sum())),
         after=float(np.sqrt(after)),

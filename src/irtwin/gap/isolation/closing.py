@@ -66,7 +66,7 @@ def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]]) -> tuple[float,
     """
     each = [_above_floor(one.before - one.after, one, floor) for one, floor in parts]
     closed, above = (np.concatenate(own) for own in zip(*each, strict=True))
-    return share(closed, above) if above.sum() > 0 else None
+    return _ratio(closed, above, above)
 
 
 def _above_floor(closed: np.ndarray, held_out: HeldOut, floor: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -81,24 +81,31 @@ def _above_floor(closed: np.ndarray, held_out: HeldOut, floor: np.ndarray | None
 
 
 def share(part: np.ndarray, whole: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Return which share of the whole a part is, each a sum over groups (G,), at most 1, with its 95 % interval."""
+    """Return which share of the whole a part is, each a sum over groups (G,), at most 1, with its 95 % interval.
+
+    For it groups are alike: one that is most of the whole, as of a contact in one run, does not unsay what it shows.
+    """
+    return _ratio(part, whole, np.ones(len(whole))) or (0.0, (0.0, 0.0))
+
+
+def _ratio(part: np.ndarray, whole: np.ndarray, own: np.ndarray) -> tuple[float, tuple[float, float]] | None:
+    """Return the ratio of two sums over groups (G,), at most 1, with its interval by `half_width`; None of no whole."""
     if whole.sum() <= 0:
-        return 0.0, (0.0, 0.0)
+        return None
     value = min(float(part.sum() / whole.sum()), 1.0)
-    half = half_width(value, part, whole)
+    half = half_width(value, part, whole, own)
     return value, (value - half, min(value + half, 1.0))
 
 
-def half_width(value: float, part: np.ndarray, whole: np.ndarray) -> float:
+def half_width(value: float, part: np.ndarray, whole: np.ndarray, own: np.ndarray) -> float:
     """Return half of the 95 % interval of a ratio of two sums over groups (G,), 0 where there is one group.
 
     It is Student's, linearised: groups are few, and of groups drawn anew some sets have no whole. What a group misses
-    counts as if the ratio had been found without it (MacKinnon and White 1985).
+    counts as if the ratio had been found without it, by its `own` weight (MacKinnon and White 1985).
     """
     groups = len(whole)
     if groups < 2:
         return 0.0
-    own = np.clip(whole / whole.sum(), 0.0, _MOST)
-    missed = (part - value * whole) / (1 - own)
+    missed = (part - value * whole) / (1 - np.clip(own / own.sum(), 0.0, _MOST))
     error = float(np.sqrt(np.sum(missed**2) * (groups - 1) / groups) / whole.sum())
     return float(scipy.special.stdtrit(groups - 1, 0.975)) * error
