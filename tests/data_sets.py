@@ -59,10 +59,15 @@ def irtwin_refuses(*arguments: object) -> Said:
 
 
 def refused(*arguments: object) -> str:
-    """Call the command line, which refuses and prints nothing else; return the one line that it says."""
+    """Call the command line, which refuses and prints nothing else; return what it says of the mistake."""
     said = irtwin_refuses(*arguments)
-    assert said.out == "", said
-    (line,) = said.err.splitlines()
+    assert (said.out, "Traceback" in said.err) == ("", False), said
+    return said.err
+
+
+def refused_in_a_line(*arguments: object) -> str:
+    """Call the command line, which refuses, and return the one line that it says."""
+    (line,) = refused(*arguments).splitlines()
     return line
 
 

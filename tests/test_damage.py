@@ -24,7 +24,7 @@ from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
 from irtwin.storage.journal import Header, Journal
 from irtwin.storage.schema import LIVE, Base
-from tests.data_sets import irtwin, refused
+from tests.data_sets import irtwin, refused_in_a_line
 from tests.mapped import MAPPINGS
 from tests.small_robots import data_set
 from tests.trusting import trust_all
@@ -83,7 +83,7 @@ def asked(workspace: Path, question: str) -> str:
 
 
 def one_line(workspace: Path, *arguments: object) -> str:
-    return refused(*arguments, "--workspace", workspace)
+    return refused_in_a_line(*arguments, "--workspace", workspace)
 
 
 def tables(workspace: Path) -> list[Path]:

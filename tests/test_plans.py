@@ -27,7 +27,7 @@ from irtwin.storage import schema
 from irtwin.storage.database import Workspace
 from irtwin.storage.staging import staged
 from tests import data_sets
-from tests.data_sets import Said, irtwin, refused
+from tests.data_sets import Said, irtwin, refused_in_a_line
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 pytestmark = pytest.mark.slow
@@ -160,23 +160,23 @@ def test_the_graph_conforms_and_the_page_shows_both(performed: Path) -> None:
 def test_bad_plans_are_told_and_nothing_is_kept(performed: Path, tmp_path: Path) -> None:
     before = list(asking.ask("planned_runs", performed))
     here = ("--workspace", performed)
-    assert 'no robot "arm_3" here; the nearest is "arm_2"' in refused("plan", "arm_3", *GOAL, *here)
-    taken = refused("plan", "arm_2", *GOAL, *here, "--run", "Reach")
+    assert 'no robot "arm_3" here; the nearest is "arm_2"' in refused_in_a_line("plan", "arm_3", *GOAL, *here)
+    taken = refused_in_a_line("plan", "arm_2", *GOAL, *here, "--run", "Reach")
     assert taken.endswith('the robot has a run "reach" already; choose another name')
-    assert "outside its limits" in refused("plan", "arm_2", "--from", "0,0", "--to", "3,0", *here)
-    assert "give 2 joint positions" in refused("plan", "arm_2", "--from", "0,0,0", "--to", "1,0,0", *here)
+    assert "outside its limits" in refused_in_a_line("plan", "arm_2", "--from", "0,0", "--to", "3,0", *here)
+    assert "give 2 joint positions" in refused_in_a_line("plan", "arm_2", "--from", "0,0,0", "--to", "1,0,0", *here)
     other, file, out = swing(arm(3), 1, seconds=2.0), tmp_path / "other.csv", tmp_path / "torn.parquet"
     predict = ("predict", "arm_2", file)
     file.write_text(csv_text(Signals(other.time, other.q), ("joint_1", "joint_2", "joint_3")))
-    assert 'no moving joint "joint_3"' in refused(*predict, *here)
+    assert 'no moving joint "joint_3"' in refused_in_a_line(*predict, *here)
     file.write_text(csv_text(Signals(other.time / 8, other.q[:, :2]), ROBOT.joint_names))
-    assert "above its limit" in refused(*predict, *here)
+    assert "above its limit" in refused_in_a_line(*predict, *here)
     torn = Signals(other.time, other.q[:, :2]).rows(np.flatnonzero((other.time < 0.5) | (other.time > 1.5)))
     file.write_text(csv_text(torn, ROBOT.joint_names))
-    assert "has a hole in time" in refused(*predict, *here, "--out", out)
+    assert "has a hole in time" in refused_in_a_line(*predict, *here, "--out", out)
     assert not out.exists()
-    assert "--workspace FOLDER" in refused(*predict)
-    assert "give --workspace FOLDER too" in refused(*predict, "--run", "x", "--out", tmp_path / "x")
+    assert "--workspace FOLDER" in refused_in_a_line(*predict)
+    assert "give --workspace FOLDER too" in refused_in_a_line(*predict, "--run", "x", "--out", tmp_path / "x")
     assert list(asking.ask("planned_runs", performed)) == before
 
 
@@ -188,7 +188,7 @@ def also_priced(performed: Path, tmp_path_factory: pytest.TempPathFactory) -> tu
     log = performed.parent / "logs_2" / "runs" / "done.parquet"
     live = ("live", "--replay", log, "--robot", "arm_2", "--speed", 1000, "--workspace", workspace)
     for plan, said in (("reech", 'no planned run "reech"; the nearest is "reach"'), ("done", 'no planned run "done"')):
-        assert said in refused(*live, "--performs", plan)
+        assert said in refused_in_a_line(*live, "--performs", plan)
     ended = irtwin(*live, "--performs", "reach")
     assert ended.status == 0, ended.err
     reach = performed.parent / "reach.parquet"
@@ -244,7 +244,7 @@ def test_one_run_is_dropped_and_the_others_stay(watched: Path) -> None:
         ("reach", 'carried out "reach"'),
         ("rech", 'the robot has no run "rech"; the nearest is "reach"'),
     ):
-        assert said in refused(*here, name)
+        assert said in refused_in_a_line(*here, name)
     before, files = told(watched), len(list((watched / "series").iterdir()))
     for name in ("laden", live):
         gone = irtwin(*here, name)

@@ -20,7 +20,7 @@ from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from tests import rows
-from tests.data_sets import irtwin, refused
+from tests.data_sets import irtwin, refused_in_a_line
 from tests.forks import Command
 from tests.live.opcua_robot import ServedRobot
 from tests.synthetic import arm
@@ -91,7 +91,7 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
     template.parent.mkdir(parents=True)
     template.write_text("{% if %}", encoding="utf-8")
     trust_all(workspace)
-    assert f"{template}, line 1: " in refused("live", "--workspace", workspace)
+    assert f"{template}, line 1: " in refused_in_a_line("live", "--workspace", workspace)
 
 
 def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None:
@@ -107,7 +107,7 @@ def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None
 
 def test_a_workspace_that_is_not_there(tmp_path: Path) -> None:
     for command in (["live"], ["workspace", "backup", tmp_path / "a.zip"]):
-        assert "no workspace here" in refused(*command, "--workspace", tmp_path / "none")
+        assert "no workspace here" in refused_in_a_line(*command, "--workspace", tmp_path / "none")
     assert not list(tmp_path.iterdir())
 
 
@@ -164,5 +164,5 @@ def test_options_that_do_not_go_together(tmp_path: Path, options: list[str], sai
 
 def test_a_log_of_a_robot_that_is_not_there(workspace: Path) -> None:
     replay = ("--replay", "log.csv", "--robot", "nobody")
-    assert 'no robot "nobody" here' in refused("live", "--workspace", workspace, *replay)
+    assert 'no robot "nobody" here' in refused_in_a_line("live", "--workspace", workspace, *replay)
     assert not list((workspace / "live").iterdir())

@@ -79,8 +79,8 @@ def test_a_fleet_has_one_base_of_iris(robots: Path, out: Path) -> None:
     said = [data_sets.irtwin("query", asked, "--workspace", place).out for place in places if place.is_dir()]
     assert said and all(lines.count(f"{BASE}robot/") == 2 for lines in said)
     other = f"the IRIs of this fleet begin with {BASE}; give --base {BASE}, or another --out"
-    assert other in data_sets.refused("run", robots, "--out", out)
-    assert data_sets.refused("run", robots, "--out", out, "--base", "plant").startswith("irtwin: --base: ")
+    assert other in data_sets.refused_in_a_line("run", robots, "--out", out)
+    assert data_sets.refused_in_a_line("run", robots, "--out", out, "--base", "plant").startswith("irtwin: --base: ")
 
 
 def test_status_says_what_became_of_each(out: Path) -> None:
@@ -90,7 +90,7 @@ def test_status_says_what_became_of_each(out: Path) -> None:
 
 
 def test_a_folder_is_of_one_kind(robots: Path, out: Path) -> None:
-    said = data_sets.refused("diagnose", robots, "--out", out)
+    said = data_sets.refused_in_a_line("diagnose", robots, "--out", out)
     assert "holds a fleet of `run`; give `diagnose` a folder of its own" in said
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.data_sets import irtwin, refused
+from tests.data_sets import irtwin, refused_in_a_line
 from tests.trusting import trust_all
 
 from irtwin.errors import InputError
@@ -150,7 +150,7 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     put(tmp_path / "irtwin-workspace", "rules/my_rules.ttl", NO_QUERY)
     said = "irtwin: irtwin-workspace/rules/my_rules.ttl, line 10: the rule 'long run' is no SPARQL"
-    assert refused(*command).startswith(said)
+    assert refused_in_a_line(*command).startswith(said)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_commands_stop_at_a_fault(command: list[str], tmp_path: Path, monkeypatc
 def test_live_stops_at_a_fault_before_a_sample_is_read(name: str, text: str, tmp_path: Path) -> None:
     Workspace(tmp_path).close()
     file = put(tmp_path, name, text)
-    assert refused("live", "--workspace", tmp_path).startswith(f"irtwin: {file}, line ")
+    assert refused_in_a_line("live", "--workspace", tmp_path).startswith(f"irtwin: {file}, line ")
     assert not (tmp_path / "graph").exists()
 
 
