@@ -135,7 +135,7 @@ class Posterior:
         """Return what some variants explain, (P,), in units of what is left along those that they are `like`."""
         seen = self.evidence
         rows, known = (seen.rows_that_speak * self.variance)[like], seen.of_prior[places]
-        return np.asarray((seen.explained[places] - known) / rows + known / (1 + seen.unnamed[like]))
+        return np.asarray((seen.explained[places] - known) / rows + known / (seen.disagreement + seen.unnamed)[like])
 
     @cached_property
     def _scale(self) -> np.ndarray:
