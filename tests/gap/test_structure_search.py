@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.effects.friction import FrictionTurn
-from irtwin.gap.isolation.posterior import HypothesisPrior
+from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
 from irtwin.gap.isolation.structure_search import _Search, attribute, judged
-from irtwin.gap.regression.evidence import evidence
+from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
@@ -193,6 +193,20 @@ def test_groups_that_disagree_speak_against_an_effect():
     (agreed,), mixed = odds([3.0] * 8), odds([4.0, -1.0] * 4)
     assert agreed > 5
     assert not mixed or mixed[0] < agreed / 2
+
+
+def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it():
+    """Five effects that explain the prior alone; on the last of them four groups disagree."""
+    one = np.ones((5, 1))
+    missed = np.where(np.arange(5)[:, None] == 4, [50.0, -50.0, 50.0, -50.0], 0.0)
+    term, every = Term("k", "1"), 60.0 * one[:, 0]
+    variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(5))
+    seen = HypothesisEvidence(
+        variants, every, 25.0 * np.ones((5, 4)), missed, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, every
+    )
+    named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
+    posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one[:, 0], DEFAULT.criterion)
+    assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
 
 
 def test_what_the_reference_runs_show_as_well_is_missing_and_has_not_changed():

@@ -2,9 +2,9 @@
 
 What a structure leaves along a hypothesis' columns is noise, disagreement between groups, and a misfit that no effect
 names. Its variance, a row, is `v = misfit^2 + disagreement / rows`, known as from `certainty` earlier looks; what is
-left is then Student's, and what explains it has a Gaussian prior. What is explained is squares of rows, in units of v,
-and of the prior, in units of one: `told`. The odds of k coefficients of the information `A` that miss a size s of them
-by `missed` are
+left is then Student's, and what explains it has a Gaussian prior. What is explained, `told`, is squares of rows, in
+units of v, and of the prior, in units of the disagreement. The odds of k coefficients of the information `A` that miss
+a size s of them by `missed` are
 
     prior * (1 + told / certainty) ** ((certainty + k) / 2) * exp(-missed / 2) / sqrt(det(1 + s^2 A / (rows v)))
 
@@ -126,7 +126,7 @@ class Posterior:
     def _told(self) -> np.ndarray:
         """(V,) what each variant explains, in units of what is left along its columns.
 
-        That the twin's numbers are nearer to what is known of them has no misfit.
+        That the twin's numbers are nearer to what is known of them has no misfit, but groups disagree on it.
         """
         every = np.arange(len(self.evidence.explained))
         return self._in_units_of(every, every)
