@@ -16,7 +16,7 @@ from tests.signals.test_log import ROBOT
 
 from irtwin.errors import InputError
 from irtwin.signals.samples import read_signals
-from irtwin.signals.sources import bag_file
+from irtwin.signals.sources import bag_file, bag_unpacking
 
 Q = np.column_stack([np.sin(np.arange(60) / 9.0), np.cos(np.arange(60) / 7.0)])
 
@@ -76,7 +76,7 @@ def compressed(path: Path, inflated: bytes, kind: str) -> Path:
 def test_a_chunk_that_inflates_without_bound_is_told(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bag_file, "_LARGEST_CHUNK", 1_000_000)
+    monkeypatch.setattr(bag_unpacking, "_LARGEST_CHUNK", 1_000_000)
     path = compressed(tmp_path / "run.bag", bytes(3_000_000), kind)
     assert path.stat().st_size < 20_000
     assert "(ValueError: a chunk of more than 1 MB)" in refused(path)
