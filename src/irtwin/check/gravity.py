@@ -77,7 +77,7 @@ def _load(joint: int, loads: np.ndarray, beside: np.ndarray, torque: np.ndarray)
     both = np.hstack([loads, beside])
     found = fit(both, torque)
     left, without = (np.var(torque - columns @ fit(columns, torque).coefficients) for columns in (both, beside))
-    if without == 0 or 1 - left / without < _SEEN:
+    if without <= np.finfo(float).eps * np.mean(torque**2) or 1 - left / without < _SEEN:
         return None
     a, b = found.coefficients[:2]
     slope = np.array([-b, a]) / (a**2 + b**2)
