@@ -7,8 +7,10 @@ would take half a minute. What is not asked for is not there.
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -78,8 +80,10 @@ def link(package: Distribution, site: Path) -> None:
 
 @pytest.fixture(scope="module")
 def away(program: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder far from the checkout, with the demo's workspace."""
+    """A folder far from the checkout, with a log and the demo's workspace."""
     folder = tmp_path_factory.mktemp("away")
+    rows = [f"{t / 100},{math.sin(t / 50)},{math.sin(t / 30)},{t % 7}" for t in range(1000)]
+    (folder / "my_log.csv").write_text("\n".join(["t,q_joint_1,q_joint_2,tau_joint_1", *rows]))
     done = irtwin(program, "demo", folder=folder)
     assert done.returncode == 0, done.stderr
     return folder
@@ -107,6 +111,25 @@ def test_the_wheel_holds_what_the_source_does(wheel: Path) -> None:
     assert not any(name.startswith(("tests", "bench", "docs")) for name in inside)
 
 
+def first_commands() -> list[list[str]]:
+    """What the README tells a newcomer to type once the wheel is installed."""
+    (block, *_) = re.findall(r"```sh\n(.*?)```", (SOURCE / "README.md").read_text(encoding="utf-8"), re.S)
+    lines = [shlex.split(line, comments=True) for line in block.splitlines()]
+    return [line[1:] for line in lines if line[0] == "irtwin"]
+
+
+def test_the_readmes_commands_run_as_written(program: Path, away: Path) -> None:
+    demo, *others = first_commands()
+    assert demo == ["demo"]
+    page = (away / "irtwin-workspace/reports/KUKA_KR6_R700.html").read_text(encoding="utf-8")
+    assert 'class="irtwin-scene"' in page
+    assert "concluded by SHACL rules" in page
+    assert (away / "irtwin-workspace/kuka_kr6_r700/simulator.xml").is_file()
+    for arguments in others:
+        done = irtwin(program, *arguments, folder=away)
+        assert (done.returncode, done.stderr) == (0, ""), arguments
+
+
 def test_the_guide_is_in_the_wheel(program: Path, tmp_path: Path) -> None:
     told = irtwin(program, "docs", folder=tmp_path)
     page = program.parents[1] / SITE / "irtwin/guide/index.html"
@@ -121,14 +144,6 @@ def test_the_package_is_the_wheels(program: Path, tmp_path: Path) -> None:
     said = subprocess.run(command, cwd=tmp_path, env=bare(tmp_path), capture_output=True, text=True, check=True).stdout
     assert said.startswith(str(program.parents[1]))
     assert "[None, None]" in said
-
-
-@pytest.mark.nightly
-def test_the_demo_makes_its_report(away: Path) -> None:
-    page = (away / "irtwin-workspace/reports/KUKA_KR6_R700.html").read_text(encoding="utf-8")
-    assert 'class="irtwin-scene"' in page
-    assert "concluded by SHACL rules" in page
-    assert (away / "irtwin-workspace/kuka_kr6_r700/simulator.xml").is_file()
 
 
 @pytest.mark.nightly
