@@ -82,7 +82,7 @@ def of_rest(left: Sequence[np.ndarray]) -> float:
 
     That is what is left of their mean: each pose stands for itself, and is off by what dry friction holds there.
     """
-    rows = np.array([len(one) for one in left], dtype=float)
+    rows = np.array([len(samples) for samples in left], dtype=float)
     return of_pauses(left) * math.sqrt((rows**2).sum()) / max(float(rows.sum()), 1.0)
 
 
