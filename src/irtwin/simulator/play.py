@@ -68,11 +68,8 @@ class PlayedStretch:
 
     @property
     def speed(self) -> np.ndarray:
-        """The robot's speeds (N, n), over 0.1 s."""
-        apart = max(1, round(_AROUND / 2 / interval(self.time)))
-        rows = np.arange(len(self.time))
-        before, after = np.maximum(rows - apart, 0), np.minimum(rows + apart, len(rows) - 1)
-        return np.asarray((self.q[after] - self.q[before]) / (self.time[after] - self.time[before])[:, None])
+        """The robot's speeds (N, n)."""
+        return speeds(self.time, self.q)
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and speed (n,) of the robot where it begins."""
@@ -116,6 +113,14 @@ class PlayedStretch:
             at = self.begin + begin - numbers[NAMES.index("delay"), k]
             commands[:, k] = (np.interp(at + step, ends, summed[:, k]) - np.interp(at, ends, summed[:, k])) / step
         return np.asarray(commands + numbers[NAMES.index("offset")])
+
+
+def speeds(time: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the speeds (N, n) of positions (N, n) at times (N,), s, over 0.1 s."""
+    apart = max(1, round(_AROUND / 2 / interval(time)))
+    rows = np.arange(len(time))
+    before, after = np.maximum(rows - apart, 0), np.minimum(rows + apart, len(rows) - 1)
+    return np.asarray((q[after] - q[before]) / (time[after] - time[before])[:, None])
 
 
 def whole(run: Run, pushes: tuple[Push, ...] = ()) -> PlayedStretch:

@@ -10,11 +10,12 @@ from math import factorial
 import numpy as np
 
 from irtwin.identification.progress import track
+from irtwin.identification.validation import energy, energy_error
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
 from irtwin.simulator.choice import DifferingNumbers
-from irtwin.simulator.play import PlayedStretch, Push, each, play, whole
+from irtwin.simulator.play import PlayedStretch, Push, each, play, speeds, whole
 from irtwin.simulator.servos import NAMES, Servos, part_of
 
 _FOLDS = 3
@@ -30,10 +31,12 @@ OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
 class Tracked:
     """A run played as a whole: the tracking error's mean `squares` (c, n), rad^2 and N^2 m^2.
 
-    At some times (P,), s: positions of robot and model (P, n), and how far apart they have the flange, `off` (P,) m.
+    energy_error: %, of the work that joints do on the arm; None where no torque was logged. At some times (P,), s:
+    positions of robot and model (P, n), and how far apart they have the flange, `off` (P,) m.
     """
 
     squares: np.ndarray
+    energy_error: float | None
     time: np.ndarray
     robot: np.ndarray
     model: np.ndarray
@@ -106,13 +109,22 @@ def tracked(
     tracks = []
     for run in track(runs, lambda run: f"playing {run.name}"):
         every = whole(run, pushes)
-        left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
+        measured, played = every.measured, play(own, [numbers[run.name]], [every])[0][0]
+        left = measured - played
         some = slice(None, None, max(1, len(left) // _POSES))
         poses = every.q[some], (every.q - left[:, 0])[some]
         places = [placements(robot, q)[:, :3, 3] for q in poses]
         off = np.linalg.norm(places[0] - places[1], axis=1)
-        tracks.append(Tracked((left**2).mean(axis=0), run.signals.time[some], *poses, off))
+        works = [work(every.time, done) for done in (measured, played)] if measured.shape[1] > 1 else None
+        error = None if works is None else energy_error(*works)
+        tracks.append(Tracked((left**2).mean(axis=0), error, run.signals.time[some], *poses, off))
     return tracks
+
+
+def work(time: np.ndarray, done: np.ndarray) -> float:
+    """Return the work (J) that joints do, of positions and torques (N, 2, n): what they take back feeds no other."""
+    power = done[:, 1] * speeds(time, done[:, 0])
+    return energy(time, np.maximum(power, 0.0).sum(axis=1))
 
 
 def restarted(

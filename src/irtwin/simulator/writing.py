@@ -15,6 +15,7 @@ from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.compliance import JointElasticity
 from irtwin.effects.load import CableDrag, ExternalContact
+from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.closing import share
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
@@ -95,11 +96,12 @@ def document(
     places, torques = [side[:, 0] for side in squares], [side[:, 1:] for side in squares]
     closed, interval = share((places[0] - places[1]).sum(axis=1), places[0].sum(axis=1))
     verdict = _verdict(named, closed, *map(_rms, places))
+    energies = _energies(before, after)
     return said.Document(
         verdict=verdict,
         robot=robot.name,
         gap=said.Gap(
-            energy_error_percent=None,
+            energy_error_percent=energies.mean[0] if energies else None,
             torque=_sizes(robot, torques[0][:, 0]) if torques[0].size else None,
             position=_sizes(robot, places[0]),
         ),
@@ -112,7 +114,7 @@ def document(
             noise_floor_from=None,
             torque_rmse=together(*(torque[:, 0] for torque in torques)) if torques[0].size else None,
             power_rmse=None,
-            energy_error_percent=None,
+            energy_error_percent=energies.change if energies else None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
             position_rmse=together(*places),
@@ -125,6 +127,11 @@ def document(
             for at, error_before, error_after in horizons
         ),
     )
+
+
+def _energies(before: Sequence[Tracked], after: Sequence[Tracked]) -> EnergyErrors | None:
+    errors = [np.array([run.energy_error for run in side if run.energy_error is not None]) for side in (before, after)]
+    return EnergyErrors(*errors) if errors[0].size else None
 
 
 def _sizes(robot: Robot, squares: np.ndarray) -> Mapping[str, said.Size]:
