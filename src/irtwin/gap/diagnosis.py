@@ -108,12 +108,12 @@ class Diagnosis:
         unknown_is_there = self.left_open in (MUCH_IS_LEFT, IMPOSSIBLE_NUMBER)
         doubted = set(ids) if unknown_is_there else writing.closing_nothing(findings)
         written = tuple(
-            writing.doubted(one, self.thresholds.criterion) if one.id in doubted else one for one in written
+            writing.doubted(cause, self.thresholds.criterion) if cause.id in doubted else cause for cause in written
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
         if self.simulator is not None:
             alone = alone_in_file(self.causes, self.scale)
-            written = tuple(beside(self.simulator, one, alone) for one in written)
+            written = tuple(beside(self.simulator, cause, alone) for cause in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
         findings = apart.findings(findings, causes, self.thresholds.matters)
@@ -202,7 +202,7 @@ def diagnose(
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)
     energies: EnergyErrors | None = None
-    causes = [cause for one in explained for cause in one.finding.causes]
+    causes = [cause for channel in explained for cause in channel.finding.causes]
     twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
@@ -210,7 +210,7 @@ def diagnose(
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
-    findings = [one.finding for one in explained]
+    findings = [channel.finding for channel in explained]
     tell("Identifying the twin with its causes")
     if len(every := [cause for finding in findings for cause in finding.causes]) > len(causes):
         twin_with_causes.drop()
@@ -219,21 +219,24 @@ def diagnose(
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
-        one
-        for one in catalogue().values()
-        if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
+        effect
+        for effect in catalogue().values()
+        if effect.id not in blamed and not effect.disturbance and not isinstance(effect, screened)
     ]
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
-    left = [channel_residual(case, one, twin_torque if one is torque else torque or twin_torque) for one in explained]
+    left = [
+        channel_residual(case, channel, twin_torque if channel is torque else torque or twin_torque)
+        for channel in explained
+    ]
     open_because = left_open(
         findings,
         thresholds,
         unmatched=refusals.unmatched,
         alike=case.alike,
         differing=differ,
-        explained=[one.disturbance for one in taken],
+        explained=[removal.disturbance for removal in taken],
     )
     located = places(
         left, seed, most_left(findings, thresholds, alike=case.alike) if open_because == MUCH_IS_LEFT else None
@@ -244,7 +247,7 @@ def diagnose(
     proposal = next_experiment(
         case.robot,
         [(finding, equations[finding.name]) for finding in findings],
-        [one.effect for one in lacking],
+        [untestable.effect for untestable in lacking],
         case.seen,
         thresholds,
     )

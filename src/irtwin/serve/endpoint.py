@@ -179,7 +179,7 @@ async def _send(answer: Reply, head: AnswerHead, request: Request, send: Send) -
     if head.etag is not None:
         headers["ETag"] = head.etag
     encoded = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
-    known = {one.strip() for one in request.headers.get("if-none-match", "").split(",")}
+    known = {tag.strip() for tag in request.headers.get("if-none-match", "").split(",")}
     is_known = head.etag in known and request.method != "POST"
     await send({"type": "http.response.start", "status": 304 if is_known else 200, "headers": encoded})
     async for piece in answer.pieces():

@@ -74,13 +74,13 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
         if row is None:
             continue
         now = written(getattr(row, fact.column.name))
-        what = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
+        cell = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
         by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
         if now == fact.replaced:
             setattr(row, fact.column.name, value_of(fact.column, fact.value))
-            values[str(fact.place), _key(fact)] = f"{what}: {fact.value}, as {by}; the data set says {fact.replaced}"
+            values[str(fact.place), _key(fact)] = f"{cell}: {fact.value}, as {by}; the data set says {fact.replaced}"
         elif now != fact.value:
-            values[str(fact.place), _key(fact)] = f"{what}: the data set says {now} now; what {by} no longer holds"
+            values[str(fact.place), _key(fact)] = f"{cell}: the data set says {now} now; what {by} no longer holds"
     return list(values.values())
 
 
@@ -112,7 +112,7 @@ def keep(session: Session, facts: Sequence[AssertedFact], withdrawn: Iterable[st
 def row_of(session: Session, fact: AssertedFact) -> Base | None:
     """Return the row that a fact is about; None where there is none."""
     key = json.loads(str(fact.row_key))
-    mapper = next(one for one in Base.registry.mappers if one.local_table is fact.table)
+    mapper = next(candidate for candidate in Base.registry.mappers if candidate.local_table is fact.table)
     ident = tuple(value_of(column, key[column.name]) for column in fact.table.primary_key)
     return session.get(mapper.class_, ident)
 

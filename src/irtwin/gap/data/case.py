@@ -65,10 +65,10 @@ class Case:
     def modelled(self) -> frozenset[tuple[str, str | None]]:
         """Each effect that the twin has, with each joint at which it has it; None: of the whole robot, or known."""
         modelled = set()
-        for one in self.stack.effects:
-            terms = one.terms(self.robot)
+        for effect in self.stack.effects:
+            terms = effect.terms(self.robot)
             known = all(term.fixed for term in terms)  # as a candidate, it has one coefficient for all
-            modelled |= {(one.id, None if known else place_of(term)) for term in terms}
+            modelled |= {(effect.id, None if known else place_of(term)) for term in terms}
         return frozenset(modelled)
 
     @property
@@ -121,7 +121,7 @@ class Case:
     @property
     def measured(self) -> list[Motion]:
         """The motions whose torque is known or whose power was measured."""
-        return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
+        return [motion for motion in self.motions.values() if motion.torque is not None or motion.power is not None]
 
     @cached_property
     def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
@@ -164,11 +164,11 @@ class Case:
             if motions:
                 turned, _ = with_friction_near_zero(self.robot, motions, effects)
                 both = zip(robot.joints, turned.joints, strict=True)
-                robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
+                robot = replace(robot, joints=tuple(_turned(own, joint) for own, joint in both))
         if self.turning:
             turned, _ = with_friction_near_zero(self.robot, self.with_torque, effects, self.turning)
             both = zip(robot.joints, turned.joints, strict=True)
-            robot = replace(robot, joints=tuple(one if one.name in self.turning else own for own, one in both))
+            robot = replace(robot, joints=tuple(joint if joint.name in self.turning else own for own, joint in both))
         return replace(self, robot=robot)
 
     @property
@@ -179,8 +179,8 @@ class Case:
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
         motions = {run: _earlier(motion, lag) for run, motion in self.motions.items()}
-        said = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
-        cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {said}")
+        reason = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
+        cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {reason}")
         return replace(self, motions=motions, cutoff=cutoff)
 
     def shows(self, signal: str) -> bool:

@@ -64,8 +64,8 @@ def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]]) -> tuple[float,
 
     parts: each channel's groups and noise floor (g,). None without a gap.
     """
-    each = [_above_floor(one.before - one.after, one, floor) for one, floor in parts]
-    closed, above = (np.concatenate(own) for own in zip(*each, strict=True))
+    by_channel = [_above_floor(groups.before - groups.after, groups, floor) for groups, floor in parts]
+    closed, above = (np.concatenate(own) for own in zip(*by_channel, strict=True))
     return _ratio(closed, above, above)
 
 

@@ -76,8 +76,8 @@ def read(
     now = datetime.now(UTC)
     for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
         gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
-        said = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
-        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **said)
+        common = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
+        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **common)
         cell = _cell(graph, subject, predicate)
         if cell is not None:
             _fill(assertion, graph, session, cell, (subject, predicate), new, fact)
@@ -150,16 +150,16 @@ def _fill(
     cell: _Cell,
     about: tuple[NamedNode, NamedNode],
     new: set[Quad],
-    said: Callable[..., AssertedFact],
+    make_fact: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
-    what = say(about, graph.base)
+    statement = say(about, graph.base)
     if len({quad.object for quad in new}) > 1:
-        raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
+        raise InputError(f"{statement}: has one value, not {len(new)}; nothing changed")
     value = next(iter(new)).object if new else None
-    fact = said(
+    fact = make_fact(
         fact_id=secrets.token_hex(12),
-        value=_text(cell.column, value, what),
+        value=_text(cell.column, value, statement),
         kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
         graph=cell.graph.value,
         place=f"{cell.column.table.name}.{cell.column.name}",
@@ -167,13 +167,13 @@ def _fill(
     )
     row = row_of(session, fact)
     if row is None:
-        raise InputError(f"{what}: the database has no such {cell.column.table.name}; nothing changed")
+        raise InputError(f"{statement}: the database has no such {cell.column.table.name}; nothing changed")
     if fact.value is None and not cell.column.nullable:
-        raise InputError(f"{what}: needs a value; say another one in the same update; nothing changed")
+        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
     try:
         check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
     except ValueError as error:
-        raise InputError(f"{what}: {error}; nothing changed") from None
+        raise InputError(f"{statement}: {error}; nothing changed") from None
     fact.replaced = written(getattr(row, cell.column.name))
     if fact.value == fact.replaced:
         return
@@ -183,18 +183,18 @@ def _fill(
         assertion.added.add(quad_of(fact))
 
 
-def _text(column: Column[Any], value: object, what: str) -> str | None:
+def _text(column: Column[Any], value: object, statement: str) -> str | None:
     """Return a value as facts write it, in the column's own form. InputError where the column can hold no such."""
     if value is None:
         return None
     is_number = column.type.python_type is not str
     datatype = value.datatype.value if isinstance(value, Literal) else ""
     if not isinstance(value, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
-        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
+        raise InputError(f"{statement}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
     try:
         return written(value_of(column, value.value))
     except ValueError:
-        raise InputError(f"{what}: cannot be {value.value!r}; nothing changed") from None
+        raise InputError(f"{statement}: cannot be {value.value!r}; nothing changed") from None
 
 
 def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
@@ -210,7 +210,7 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
     ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
     name = getattr(quad.graph_name, "value", "")
     if not ids and name.startswith(GRAPH):
-        why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
+        why = next((reason for below, reason in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
         raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
     assertion.withdrawn += ids
     assertion.removed.add(quad)
@@ -218,12 +218,12 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     """Raise InputError where a statement is one that irtwin makes itself."""
-    what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
+    statement, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+        raise InputError(f"{statement}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
     if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
-            f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
+            f"{statement}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )
 
 

@@ -29,8 +29,8 @@ def premises(graph: KnowledgeGraph, rule: Rule, conclusion: Triple) -> tuple[Tri
         bound = _unified(pattern, conclusion)
         if bound is not None:
             for known in _matches(graph, rule, bound):
-                found = dict.fromkeys(_instances(query.p, known))
-                return tuple(triple for triple in found if triple != conclusion and graph.holds(triple))
+                instances = dict.fromkeys(_instances(query.p, known))
+                return tuple(triple for triple in instances if triple != conclusion and graph.holds(triple))
     return None
 
 
@@ -56,8 +56,8 @@ def _instances(algebra: Any, known: _Bound) -> Iterator[Triple]:
             yield Triple(*terms)  # type: ignore[arg-type]
     for name, part in algebra.items():
         if name != "expr":
-            for each in part if isinstance(part, list) else [part]:
-                yield from _instances(each, known)
+            for inner in part if isinstance(part, list) else [part]:
+                yield from _instances(inner, known)
 
 
 def _unified(pattern: tuple[Any, Any, Any], triple: Triple) -> _Bound | None:

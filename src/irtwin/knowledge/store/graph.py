@@ -255,7 +255,7 @@ class KnowledgeGraph:
         PREFIX. InputError where the text is no such query, asks another server, or has too many answers.
         """
         given = (bindings or {}).items()
-        text = bound(text, {name: self.iri(one) if isinstance(one, str) else one for name, one in given})
+        text = bound(text, {name: self.iri(value) if isinstance(value, str) else value for name, value in given})
         answers = self.answers
         kept = answers.get(text)
         if kept is None:
