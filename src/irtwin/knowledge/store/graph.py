@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -280,15 +280,16 @@ class KnowledgeGraph:
         named_graphs: Sequence[str] = (),
         faults: dict[str, None] | None = None,
         base: str | None = None,
+        services: Collection[str] = (),
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
-        """Answer a query row by row as they are found; InputError where it is none or asks another server.
+        """Answer a query row by row as they are found; InputError where it is none or asks a server not of `services`.
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
         `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`,
         else below the graph's.
         """
         base = base or self.base
-        refuse_service(text, base, self.store.embedded is None)
+        refuse_service(text, base, self.store.embedded is None, services)
         whole = not (default_graphs or named_graphs)
         try:
             return self.store.query(
