@@ -23,8 +23,8 @@ OtherNumber = tuple[str, str | None, float, float, str]
 class ToldFinding:
     """A finding as it is told: `members`, for each of its causes, the cause and what the data cannot tell from it.
 
-    against: what it is held against: "twin", "reference" or "simulated" runs, or "both" of these. share, interval: of
-    its channel's gap that closes, `of` what it is a share.
+    against: what it is held against: "twin", "reference" or "simulated" runs. share, interval: of its channel's gap
+    that closes, `of` what it is a share.
     """
 
     family: str
@@ -91,7 +91,6 @@ _CLAIMS = {
     "twin": "differs from the twin’s",
     "reference": "changed since the reference runs",
     "simulated": "differs from the simulator’s",
-    "both": "changed since the reference runs, and differs from the simulator’s",
 }
 
 

@@ -79,9 +79,7 @@ def _finding(row: Row, answers: Answers) -> ToldFinding:
 
 def _against(diagnosis: Row) -> str:
     """Return which runs lack what changed: simulated runs never had it, reference runs did not have it yet."""
-    if not diagnosis["against_simulator"]:
-        return "reference"
-    return "both" if diagnosis["referenced"] else "simulated"
+    return "simulated" if diagnosis["against_simulator"] else "reference"
 
 
 def where(channel: str, joint: str | None, regime: str | None = None, share: float = 0.0) -> str:
