@@ -69,6 +69,22 @@ def test_equal_logs_of_simulator_and_robot_show_no_gap(tmp_path, noise):
     assert (document["verdict"], document["causes"]) == ("no_gap", [])
 
 
+def test_damping_that_differs_from_the_simulators_logs_has_both_numbers(tmp_path):
+    made, true = [], truth(DRAWN)
+    for seed in range(3):
+        motion = swing(DRAWN, seed, seconds=5.0)
+        torque = rigid_torque(DRAWN, motion) + true["Ia"] * motion.ddq + true["Fc"] * np.sign(motion.dq)
+        for role, damping in {"simulated": 20.0, "observed": 40.0}.items():
+            seen = replace(motion, torque=torque + damping * motion.dq * (np.arange(4) == 2), run=f"{role}_{seed}")
+            made.append(replace(as_run(seen), role=role))
+    said = irtwin_does("diagnose", write(tmp_path / "data", DRAWN, made), "--json", tmp_path / "out.json")
+    (cause,) = json.loads((tmp_path / "out.json").read_text())["causes"]
+    (damping,) = cause["parameters"]
+    assert (cause["effect"], cause["joints"]) == ("viscous_friction", ["joint_3"])
+    assert [damping[key] for key in ("simulator", "robot", "value")] == pytest.approx([20.0, 40.0, 20.0], rel=0.05)
+    assert "damping (Fv) of joint_3 40.0 N m s/rad in place of 20.0" in said.out
+
+
 @pytest.mark.nightly
 def test_a_simulator_without_friction_lacks_all_of_it(tmp_path):
     _, causes = diagnosed(tmp_path, lambda motion: 0.0, friction=0.0)

@@ -118,7 +118,7 @@ def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
 
 
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
-    rows = summary.causes(gap_cases.document("attributed")).rows
+    rows = summary.causes(gap_cases.document("attributed"), "reference").rows
     assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [
         ("viscous friction", "joint_a3", 70),
         ("stribeck friction", "joint_a3", 96),
@@ -129,19 +129,24 @@ def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     assert rows[1] == {**dict.fromkeys(rows[1]), "parameter": "d", "value": 1.0, "unit": ""}
 
 
+def test_a_value_is_a_change_beside_logs_of_a_simulator():
+    row = summary.causes(gap_cases.document("attributed"), "simulated").rows[0]
+    assert (row["simulator"], row["robot"], row["change"]) == (None, None, 1.82)
+
+
 def test_a_guess_is_called_one_and_what_closes_little_is_not_listed():
     said = gap_cases.diagnosis("attributed")
     said["causes"][0]["confidence"] = 0.3
-    rows = summary.causes(Document.from_json(said)).rows
+    rows = summary.causes(Document.from_json(said), "reference").rows
     assert [row["cause"] for row in rows if row["cause"]] == ["perhaps viscous friction", "stribeck friction"]
     for finding in said["findings"]:
         finding["matters"] = False
-    assert not summary.causes(Document.from_json(said))
+    assert not summary.causes(Document.from_json(said), "reference")
 
 
 @pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])
 def test_where_nothing_is_to_blame_nothing_is_tabled_or_explained(verdict):
-    assert not summary.causes(gap_cases.document(verdict))
+    assert not summary.causes(gap_cases.document(verdict), "reference")
     assert summary.meanings(gap_cases.document(verdict)) == []
 
 

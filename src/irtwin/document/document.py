@@ -114,8 +114,7 @@ class GapLocation:
 class CauseParameter:
     """A parameter of a cause, in its `unit`; joint None: of the whole robot.
 
-    Where a simulator's model has the number, `simulator` is its, `robot` the robot's, and `value` how far these are
-    apart.
+    Where a simulator has the number, `simulator` is its, `robot` the robot's, and `value` how far these are apart.
     """
 
     name: str = told("Cause_Parameter_Name")

@@ -13,7 +13,7 @@ from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
-from irtwin.gap.beside_file import Simulator, alone_in_file, beside
+from irtwin.gap.beside_file import Simulator, alone_in_file, beside, of_simulated_runs
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
@@ -111,9 +111,10 @@ class Diagnosis:
             writing.doubted(cause, self.thresholds.criterion) if cause.id in doubted else cause for cause in written
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
-        if self.simulator is not None:
-            alone = alone_in_file(self.causes, self.scale)
-            written = tuple(beside(self.simulator, cause, alone) for cause in written)
+        if self.against == "simulated":
+            numbers = of_simulated_runs(self.channels) if self.simulator is None else self.simulator.numbers
+            alone = {} if self.simulator is None else alone_in_file(self.causes, self.scale)
+            written = tuple(beside(numbers, cause, alone) for cause in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
         findings = apart.findings(findings, causes, self.thresholds.matters)

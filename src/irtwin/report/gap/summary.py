@@ -142,13 +142,13 @@ def _differing_friction(diagnosis: Document) -> list[str]:
     return [f"Friction differs from run to run, {listed(told)} (one standard deviation): noise."] if told else []
 
 
-def causes(diagnosis: Document) -> AnswerTable:
+def causes(diagnosis: Document, against: str | None) -> AnswerTable:
     """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals.
 
-    Beside a simulator's model the value is the change from its number to the robot's.
+    Beside a simulator, `against` as of `line`, the value is the change from its number to the robot's.
     """
     rows = tuple(_rows_of_causes(diagnosis))
-    beside = diagnosis.simulator is not None
+    beside = against == "simulated"
     value = ("simulator", "robot", "change") if beside else ("value",)
     columns = ("cause", "joints", "sure, %", "parameter", *value, "95 % from", "to", "unit")
     return AnswerTable(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))
