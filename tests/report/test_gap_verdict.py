@@ -43,9 +43,10 @@ def answers(scope, simulated=False, parameters=(), sure=0.9, verdict="ambiguous"
     ],
 )
 def test_a_finding_is_set_against_the_runs_that_lack_it(scope, simulated, claim):
+    closes = "the simulator closes 50 % of its gap to the robot" if simulated else "the twin closes 50 % of the gap"
     assert plain(sentence(answers(scope, simulated))) == (
-        f"Load {claim} (90 % sure): payload (70 %) or external contact (20 %). Adding this to the twin closes 50 % of "
-        "the gap on held-out runs."
+        f"Load {claim} (90 % sure): payload (70 %) or external contact (20 %). Adding this to {closes} on held-out "
+        "runs."
     )
 
 

@@ -117,11 +117,14 @@ class Diagnosis:
             written = tuple(beside(numbers, cause, alone) for cause in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
+        between = self.against == "simulated" and any(finding.matters for finding in findings)
+        if between:
+            findings = writing.between_sides(findings, self.channels, ids_of)
         findings = apart.findings(findings, causes, self.thresholds.matters)
         causes = writing.folded(causes, findings)
         judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
-        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of)
+        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, between=between)
         return Document(
             verdict=verdict,
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
@@ -131,7 +134,7 @@ class Diagnosis:
             findings=findings,
             causes=causes,
             not_testable=self.untestable,
-            shrink=apart.shrink(shrink),
+            shrink=apart.shrink(shrink, between=between),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
             refused=self.refusals.refused or None,

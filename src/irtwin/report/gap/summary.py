@@ -34,7 +34,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
-        None if closed is None else closes(closed.value, closed.interval95, tracking is not None),
+        None if closed is None else closes(closed.value, closed.interval95, against, played=tracking is not None),
         diagnosis.unexplained_because,
         differing(
             [

@@ -31,7 +31,7 @@ def sentence(answers: Answers) -> str:
         wording.local_name(judged["verdict"]),
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
-        None if closed is None else closes(closed["closed"], ends, played),
+        None if closed is None else closes(closed["closed"], ends, _against(judged), played=played),
         judged["reason"] and wording.local_name(judged["reason"]),
         differing([
             (disturbance["kind"], disturbance["channel"], disturbance["joint"])
@@ -98,13 +98,14 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
     return words if not more else f"{words}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
-def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
-    """Say how much of a gap closes; `played`: of a simulator's tracking error."""
+def closes(share: float, interval: Sequence[float] | None, against: str | None, *, played: bool) -> str:
+    """Say how much of a gap closes, `against` the role of what runs are held against; `played`: of tracking error."""
     within = "" if interval is None else f" {findings.within(interval)}"
     if played:
         closed = f"{wording.part(share)} of the mean square of its tracking error"
         return f" The robot’s numbers in the simulator close {closed} on held-out runs{within}."
-    return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
+    adding, gap = ("simulator", "its gap to the robot") if against == "simulated" else ("twin", "the gap")
+    return f" Adding this to the {adding} closes {wording.part(share)} of {gap} on held-out runs{within}."
 
 
 def misses(against: str | None, tracking: float | None, torque: float | None) -> str | None:
