@@ -42,12 +42,13 @@ def test_the_verdict_is_one_sentence(verdict, against, said):
     assert summary.line(gap_cases.document(verdict), against) == f"{verdict}: {said}"
 
 
-def test_a_simulator_that_is_right_agrees_to_so_much_torque():
+def test_a_simulator_that_is_right_agrees_beside_what_the_twin_leaves_of_both():
     diagnosis = gap_cases.diagnosis("no_gap")
     torque = {"before": 0.42, "after": 0.42, "noise_floor": 0.4, "interval95_after": None}
     diagnosis["shrink"] |= {"torque_rmse": torque}
     said = summary.line(Document.from_json(diagnosis), "simulated")
-    assert said == "no_gap: There is no gap: the simulator agrees with the robot, to 0.42 N m RMS."
+    agrees = "the simulator agrees with the robot, beside the 0.42 N m RMS that no effect explains."
+    assert said == f"no_gap: There is no gap: {agrees}"
 
 
 def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():

@@ -65,8 +65,8 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
     assert "other numbers" not in guessed
 
 
-def test_a_simulator_that_is_right_agrees_to_so_much_torque():
-    agrees = "There is no gap: the simulator agrees with the robot, to 0.42 N m RMS."
+def test_a_simulator_that_is_right_agrees_beside_what_the_twin_leaves_of_both():
+    agrees = "There is no gap: the simulator agrees with the robot, beside the 0.42 N m RMS that no effect explains."
     assert sentence(answers("changed", simulated=True, verdict="no_gap")).startswith(agrees)
     assert "simulator" not in sentence(answers("changed", simulated=False, verdict="no_gap"))
 

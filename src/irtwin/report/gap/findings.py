@@ -112,18 +112,18 @@ def sentence(
     because: str | None = None,
     differ: str = "",
     has_floor: bool = True,
-    misses: str | None = None,
+    agrees: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `misses`: by how much a simulator does, where it is held against one.
+    `has_floor`: whether a noise floor is known; `agrees`: how far a simulator does, where it is held against one.
     """
     if verdict == "no_gap":
-        if misses is not None:
+        if agrees is not None:
             beside = f" Beyond this, {counted(findings)}." if findings else ""
-            return f"There is no gap: the simulator agrees with the robot, to {misses}.{beside}"
+            return f"There is no gap: the simulator agrees with the robot, {agrees}.{beside}"
         if not findings and not has_floor:
             return (
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."

@@ -10,7 +10,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
 from irtwin.knowledge.vocabulary import EFFECT
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import closes, differing, misses, where
+from irtwin.report.gap.verdict import agrees, closes, differing, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -44,7 +44,7 @@ def line(diagnosis: Document, against: str | None) -> str:
             ]
         ),
         shrink.noise_floor_from is not None,
-        misses(against, tracking, torque),
+        agrees(against, tracking, torque),
     )
     numbers = findings.other_numbers([
         (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit)

@@ -39,7 +39,7 @@ def sentence(answers: Answers) -> str:
             if not disturbance["cause"]
         ]),
         judged["floor_from"] is not None,
-        misses(_against(judged), judged["tracking_error"], judged["torque_error"]),
+        agrees(_against(judged), judged["tracking_error"], judged["torque_error"]),
     )  # fmt: skip
     return numbers + words + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
@@ -108,11 +108,13 @@ def closes(share: float, interval: Sequence[float] | None, against: str | None, 
     return f" Adding this to the {adding} closes {wording.part(share)} of {gap} on held-out runs{within}."
 
 
-def misses(against: str | None, tracking: float | None, torque: float | None) -> str | None:
-    """Say by how much a simulator misses the robot, where that is what the robot is held against.
+def agrees(against: str | None, tracking: float | None, torque: float | None) -> str | None:
+    """Say how far a simulator agrees with the robot, where that is what the robot is held against.
 
-    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else.
+    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else, what the twin leaves of both sides.
     """
     if tracking is not None:
-        return f"{1e3 * tracking:.3g} mrad RMS"
-    return None if torque is None or against != "simulated" else f"{torque:.3g} N m RMS"
+        return f"to {1e3 * tracking:.3g} mrad RMS"
+    if torque is None or against != "simulated":
+        return None
+    return f"beside the {torque:.3g} N m RMS that no effect explains"
