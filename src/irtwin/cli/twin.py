@@ -272,7 +272,7 @@ def diagnose(
         summary.gap(diagnosis.document),
         summary.runs(diagnosis.curves),
         summary.horizons(diagnosis.document),
-        summary.causes(diagnosis.document),
+        summary.causes(diagnosis.document, diagnosis.against),
     ):
         if table:
             click.echo()

@@ -114,8 +114,7 @@ class GapLocation:
 class CauseParameter:
     """A parameter of a cause, in its `unit`; joint None: of the whole robot.
 
-    Where a simulator's model has the number, `simulator` is its, `robot` the robot's, and `value` how far these are
-    apart.
+    Where a simulator has the number, `simulator` is its, `robot` the robot's, and `value` how far these are apart.
     """
 
     name: str = told("Cause_Parameter_Name")
@@ -331,7 +330,10 @@ class ChangeBy(Change):
 
 @part("Gap_Shrinkage", of="shrinkage_of")
 class ClosedFraction:
-    """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse."""
+    """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse.
+
+    Beside a simulator it is of what the twin leaves beyond what it leaves of the simulator's own runs.
+    """
 
     value: float = told("Closed_Fraction", column="closed_fraction")
     interval95: Interval = told("Closed_Fraction", optional=True)

@@ -1,8 +1,8 @@
-"""Causes beside the file of a simulator's model: its numbers and the robot's, as they are best in that file."""
+"""Causes beside a simulator: its numbers and the robot's; of its model's file, as they are best in that file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -16,6 +16,7 @@ from irtwin.gap.writing import least_change, parameter
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 Changes = Mapping[tuple[str, str], CauseParameter]  # by joint and name
+Numbers = Callable[[str], Mapping[str, float]]  # a simulator's, of a joint, by what MJCF calls them
 
 
 class Simulator(Protocol):
@@ -29,8 +30,19 @@ class Simulator(Protocol):
         """Return a joint's numbers, by what MJCF calls them."""
 
 
-def beside(simulator: Simulator, cause: Cause, alone: Changes) -> Cause:
-    """Return a cause with the numbers of the simulator's file beside the robot's; below zero they are zero in both.
+def of_simulated_runs(findings: Sequence[ChannelFinding]) -> Numbers:
+    """Return the numbers of a simulator of which runs alone are there: those of the twin, which fits these."""
+    known: dict[str, dict[str, float]] = {}
+    for finding in findings:
+        values = finding.estimate.values if finding.name == "torque" else ()
+        for (effect, term), value in zip(finding.system.terms, values, strict=False):  # the causes' follow
+            if term.joint is not None and term.name in effect.in_mjcf:
+                known.setdefault(term.joint, {})[effect.in_mjcf[term.name]] = max(0.0, float(value))
+    return lambda joint: known.get(joint, {})
+
+
+def beside(numbers: Numbers, cause: Cause, alone: Changes) -> Cause:
+    """Return a cause with the simulator's numbers beside the robot's; below zero they are zero in both.
 
     `alone`: changes by joint and name where they are others in a file, which has no place for all that differs. One
     that is not sure there goes with what the file cannot hold: the file's number stays.
@@ -39,7 +51,7 @@ def beside(simulator: Simulator, cause: Cause, alone: Changes) -> Cause:
     def told(number: CauseParameter) -> CauseParameter:
         if number.joint is None or cause.scope != CHANGED:
             return number
-        own = simulator.numbers(number.joint).get(catalogue()[cause.effect].changed_in_mjcf.get(number.name, ""))
+        own = numbers(number.joint).get(catalogue()[cause.effect].changed_in_mjcf.get(number.name, ""))
         in_file = alone.get((number.joint, number.name), number)
         if own is None or (in_file is not number and not least_change(in_file)):
             return number

@@ -13,7 +13,7 @@ from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
-from irtwin.gap.beside_file import Simulator, alone_in_file, beside
+from irtwin.gap.beside_file import Simulator, alone_in_file, beside, of_simulated_runs
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
@@ -111,16 +111,20 @@ class Diagnosis:
             writing.doubted(cause, self.thresholds.criterion) if cause.id in doubted else cause for cause in written
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
-        if self.simulator is not None:
-            alone = alone_in_file(self.causes, self.scale)
-            written = tuple(beside(self.simulator, cause, alone) for cause in written)
+        if self.against == "simulated":
+            numbers = of_simulated_runs(self.channels) if self.simulator is None else self.simulator.numbers
+            alone = {} if self.simulator is None else alone_in_file(self.causes, self.scale)
+            written = tuple(beside(numbers, cause, alone) for cause in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
+        between = self.against == "simulated" and any(finding.matters for finding in findings)
+        if between:
+            findings = writing.between_sides(findings, self.channels, ids_of)
         findings = apart.findings(findings, causes, self.thresholds.matters)
         causes = writing.folded(causes, findings)
         judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
-        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of)
+        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, between=between)
         return Document(
             verdict=verdict,
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
@@ -130,7 +134,7 @@ class Diagnosis:
             findings=findings,
             causes=causes,
             not_testable=self.untestable,
-            shrink=apart.shrink(shrink),
+            shrink=apart.shrink(shrink, between=between),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
             refused=self.refusals.refused or None,

@@ -169,12 +169,12 @@ class DifferingRepeats:
             squares, squares.sum(axis=1) > 0, finding.counted, finding.floor_within, finding.attribution.noise
         )
 
-    def shrink(self, shrink: document.Shrink) -> document.Shrink:
-        """Return how far the gap shrinks, with what was taken out."""
+    def shrink(self, shrink: document.Shrink, *, between: bool) -> document.Shrink:
+        """Return how far the gap shrinks, with what was taken out; `between` sides, as `writing.shrink` has it."""
         if not self.taken:
             return shrink
         changed = [channel.name for channel in self.channels if channel.causes or self._of(channel.name)]
-        fraction = fraction_closed(self.channels, changed)
+        fraction = fraction_closed(self.channels, changed, between=between)
         return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
 
     def _of(self, channel: str) -> list[Removed]:

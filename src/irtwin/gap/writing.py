@@ -23,6 +23,7 @@ from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
+_APART = "the gap above what the twin leaves of the simulator's own runs"
 
 
 def gap(joints: Sequence[str], findings: Sequence[ChannelFinding], energies: EnergyErrors | None) -> document.Gap:
@@ -130,6 +131,23 @@ def findings(
     return tuple(findings)
 
 
+def between_sides(
+    findings: Sequence[document.Finding], channels: Sequence[ChannelFinding], ids_of: Mapping[int, str]
+) -> tuple[document.Finding, ...]:
+    """Return findings with their shares of what sets a simulator apart; `ids_of` as in `findings`.
+
+    What the twin leaves of the simulator's own runs, too, is between no sides.
+    """
+    found = {ids_of[id(each)]: (channel, each) for channel in channels for each in channel.causes}
+    told = []
+    for finding in findings:
+        own = [found[name] for name in finding.causes]
+        if closed := own[0][0].closed_between([each for _, each in own]):
+            finding = replace(finding, share=closed[0], share_interval95=closed[1], share_of=_APART)
+        told.append(finding)
+    return tuple(told)
+
+
 def number_is_off(cause: document.Cause, limits: Matters) -> bool:
     """Return whether a likely cause has a number of the simulator's model that is off by much, and for sure.
 
@@ -210,10 +228,13 @@ def shrink(
     floor: Floor,
     energies: EnergyErrors | None,
     ids_of: Mapping[int, str],
+    *,
+    between: bool,
 ) -> document.Shrink:
     """Return how far the gap shrinks on runs that took no part in the fit; `ids_of` as in `findings`.
 
-    What is closed of it together is left out where causes act in a channel whose floor nobody knows.
+    What is closed of it together is left out where causes act in a channel whose floor nobody knows; it is of what lies
+    `between` sides, or of what the twin leaves.
     """
     changes = {finding.name: _change(finding) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
@@ -224,19 +245,22 @@ def shrink(
         torque_rmse=changes.get("torque"),
         power_rmse=changes.get("power"),
         energy_error_percent=energies.change if energies else None,
-        closed_fraction=fraction_closed(findings, changed),
+        closed_fraction=fraction_closed(findings, changed, between=between),
         by_cause=tuple(
             _by_cause(robot, finding, each, ids_of[id(each)]) for finding in findings for each in finding.causes
         ),
     )
 
 
-def fraction_closed(findings: Sequence[ChannelFinding], changed: Container[str]) -> document.ClosedFraction | None:
+def fraction_closed(
+    findings: Sequence[ChannelFinding], changed: Container[str], *, between: bool
+) -> document.ClosedFraction | None:
     """Return what closes in the channels that are `changed`, whose floor is known; None as `shrink` leaves it out."""
+    floors = [finding.floor_between if between else finding.floor for finding in findings]
     with_floor = [
-        (finding.held_out, finding.floor)
-        for finding in findings
-        if finding.floor is not None and finding.name in changed
+        (finding.held_out, floor)
+        for finding, floor in zip(findings, floors, strict=True)
+        if floor is not None and finding.name in changed
     ]
     if not with_floor or any(finding.floor is None for finding in findings if finding.causes):
         return None

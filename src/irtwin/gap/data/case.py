@@ -22,6 +22,7 @@ from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.friction_near_zero import with_friction_near_zero
+from irtwin.identification.progress import tell
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
@@ -88,7 +89,7 @@ class Case:
 
     @property
     def others(self) -> list[Motion]:
-        """The motions of the runs that observed ones are held against: reference and simulated."""
+        """The motions of the runs that observed ones are held against: reference or simulated."""
         return [motion for run, motion in self.motions.items() if run not in self.observed]
 
     @property
@@ -99,8 +100,7 @@ class Case:
     @property
     def against(self) -> str | None:
         """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
-        roles = {run.role for run in self.runs}
-        return next((role for role in ("reference", "simulated") if role in roles), None)
+        return next((run.role for run in self.runs if run.role != "observed"), None)
 
     @property
     def alike(self) -> bool:
@@ -193,6 +193,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
 
     Raises InputError where `baseline` and `admit` do.
     """
+    data_set = replace(data_set, runs=_held_against_one(data_set.runs))
     begun = baseline(data_set, withhold, thresholds.data.moved, twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff)
     given = {run.name: condition_for_fit(run, begun.robot, cutoff.hz) for run in data_set.runs}
@@ -204,6 +205,16 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     case = case.with_friction_near_zero()
     sides = [case.others, case.seen] if case.against == "reference" else [case.seen]
     return replace(case, effects=shaped(case.robot, sides, case.effects))
+
+
+def _held_against_one(runs: tuple[Run, ...]) -> tuple[Run, ...]:
+    """Return the runs without reference runs where there are simulated ones: no fit is of a simulator and a robot."""
+    if not any(run.role == "simulated" for run in runs):
+        return runs
+    kept = tuple(run for run in runs if run.role != "reference")
+    if len(kept) < len(runs):
+        tell(f"  beside a simulator reference runs are left out: {len(runs) - len(kept)}")
+    return kept
 
 
 def _earlier(motion: Motion, lag: float) -> Motion:

@@ -59,6 +59,15 @@ def closing(
     return Closing(value, interval, floors, size)
 
 
+def share_above(closed: np.ndarray, held_out: HeldOut, floor: np.ndarray) -> tuple[float, tuple[float, float]] | None:
+    """Return which share squares `closed` (G, g) are of the gap above a floor (g,), RMS, with its 95 % interval.
+
+    None without a gap.
+    """
+    closed_of_groups, above = _above_floor(closed, held_out, floor)
+    return _ratio(closed_of_groups, above, np.ones(len(above)))
+
+
 def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]]) -> tuple[float, tuple[float, float]] | None:
     """Return the fraction of the gap above the floor that is closed, with its 95 % interval over groups.
 

@@ -14,14 +14,14 @@ from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.closing import Closing, closing
+from irtwin.gap.isolation.closing import Closing, closing, share_above
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
 from irtwin.gap.regression.joint_equations import JointEquations
-from irtwin.gap.regression.normal_equations import System, observed_rms
+from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
 from irtwin.gap.regression.run_to_run import with_offsets_held
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.progress import tell_step
@@ -93,6 +93,24 @@ class ChannelFinding:
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
         return closing(closed, acting, self.counted, self.floor_within, self.attribution.noise)
+
+    def closed_between(self, causes: Sequence[FoundCause]) -> tuple[float, tuple[float, float]] | None:
+        """Return which share some causes close of what sets the other runs apart, with its 95 % interval.
+
+        That is the gap above what the twin, fitted to the other runs alone, leaves of these, too. None where none is.
+        """
+        if self.floor_within is None:
+            return None
+        closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
+        return share_above(closed, self.counted, self.apart.level(self.floor_within))
+
+    @cached_property
+    def floor_between(self) -> np.ndarray | None:
+        """(g,) RMS that sets no runs apart: the floor, or what the twin leaves of the other runs alone, if more."""
+        before = self.before
+        if self.floor is None or not before.both:
+            return self.floor
+        return np.asarray(np.maximum(self.floor, reference_rms(before, before.noise_before)))
 
     @property
     def chosen(self) -> list[int]:

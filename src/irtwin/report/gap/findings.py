@@ -23,8 +23,8 @@ OtherNumber = tuple[str, str | None, float, float, str]
 class ToldFinding:
     """A finding as it is told: `members`, for each of its causes, the cause and what the data cannot tell from it.
 
-    against: what it is held against: "twin", "reference" or "simulated" runs, or "both" of these. share, interval: of
-    its channel's gap that closes, `of` what it is a share.
+    against: what it is held against: "twin", "reference" or "simulated" runs. share, interval: of its channel's gap
+    that closes, `of` what it is a share.
     """
 
     family: str
@@ -91,7 +91,6 @@ _CLAIMS = {
     "twin": "differs from the twin’s",
     "reference": "changed since the reference runs",
     "simulated": "differs from the simulator’s",
-    "both": "changed since the reference runs, and differs from the simulator’s",
 }
 
 
@@ -113,18 +112,18 @@ def sentence(
     because: str | None = None,
     differ: str = "",
     has_floor: bool = True,
-    misses: str | None = None,
+    agrees: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `misses`: by how much a simulator does, where it is held against one.
+    `has_floor`: whether a noise floor is known; `agrees`: how far a simulator does, where it is held against one.
     """
     if verdict == "no_gap":
-        if misses is not None:
+        if agrees is not None:
             beside = f" Beyond this, {counted(findings)}." if findings else ""
-            return f"There is no gap: the simulator agrees with the robot, to {misses}.{beside}"
+            return f"There is no gap: the simulator agrees with the robot, {agrees}.{beside}"
         if not findings and not has_floor:
             return (
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."

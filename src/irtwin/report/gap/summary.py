@@ -10,7 +10,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
 from irtwin.knowledge.vocabulary import EFFECT
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import closes, differing, misses, where
+from irtwin.report.gap.verdict import agrees, closes, differing, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -34,7 +34,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
-        None if closed is None else closes(closed.value, closed.interval95, tracking is not None),
+        None if closed is None else closes(closed.value, closed.interval95, against, played=tracking is not None),
         diagnosis.unexplained_because,
         differing(
             [
@@ -44,7 +44,7 @@ def line(diagnosis: Document, against: str | None) -> str:
             ]
         ),
         shrink.noise_floor_from is not None,
-        misses(against, tracking, torque),
+        agrees(against, tracking, torque),
     )
     numbers = findings.other_numbers([
         (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit)
@@ -142,13 +142,13 @@ def _differing_friction(diagnosis: Document) -> list[str]:
     return [f"Friction differs from run to run, {listed(told)} (one standard deviation): noise."] if told else []
 
 
-def causes(diagnosis: Document) -> AnswerTable:
+def causes(diagnosis: Document, against: str | None) -> AnswerTable:
     """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals.
 
-    Beside a simulator's model the value is the change from its number to the robot's.
+    Beside a simulator, `against` as of `line`, the value is the change from its number to the robot's.
     """
     rows = tuple(_rows_of_causes(diagnosis))
-    beside = diagnosis.simulator is not None
+    beside = against == "simulated"
     value = ("simulator", "robot", "change") if beside else ("value",)
     columns = ("cause", "joints", "sure, %", "parameter", *value, "95 % from", "to", "unit")
     return AnswerTable(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))

@@ -31,7 +31,7 @@ def sentence(answers: Answers) -> str:
         wording.local_name(judged["verdict"]),
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
-        None if closed is None else closes(closed["closed"], ends, played),
+        None if closed is None else closes(closed["closed"], ends, _against(judged), played=played),
         judged["reason"] and wording.local_name(judged["reason"]),
         differing([
             (disturbance["kind"], disturbance["channel"], disturbance["joint"])
@@ -39,7 +39,7 @@ def sentence(answers: Answers) -> str:
             if not disturbance["cause"]
         ]),
         judged["floor_from"] is not None,
-        misses(_against(judged), judged["tracking_error"], judged["torque_error"]),
+        agrees(_against(judged), judged["tracking_error"], judged["torque_error"]),
     )  # fmt: skip
     return numbers + words + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
@@ -79,9 +79,7 @@ def _finding(row: Row, answers: Answers) -> ToldFinding:
 
 def _against(diagnosis: Row) -> str:
     """Return which runs lack what changed: simulated runs never had it, reference runs did not have it yet."""
-    if not diagnosis["against_simulator"]:
-        return "reference"
-    return "both" if diagnosis["referenced"] else "simulated"
+    return "simulated" if diagnosis["against_simulator"] else "reference"
 
 
 def where(channel: str, joint: str | None, regime: str | None = None, share: float = 0.0) -> str:
@@ -100,20 +98,23 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
     return words if not more else f"{words}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
-def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
-    """Say how much of a gap closes; `played`: of a simulator's tracking error."""
+def closes(share: float, interval: Sequence[float] | None, against: str | None, *, played: bool) -> str:
+    """Say how much of a gap closes, `against` the role of what runs are held against; `played`: of tracking error."""
     within = "" if interval is None else f" {findings.within(interval)}"
     if played:
         closed = f"{wording.part(share)} of the mean square of its tracking error"
         return f" The robot’s numbers in the simulator close {closed} on held-out runs{within}."
-    return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
+    adding, gap = ("simulator", "its gap to the robot") if against == "simulated" else ("twin", "the gap")
+    return f" Adding this to the {adding} closes {wording.part(share)} of {gap} on held-out runs{within}."
 
 
-def misses(against: str | None, tracking: float | None, torque: float | None) -> str | None:
-    """Say by how much a simulator misses the robot, where that is what the robot is held against.
+def agrees(against: str | None, tracking: float | None, torque: float | None) -> str | None:
+    """Say how far a simulator agrees with the robot, where that is what the robot is held against.
 
-    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else.
+    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else, what the twin leaves of both sides.
     """
     if tracking is not None:
-        return f"{1e3 * tracking:.3g} mrad RMS"
-    return None if torque is None or against != "simulated" else f"{torque:.3g} N m RMS"
+        return f"to {1e3 * tracking:.3g} mrad RMS"
+    if torque is None or against != "simulated":
+        return None
+    return f"beside the {torque:.3g} N m RMS that no effect explains"
