@@ -10,8 +10,12 @@ from tests.synthetic import arm, as_run, data_set, measure, swing, with_constant
 
 from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.gap.choice import begin, elsewhere, identified
+from irtwin.identification.cutoff import cutoff_for
+from irtwin.identification.validation import split
 from irtwin.signals.conditioning import condition
+from irtwin.signals.log import read_data_set
 from irtwin.twin.validate import validate
+from irtwin.workflow import unpack_demo
 
 ROBOT = arm(2)
 KT = 8.0  # N m/A
@@ -88,3 +92,20 @@ def test_runs_that_show_nothing_leave_the_effects_of_every_robot():
     short = replace(data, runs=tuple(replace(run, signals=run.signals.rows(np.arange(60))) for run in data.runs[:1]))
     twin = identified(short, motions)
     assert twin.effect_ids == begin(data.runs) and twin.choices == ()
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_demos_logs_are_predicted_by_what_its_supply_does(tmp_path):
+    """Chopper, capacitor and a meter that lags hide one another: each by itself is less likely than nothing."""
+    data = replace(read_data_set(unpack_demo(tmp_path)), effects=None)
+    cutoff = cutoff_for(data.robot, data.runs, data.cutoff).hz
+    motions = [condition(run, data.robot, cutoff) for run in data.runs]
+    parts = split(motions, {run.name: run.repeat_of for run in data.runs if run.repeat_of})
+    fitted = {motion.run for motion in parts.fit}
+    twin = identified(replace(data, runs=tuple(run for run in data.runs if run.name in fitted)), parts.fit)
+    errors = [fit.energy_error for fit in validate(twin, parts.held_out)]
+    assert np.mean(errors) < 1.0
+    assert max(errors) < 3.0
+    (standby,) = (number for number in twin.parameters if number.effect == "standby_power")
+    assert standby.lower < 110.0 < standby.upper

@@ -15,8 +15,10 @@ from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case, case_of
 from irtwin.gap.energy_errors import energy_errors
 from irtwin.gap.isolation.cause import FoundCause
+from irtwin.gap.isolation.closing import share
 from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.regression.held_out import left_out
+from irtwin.gap.regression.hypotheses import Hypothesis
 from irtwin.gap.search import Search, variants
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.two_processes import one_blas_thread
@@ -107,7 +109,40 @@ def _findings(case: Case) -> Iterator[ChannelFinding]:
         yield of_torque.finding
     if case.shows("power"):
         # on the torque by which a twin predicts: by the logged one the demo's warm runs err by 2 %, not by half
-        yield search.power_causes(_standing(case, "power"), floor, of_torque, by_log=False)[0].finding
+        yield _predicting(
+            case, search.power_causes(_standing(case, "power"), floor, of_torque, by_log=False)[0].finding
+        )
+
+
+def _predicting(case: Case, finding: ChannelFinding) -> ChannelFinding:
+    """Return what was found, with what is left open and surely predicts groups left out better, one after another.
+
+    Beside much that no effect explains, causes of the whole robot hide each other: a diagnosis names none of them.
+    """
+    while (better := _best_predicting(case, finding)) is not None:
+        causes = (*finding.causes, better)
+        noise = finding.system.residual_rms([*finding.chosen, *better.columns], finding.attribution.noise)
+        attribution = replace(finding.attribution, causes=causes, noise=noise)
+        finding = replace(finding, attribution=attribution)
+        after = left_out(finding.system, noise, finding.chosen, np.flatnonzero(finding.system.group_observed))
+        finding = replace(finding, held_out=replace(finding.held_out, after=after))
+    return finding
+
+
+def _best_predicting(case: Case, finding: ChannelFinding) -> FoundCause | None:
+    """Return what is left open and closes most of what is left of groups left out, if that matters."""
+    system, noise = finding.system, finding.attribution.noise
+    groups, left = np.flatnonzero(system.group_observed), finding.held_out.after.sum(axis=1)
+    best, most = None, case.thresholds.matters.share
+    for hypothesis, odds in _left_open(case, finding):
+        sets = [[*finding.chosen, *variant.columns] for variant in hypothesis.variants]
+        shape = int(np.argmin([system.residual_rms(columns, noise).sum() for columns in sets]))
+        closed, (least, _) = share(left - left_out(system, noise, sets[shape], groups).sum(axis=1), left)
+        if closed >= most and least > 0:
+            joints, chance = (hypothesis.joint,) if hypothesis.joint else (), float(scipy.special.expit(odds))
+            shapes = (hypothesis.variants[shape],)
+            best, most = FoundCause(hypothesis.effect, hypothesis.scope, joints, shapes, 0.0, odds, chance), closed
+    return best
 
 
 def _standing(case: Case, signal: str) -> list[Effect]:
@@ -130,11 +165,19 @@ def _choices(case: Case, finding: ChannelFinding) -> Iterator[Choice]:
 def _open(case: Case, finding: ChannelFinding) -> dict[str, Places]:
     """Return the joints, None for the whole robot, where a channel leaves effects open, and how likely each is."""
     left_open: dict[str, Places] = {}
-    for hypothesis, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
-        chance = float(scipy.special.expit(odds))
-        if hypothesis.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
-            left_open.setdefault(hypothesis.effect, []).append((hypothesis.joint, chance))
+    for hypothesis, odds in _left_open(case, finding):
+        left_open.setdefault(hypothesis.effect, []).append((hypothesis.joint, float(scipy.special.expit(odds))))
     return left_open
+
+
+def _left_open(case: Case, finding: ChannelFinding) -> Iterator[tuple[Hypothesis, float]]:
+    """Yield the hypotheses on a channel's signal that may be there beside what was found, with their log odds."""
+    there = {(cause.effect, joint) for cause in finding.causes for joint in cause.joints or (None,)}
+    for hypothesis, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds.tolist(), strict=True):
+        likely = scipy.special.expit(odds) >= case.thresholds.criterion.unknown
+        own = hypothesis.variants[0].effect.signal == finding.name
+        if own and likely and (hypothesis.effect, hypothesis.joint) not in there:
+            yield hypothesis, odds
 
 
 def _worth(case: Case, finding: ChannelFinding, cause: FoundCause) -> Choice:
