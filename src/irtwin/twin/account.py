@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
@@ -167,11 +167,12 @@ _Slope = tuple[int, np.ndarray, np.ndarray]  # an entry's row, and its slope ove
 
 def _of_work(about: _About, rows: dict[Key, int], shape: tuple[int, ...]) -> np.ndarray:
     """Return the slopes of what joints' torque works, `shape`: (E, K)."""
-    stack, names, slopes = about.twin.stack, about.twin.robot.joint_names, np.zeros(shape)
-    if any(effect.carries_torque for effect in stack.effects):
-        work = np.einsum("t,tj,tjk->jk", about.weights, about.piece.dq, about.columns)
-        for joint, k in zip(*np.nonzero(stack.pattern & stack.real), strict=True):
-            slopes[rows[stack.torque_terms[k][0].id, names[joint]], k] += work[joint, k]
+    stack, slopes = about.twin.stack, np.zeros(shape)
+    for _, own, works in stack.works(about.piece, about.columns, about.weights):
+        for (entry, work), (joint, name) in product(works.items(), enumerate(about.twin.robot.joint_names)):
+            row = rows.get((entry, name))
+            if row is not None:
+                slopes[row, own] += work[joint]
     return slopes
 
 
