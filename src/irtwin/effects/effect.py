@@ -25,9 +25,9 @@ class Term:
     """One coefficient of an effect, and what is known of it before any data.
 
     `expected` and `spread` (in `unit`) are mean and standard deviation of a weak prior: they decide only what the
-    data leave open. `lowest` is the physical bound (friction and resistance are not negative). A `fixed` term is
-    known to equal `expected` and is not estimated. `unnamed`: the standard deviation of what any healthy robot may
-    have of it, as nobody knows the laws of the others so well; that much is no effect.
+    data leave open. `lowest` and `highest` are physical bounds (friction and resistance are not negative). A `fixed`
+    term is known to equal `expected` and is not estimated. `unnamed`: the standard deviation of what any healthy robot
+    may have of it, as nobody knows the laws of the others so well; that much is no effect.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Term:
     expected: float = 0.0
     spread: float = 1.0
     lowest: float = -np.inf
+    highest: float = np.inf
     fixed: bool = False
     unnamed: float = 0.0
 
