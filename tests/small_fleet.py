@@ -65,13 +65,13 @@ EXCURSIONS = [  # of Arm_B.live_1: channel, joint, number, began, ended, s, resi
     ("power", None, 1, "2026-03-03 10:00:08", None, 4.0, 80.0, "W", 4.0),
 ]
 LEDGER = {  # run: effect, joint, J
-    "Arm_A.fit_1": "rigid_body j1 250, coulomb_friction j1 50, rigid_body j2 150, coulomb_friction j2 30",
-    "Arm_A.check_1": "rigid_body j1 150, coulomb_friction j1 50, rigid_body j2 450, coulomb_friction j2 110",
-    "Arm_A.idle_1": "rigid_body j1 30, coulomb_friction j1 10, rigid_body j2 20, coulomb_friction j2 8",
-    "Arm_B.work_1": "rigid_body j1 200, rigid_body j2 100",
-    "Arm_B.work_2": "rigid_body j1 300, rigid_body j2 316",
-    "Arm_C.press_1": "rigid_body j1 200, coulomb_friction j1 80, no_regeneration - 20",
-    "Arm_C.press_2": "rigid_body j1 196, coulomb_friction j1 80, no_regeneration - 24",
+    "Arm_A.fit_1": "kinetic_energy j1 250, coulomb_friction j1 50, kinetic_energy j2 150, coulomb_friction j2 30",
+    "Arm_A.check_1": "kinetic_energy j1 150, coulomb_friction j1 50, kinetic_energy j2 450, coulomb_friction j2 110",
+    "Arm_A.idle_1": "kinetic_energy j1 30, coulomb_friction j1 10, kinetic_energy j2 20, coulomb_friction j2 8",
+    "Arm_B.work_1": "kinetic_energy j1 200, kinetic_energy j2 100",
+    "Arm_B.work_2": "kinetic_energy j1 300, kinetic_energy j2 316",
+    "Arm_C.press_1": "kinetic_energy j1 200, coulomb_friction j1 80, no_regeneration - 20",
+    "Arm_C.press_2": "kinetic_energy j1 196, coulomb_friction j1 80, no_regeneration - 24",
 }
 FRICTION_TOGETHER = ("Arm_A.fit_1", "coulomb_friction")  # of both joints: not told apart
 SUPPLY = {  # run: state, s, W by the log and by the twin

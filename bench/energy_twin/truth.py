@@ -39,7 +39,7 @@ class Truth:
         effect, joint = place
         parts = self.energies[run]
         if effect not in parts:
-            return 0.0 if "rigid_body" in parts else None
+            return 0.0 if "kinetic_energy" in parts else None
         return float(parts[effect] if joint is None else parts[effect][self.joints.index(joint)])
 
     def base(self, stack: Stack) -> np.ndarray:
@@ -87,7 +87,10 @@ def mechanical(machine: Machine, traces: Traces, friction: Parts) -> Parts:
     known = {name: own * traces.dq for name, own in friction.items()}
     turned = (traces.torque != 0) * machine.drive.joint_inertia * traces.ddq
     known["rotor_inertia"] = turned * traces.dq
-    return {**known, "rigid_body": work - sum(known.values())}
+    arm, still = machine.arm(PlantPayload()), np.zeros(work.shape[2])
+    weight = np.array([arm.inverse_dynamics(q, still, still) for q in traces.q.reshape(-1, len(still))])
+    known["potential_energy"] = (traces.torque != 0) * weight.reshape(work.shape) * traces.dq
+    return {**known, "kinetic_energy": work - sum(known.values())}
 
 
 def drives(machine: Machine, traces: Traces, *, exact: bool) -> Parts:

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.synthetic import arm, swing, with_constants
+from tests.synthetic import arm, measure, swing, truth, with_constants
 
+from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Predicted
 from irtwin.effects.stack import Stack
 from irtwin.effects.supply import BusCapacitor, HoldingBrakes
 from irtwin.resources import folder
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.motion import Motion
+from irtwin.twin.identify import identify
 
 ROBOT = read_urdf(folder("ontology") / "robots" / "kuka_kr6_r700.urdf")
 
@@ -59,3 +61,19 @@ def test_brakes_open_before_a_motion_and_nobody_knows_power_while_they_switch() 
     parts = [stack.switching(still.part(at, at + 70)) for at in range(0, len(still.time), 70)]
     assert np.array_equal(np.concatenate(parts), near)
     assert Stack(arm(2), ["standby_power"]).switching(still) is None
+
+
+def test_no_more_than_what_joints_give_back_is_burnt() -> None:
+    """A log that shows half as much again, as of a loss that the twin lacks, tells that nothing is returned."""
+    robot = with_constants(arm(3))
+    logged = []
+    for seed in range(3):
+        shown = measure(robot, swing(robot, seed, seconds=20.0), 0.5, seed=seed)
+        given_back = np.maximum(truth(robot)["P0"] - shown.power, 0.0)
+        logged.append(replace(shown, power=shown.power + 1.5 * given_back))
+    twin = identify(robot, logged, (*BASELINE, "copper_loss", "no_regeneration"))
+    (burnt,) = (one for one in twin.parameters if one.effect == "no_regeneration")
+    (returned,) = twin.quantities
+    assert (burnt.value, burnt.upper) == (1.0, 1.0)
+    assert (returned.value, returned.lower) == (0.0, 0.0)
+    assert 0.0 < returned.upper < 1.0

@@ -11,7 +11,8 @@ from tests.planning.test_programme import STEP, bell, motion, rest
 
 from irtwin.effects.supply import HoldingBrakes
 from irtwin.planning.programme import SectionedMotion, programme_of
-from irtwin.planning.waiting import proposals
+from irtwin.planning.waiting import _by_way_of, proposals
+from irtwin.robot.collision import CollisionModel
 from irtwin.signals.motion import Motion
 from irtwin.twin.twin import Parameter, Twin
 
@@ -67,3 +68,33 @@ def test_off_saves_all_but_what_the_log_shows_there() -> None:
 def test_short_pauses_and_what_costs_more_are_no_proposals() -> None:
     assert not list(proposals(known_twin(), programme(0.6), 4.0))
     assert "switch off" not in {one.what for one in proposals(known_twin(), programme(), 1e3)}
+
+
+def test_parking_saves_the_difference_of_holding_but_for_the_way() -> None:
+    known, weld = known_twin(), programme(90.0)
+    (parked,) = (one for one in proposals(known, weld, None) if one.what.startswith("park"))
+    pose = np.array([float(part.split()[1]) for part in parked.what.removeprefix("park at ").split(", ")])
+    still = np.zeros((5, 2))
+    there = Motion(np.arange(5) * STEP, still + pose, still, still, run="park")
+    less = float(known.power(weld.alone(2)).mean() - known.power(there).mean())
+    assert less > 0
+    assert 0.5 * less * parked.seconds < parked.saved.value < less * parked.seconds
+    assert pose[0] == 0.0  # a joint that the programme does not move stays
+    assert parked.takes == 0.0
+
+
+def test_a_way_there_and_back_is_smooth_and_ends_where_it_began() -> None:
+    weld = programme(4.0)
+    own = slice(weld.sections[2].first, weld.sections[2].last + 1)
+    away = np.array([0.0, 0.7])
+    moved = _by_way_of(weld.motion, own, away, 1.0)
+    assert moved.q[own][[0, -1]] == pytest.approx(weld.motion.q[own][[0, -1]])
+    middle = (own.start + own.stop) // 2
+    assert moved.q[middle] == pytest.approx(weld.motion.q[middle] + away)
+    np.testing.assert_allclose(np.gradient(moved.q, STEP, axis=0)[own], moved.dq[own], atol=0.01)
+    np.testing.assert_allclose(np.gradient(moved.dq, STEP, axis=0)[own], moved.ddq[own], atol=0.05)
+
+
+def test_a_pose_in_which_links_meet_is_no_place_to_park(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CollisionModel, "first_meeting", lambda *_: (object(), 0.0))
+    assert not [one for one in proposals(known_twin(), programme(20.0), None) if one.what.startswith("park")]

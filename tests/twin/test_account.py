@@ -9,7 +9,7 @@ import pytest
 from tests.synthetic import arm, measure, swing, with_constants
 
 from irtwin.effects.catalogue import BASELINE
-from irtwin.twin.account import account
+from irtwin.twin.account import _joined, account
 from irtwin.twin.identify import identify
 from irtwin.twin.price import price
 
@@ -44,6 +44,33 @@ def test_what_data_cannot_part_is_one_entry_that_they_tell():
         assert entry.upper - entry.energy < sum(widths)
     told = {(share.effect, share.joint) for entry in entries for share in entry.shares}
     assert told & {(effect, joint) for effect in ("copper_loss", "inverter_loss") for joint in ROBOT.joint_names}
+
+
+def test_a_share_is_not_told_because_the_whole_energy_is_less_sure():
+    """What lasts of the remainder is standby's: it makes no winding's heat surer."""
+    runs = [measure(ROBOT, swing(ROBOT, of, seconds=4.0), 2.0, seed=of) for of in (1, 2)]
+    twin, motion = identify(ROBOT, runs, HEAT), swing(ROBOT, 7)
+    vague = replace(twin, remainder=replace(twin.remainder, mean=500.0))
+    together, still = (
+        {tuple((share.effect, share.joint) for share in entry.shares) for entry in account(one, motion)}
+        for one in (twin, vague)
+    )
+    assert {shares for shares in together if ("standby_power", None) not in shares} <= still
+
+
+def test_not_all_that_shares_make_up_for_each_other_is_believed():
+    runs = [measure(ROBOT, swing(ROBOT, of, seconds=4.0), 2.0, seed=of) for of in (1, 2)]
+    twin, motion = identify(ROBOT, runs, HEAT), swing(ROBOT, 7)
+    for entry in account(twin, motion):
+        apart = sum((share.upper - share.energy) ** 2 for share in entry.shares)
+        assert entry.upper - entry.energy >= 0.999 * np.sqrt(0.2 * apart)
+
+
+def test_what_hardly_makes_up_for_another_is_an_entry_of_its_own():
+    energies, variances = np.array([1.0, 1.0, 1.0]), np.eye(3)
+    variances[0, 1] = variances[1, 0] = -0.9
+    variances[1, 2] = variances[2, 1] = -0.01
+    assert _joined(energies, variances) == [[0, 1], [2]]
 
 
 @pytest.mark.parametrize(("more", "set_to"), [("copper_loss", {}), ("no_regeneration", {"burnt": 1, "Fc": 0, "Fv": 0})])

@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.synthetic import arm, measure, swing, with_constants
 
 from irtwin.effects.catalogue import BASELINE
+from irtwin.effects.rigid_body import RigidBody, model_of
+from irtwin.signals.motion import trapezoid
 from irtwin.twin import twin as room
 from irtwin.twin.identify import identify
 from irtwin.twin.twin import Parameter
@@ -34,6 +38,43 @@ def test_ledger_names_who_took_what():
         assert all(entries[effect, joint] > 0 for joint in ROBOT.joint_names)
     # what measurement adds takes no energy, and mechanical power is entered under what takes it
     assert {effect for effect, _ in entries}.isdisjoint({"torque_offset", "mechanical_power"})
+
+
+def test_work_of_bodies_is_kinetic_potential_and_the_load_lifted():
+    """Over all joints each is the change of its energy, by Pinocchio; together they are what bodies took before."""
+    motion = swing(ROBOT, 3, seconds=4)
+    loaded = replace(motion, payload_mass=3.0, payload_com=(0.1, 0.0, 0.2))
+    values = TWIN.torque_values
+
+    def changes(of):
+        model = model_of(ROBOT, TWIN.stack.bodies(of, values))
+        data = model.createData()
+        ends = ((of.q[k], of.dq[k]) for k in (0, -1))
+        kinds = [
+            (pin.computeKineticEnergy(model, data, *end), pin.computePotentialEnergy(model, data, end[0]))
+            for end in ends
+        ]
+        return np.diff(kinds, axis=0)[0]
+
+    def summed(of):
+        sums = defaultdict(float)
+        for entry in TWIN.ledger(of):
+            sums[entry.effect] += entry.energy
+        return sums
+
+    alone, lifting = summed(motion), summed(loaded)
+    assert "lifted_load" not in alone
+    assert [alone["kinetic_energy"], alone["potential_energy"]] == pytest.approx(changes(motion), rel=1e-3, abs=1e-3)
+    assert lifting["lifted_load"] == pytest.approx(sum(changes(loaded) - changes(motion)), rel=1e-3, abs=1e-3)
+    assert {name: alone[name] for name in RigidBody.entries[:2]} == pytest.approx(
+        {name: lifting[name] for name in RigidBody.entries[:2]}, rel=1e-9, abs=1e-9
+    )
+    weights = trapezoid(loaded.time)
+    torque = TWIN.stack.torque_of([one for one in TWIN.stack.effects if one.bodies], loaded, values)
+    for joint, work in zip(ROBOT.joint_names, weights @ (torque * loaded.dq), strict=True):
+        parts = [one.energy for one in TWIN.ledger(loaded) if one.joint == joint and one.effect in RigidBody.entries]
+        assert len(parts) == 3
+        assert sum(parts) == pytest.approx(work, rel=1e-9, abs=1e-9)
 
 
 def test_what_a_meter_adds_is_no_entry_of_the_ledger():

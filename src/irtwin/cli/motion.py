@@ -191,10 +191,10 @@ def optimise(
     The way stays; each move between two pauses gets a pace of its own. Printed are the energies of other cycle times,
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
-    torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, closed brakes, or off:
-    states that the robot's logs show. With --base the flange keeps its way through the room, the base up to 0.3 m
-    beside: what stands around is not known. A year is as long as plant.toml says. The motion is kept as a planned run,
-    and the robot's report says what it saves.
+    torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, parked at a pose of its
+    own, closed brakes, or off: states that the robot's logs show. With --base the flange keeps its way through the
+    room, the base up to 0.3 m beside. What stands around is not known, there or where it parks. A year is as long as
+    plant.toml says. The motion is kept as a planned run, and the robot's report says what it saves.
 
     \b
     Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12

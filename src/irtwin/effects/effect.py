@@ -25,9 +25,9 @@ class Term:
     """One coefficient of an effect, and what is known of it before any data.
 
     `expected` and `spread` (in `unit`) are mean and standard deviation of a weak prior: they decide only what the
-    data leave open. `lowest` is the physical bound (friction and resistance are not negative). A `fixed` term is
-    known to equal `expected` and is not estimated. `unnamed`: the standard deviation of what any healthy robot may
-    have of it, as nobody knows the laws of the others so well; that much is no effect.
+    data leave open. `lowest` and `highest` are physical bounds (friction and resistance are not negative). A `fixed`
+    term is known to equal `expected` and is not estimated. `unnamed`: the standard deviation of what any healthy robot
+    may have of it, as nobody knows the laws of the others so well; that much is no effect.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Term:
     expected: float = 0.0
     spread: float = 1.0
     lowest: float = -np.inf
+    highest: float = np.inf
     fixed: bool = False
     unnamed: float = 0.0
 
@@ -152,7 +153,8 @@ class Effect(ABC):
     the drives are off. A `disturbance` goes its own way, so that no run tells when it acts in another, and repeats of a
     motion show it; the word says as what, "line" or "switching". `manual_test` is what a person can do to show it where
     no motion does; `taken_off` says how a run without it is made; `in_mjcf` what MuJoCo's models call its coefficients,
-    of those that they have. What its parameters can be is `possible`.
+    of those that they have. What its parameters can be is `possible`. A ledger has its work as `entries`, that of
+    what is known to be added as their last; none: as its id.
 
     Fields of a subclass are the effect's shape, in which it is not linear; `ranges` are those that can be refined, and
     `lately` those that twins of former releases lack: they are as by default.
@@ -187,6 +189,7 @@ class Effect(ABC):
     never_changed: ClassVar[bool] = False
     nuisance: ClassVar[bool] = False
     prior_tells: ClassVar[bool] = False
+    entries: ClassVar[tuple[str, ...]] = ()
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     lately: ClassVar[frozenset[str]] = frozenset()
 
@@ -230,6 +233,10 @@ class Effect(ABC):
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray | float:
         """Return what is known to be added to the (k,) coefficients in this motion: a payload, for one."""
         return 0.0
+
+    def booked(self, robot: Robot, motion: Motion, columns: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return columns of torque, (N, n, k), by the entry of a ledger that their work is; they sum to `columns`."""
+        return {self.id: columns}
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the effect in each shape that is worth trying; a robot's data sheet may add some."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 from weakref import ReferenceType, ref
@@ -35,6 +36,7 @@ class RigidBody(Effect):
     bodies: ClassVar[bool] = True
     prior_tells: ClassVar[bool] = True
     smooth: ClassVar[bool] = True
+    entries: ClassVar[tuple[str, ...]] = ("kinetic_energy", "potential_energy", "lifted_load")
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return ten terms per moving body, expected as in the URDF, give or take what a body weighs in the mean."""
@@ -67,6 +69,13 @@ class RigidBody(Effect):
     ) -> np.ndarray:
         """Return (N, 10 n) the columns, each joint's times its `along` (N, n), summed over joints."""
         return carried_bodies(robot.model, motion.q, motion.dq, motion.ddq, along)
+
+    def booked(self, robot: Robot, motion: Motion, columns: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return what gravity alone makes as potential energy, and the rest as kinetic energy."""
+        still = np.zeros_like(motion.dq)
+        gravity = body_regressor(robot.model, motion.q, still, still)
+        kinetic, potential, _ = self.entries
+        return {kinetic: columns - gravity, potential: gravity}
 
     def shift(self, robot: Robot, motion: Motion) -> np.ndarray:
         """Return the payload that the controller was told, as a point mass on the last body.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
@@ -364,6 +364,18 @@ class Stack:
             for effect in self._power
         ]
         return np.concatenate([np.zeros((len(motion.time), 0)), *parts], axis=1)
+
+    def works(
+        self, motion: Motion, columns: np.ndarray, weights: np.ndarray
+    ) -> Iterator[tuple[Effect, slice, Mapping[str, np.ndarray]]]:
+        """Yield effects of real torque, places of their k coefficients, and by entry of a ledger their work, (n, k).
+
+        That is J in each joint by a unit of a coefficient; columns: (N, n, K) of torque; weights: (N,) s of samples.
+        """
+        for effect, own in self._torque_places.items():
+            if effect.channel == "torque":
+                parts = effect.booked(self.robot, motion, columns[:, :, own]).items()
+                yield effect, own, {name: np.einsum("t,tj,tjk->jk", weights, motion.dq, part) for name, part in parts}
 
     def shift(self, motion: Motion) -> np.ndarray:
         """Return what is known to be added to the (K,) torque coefficients in this motion."""

@@ -125,7 +125,7 @@ class NoRegeneration(Effect):
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return the share that is burnt: all of it, unless data say otherwise."""
-        return (Term("burnt", "1", expected=1.0, lowest=0.0),)
+        return (Term("burnt", "1", expected=1.0, lowest=0.0, highest=1.0),)
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, 1) what the axes give back together."""
@@ -133,8 +133,9 @@ class NoRegeneration(Effect):
         return np.asarray(np.maximum(-predicted.axes, 0.0)[:, None])
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
-        """Return the share that goes back to the mains."""
-        return (quantity("returned", None, given.values[0], "1", float(given.deviations[0]), lambda burnt: 1 - burnt),)
+        """Return the share that goes back to the mains: none to all of it."""
+        burnt, deviation = float(given.values[0]), float(given.deviations[0])
+        return (quantity("returned", None, burnt, "1", deviation, lambda share: float(np.clip(1 - share, 0, 1))),)
 
 
 @dataclass(frozen=True)

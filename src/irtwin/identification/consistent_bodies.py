@@ -78,16 +78,17 @@ def with_consistent_bodies(stack: Stack, terms: Terms, fit: Estimate) -> Estimat
         return fit
     described = described_bodies(stack)
     problem = _Problem(fit.equations[:, :-1], fit.equations[:, -1], places, np.linalg.inv(described))
-    lowest = np.array([term.lowest for _, term in terms])
+    lowest, highest = np.array([(term.lowest, term.highest) for _, term in terms]).T
     x = fit.values.copy()
     x[places] = inertial_parameters(described)
-    free = x > lowest
+    free = (x > lowest) & (x < highest)
     while True:
         solved = _solved(problem, x, free)
-        below = free & (solved < lowest)
-        if not below.any():
+        within = np.clip(solved, lowest, highest)
+        beyond = free & (within != solved)
+        if not beyond.any():
             return replace(fit, values=solved)
-        x, free = np.where(below, lowest, solved), free & ~below
+        x, free = np.where(beyond, within, solved), free & ~beyond
 
 
 def spreads(stack: Stack, terms: Terms) -> np.ndarray:

@@ -62,7 +62,7 @@ def estimate(
     stays as expected (Tikhonov's ridge with physical units). Where more is known of the terms together, `prior_rows`
     (K, K) say it instead: rows on their deviations, in units of their spread, of noise one. As samples depend on each
     other, they count against it by their design effect only; where `signals` (g,) says which equations are of one, side
-    by side, each signal by its own. Bounds hold (`lowest`). The covariance is explained in `uncertainty`.
+    by side, each signal by its own. Bounds hold. The covariance is explained in `uncertainty`.
     """
     given, weights = blocks, np.ones((len(blocks), len(pattern)))
     factors = _of_all(blocks, pattern)
@@ -70,7 +70,7 @@ def estimate(
     count = np.maximum(rows.sum(axis=0), 1)
     expected = np.array([term.expected for term in terms])
     spread = np.array([term.spread for term in terms])
-    lowest = np.array([term.lowest for term in terms])
+    ends = np.array([(term.lowest, term.highest) for term in terms]).T
     prior = np.eye(len(terms)) if prior_rows is None else prior_rows
     size = np.array([np.linalg.norm(factor[:, -1]) for factor in factors]) / np.sqrt(count)
     shown = np.array([np.abs(factor[:, :-1] * spread).max(initial=0.0) for factor in factors])
@@ -78,7 +78,7 @@ def estimate(
     least = np.maximum(_LEAST_NOISE * size, dead)
     noise = np.maximum(size, dead)
     for _ in track(range(_REWEIGHTINGS), f"{len(terms)} coefficients, weighed anew"):
-        values, _ = _solve(factors, noise, expected, spread, lowest, prior)
+        values, _ = _solve(factors, noise, expected, spread, ends, prior)
         left, before = _left(given, pattern, values), (weights, noise)
         noise = np.maximum(np.sqrt((weights * left).sum(axis=0) / count), least)
         weights = robust_weights(left, rows, noise, size)
@@ -94,7 +94,7 @@ def estimate(
         mine = [block.of(slice(own[0], own[-1] + 1)) for block in blocks]
         _, effect = covariance(mine, pattern[own], [factors[e] for e in own], values, noise[own], spread, prior)
         level[own] *= np.sqrt(effect)
-    values, equations = _solve(factors, level, expected, spread, lowest, prior)
+    values, equations = _solve(factors, level, expected, spread, ends, prior)
     tell_step(f"  how sure {len(terms)} coefficients are")
     sureness, _ = covariance(blocks, pattern, factors, values, level, spread, prior)
     return Estimate(values, sureness, noise, len(blocks), equations, weights)
@@ -139,10 +139,13 @@ def _solve(
     noise: np.ndarray,
     expected: np.ndarray,
     spread: np.ndarray,
-    lowest: np.ndarray,
+    ends: np.ndarray,
     prior: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return values and their equations, solved for deviations from expectation in units of spread: well scaled."""
+    """Return values between their ends (2, K), and their equations.
+
+    They are solved for deviations from expectation in units of spread: well scaled.
+    """
     rows = np.concatenate([factor / level for factor, level in zip(factors, noise, strict=True)])
     target = rows[:, -1] - rows[:, :-1] @ expected
     scaled = np.concatenate([rows[:, :-1] * spread, prior])
@@ -150,8 +153,8 @@ def _solve(
     factor = triangle(np.column_stack([scaled, target]))
     left, right = factor[:-1, :-1], factor[:-1, -1]
     deviation = np.linalg.solve(left, right)
-    bounds = (lowest - expected) / spread
-    if np.any(deviation < bounds):
-        deviation = scipy.optimize.lsq_linear(left, right, bounds=(bounds, np.inf), method="bvls").x
+    bounds = (ends - expected) / spread
+    if np.any((deviation < bounds[0]) | (deviation > bounds[1])):
+        deviation = scipy.optimize.lsq_linear(left, right, bounds=tuple(bounds), method="bvls").x
     equations = np.column_stack([left / spread, right + left @ (expected / spread)])
-    return np.maximum(expected + deviation * spread, lowest), equations
+    return np.clip(expected + deviation * spread, *ends), equations

@@ -26,7 +26,7 @@ def effect_colour(effect: str) -> str:
 def _effects() -> dict[str, str]:
     families: dict[str, list[str]] = {}
     for name, effect in catalogue().items():
-        families.setdefault(effect.family, []).append(name)
+        families.setdefault(effect.family, []).extend((name, *effect.entries))
     return {
         name: _shade(PALETTE[place % len(PALETTE)], number)
         for place, family in enumerate(sorted(families))

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, product
 
 import numpy as np
 
 from irtwin.effects.effect import NORMAL, JointEffect
 from irtwin.identification.power_line import power_rise, power_slope, rise_over_axes
 from irtwin.signals.motion import Motion, trapezoid
-from irtwin.twin.price import cost
 from irtwin.twin.twin import LedgerEntry, Twin
 
 _PIECE = 4096  # samples whose regressor is held at once
 _LEARNT = 0.5  # of an energy: half an interval that is wider tells nothing of it
+_SURER = 0.2  # of a variance: less is no reason to be one entry
+_BELIEVED = 0.8  # of what shares make up for each other: no law of a loss is quite the robot's
 
 Key = tuple[str, str | None]  # effect and joint
 
@@ -44,21 +45,19 @@ class Entry:
 def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
     """Return the ledger of a motion as entries that the data tell; they sum to its energy.
 
-    A share whose interval is wider than that of the whole energy, and than its own, is not told: where others make up
-    for it, they are one entry.
+    A share whose interval is wider than itself is not told: where others make up for it, they are one entry.
     """
     ledger = twin.ledger(motion)
     if twin.covariance is None:
         shares = [Share(entry.effect, entry.joint, entry.energy, None, None) for entry in ledger]
         return tuple(Entry((share,), share.energy, None, None) for share in shares)
-    whole = cost(twin, [motion]).energy.half_width
-    assert whole is not None
     covariance = _covariance(twin, motion, ledger)
     energies = np.array([entry.energy for entry in ledger])
     one_way = _one_way(twin)
+    believed = np.where(covariance < 0, _BELIEVED * covariance, covariance)
 
     def interval(places: Sequence[int]) -> tuple[float, float]:
-        energy, half = energies[places].sum(), NORMAL * _deviation(covariance, places)
+        energy, half = energies[places].sum(), NORMAL * _deviation(believed, places)
         never_less = all((ledger[k].effect, ledger[k].joint) in one_way and energies[k] >= 0 for k in places)
         return float(max(energy - half, 0.0) if never_less else energy - half), float(energy + half)
 
@@ -68,7 +67,7 @@ def account(twin: Twin, motion: Motion) -> tuple[Entry, ...]:
             float(energies[places].sum()),
             *interval(places),
         )
-        for places in _joined(energies, covariance, whole)
+        for places in _joined(energies, covariance)
     )
 
 
@@ -90,7 +89,7 @@ def _covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np
     return covariance
 
 
-def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[list[int]]:
+def _joined(energies: np.ndarray, covariance: np.ndarray) -> list[list[int]]:
     """Return the places of shares by entry: what is not told goes with what makes their sum surest."""
     groups = [[k] for k in range(len(energies))]
     while len(groups) > 1:
@@ -98,10 +97,11 @@ def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[
         own, sums = join @ covariance @ join.T, np.abs(join @ energies)
         variance = np.diag(own)
         half = NORMAL * np.sqrt(np.maximum(variance, 0.0))
-        open_ones = (half > whole) & (half > _LEARNT * sums)
+        open_ones = half > _LEARNT * sums
         together = variance[:, None] + variance + 2 * own
         np.fill_diagonal(together, np.inf)
-        gain = np.where(open_ones[:, None], variance[:, None] - together, -np.inf)
+        gain = variance[:, None] - together
+        gain[~open_ones[:, None] | (gain <= _SURER * variance[:, None])] = 0.0
         first, second = np.unravel_index(int(np.argmax(gain)), gain.shape)
         if gain[first, second] <= 0:
             break
@@ -167,11 +167,12 @@ _Slope = tuple[int, np.ndarray, np.ndarray]  # an entry's row, and its slope ove
 
 def _of_work(about: _About, rows: dict[Key, int], shape: tuple[int, ...]) -> np.ndarray:
     """Return the slopes of what joints' torque works, `shape`: (E, K)."""
-    stack, names, slopes = about.twin.stack, about.twin.robot.joint_names, np.zeros(shape)
-    if any(effect.carries_torque for effect in stack.effects):
-        work = np.einsum("t,tj,tjk->jk", about.weights, about.piece.dq, about.columns)
-        for joint, k in zip(*np.nonzero(stack.pattern & stack.real), strict=True):
-            slopes[rows[stack.torque_terms[k][0].id, names[joint]], k] += work[joint, k]
+    stack, slopes = about.twin.stack, np.zeros(shape)
+    for _, own, works in stack.works(about.piece, about.columns, about.weights):
+        for (entry, work), (joint, name) in product(works.items(), enumerate(about.twin.robot.joint_names)):
+            row = rows.get((entry, name))
+            if row is not None:
+                slopes[row, own] += work[joint]
     return slopes
 
 

@@ -177,7 +177,7 @@ def _parameters(stack: Stack, terms: Terms, fit: Estimate, left: Remainder | Non
             value=float(value),
             unit=term.unit,
             lower=None if np.isnan(width) else float(max(value - width, term.lowest)),
-            upper=None if np.isnan(width) else float(value + width),
+            upper=None if np.isnan(width) else float(min(value + width, term.highest)),
         )
         for (effect, term), value, width in zip(terms, fit.values, widths, strict=True)
     ]

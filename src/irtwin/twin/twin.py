@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -182,7 +183,6 @@ class Twin:
         def enter(effect: str, joint: str | None, value: float) -> None:
             entries[effect, joint] = entries.get((effect, joint), 0.0) + value
 
-        values = np.where(self.stack.real, self.torque_values + self.stack.shift(motion), 0.0)
         durations = trapezoid(motion.time)
         for piece in motion.pieces(_PIECE):
             weights = durations[piece.start - motion.start :][: len(piece.time)]
@@ -192,14 +192,28 @@ class Twin:
                 if not effect.carries_torque:
                     enter(effect.id, term.joint, float(value))
             if any(effect.carries_torque for effect in self.stack.effects):
-                work = np.einsum("t,tj,tjk->jk", weights, piece.dq, columns) * values
-                for joint, index in zip(*np.nonzero(self.stack.pattern & self.stack.real), strict=True):
-                    effect, _ = self.stack.torque_terms[index]
-                    enter(effect.id, self.robot.joint_names[joint], float(work[joint, index]))
+                for entry, joint, value in self._work(piece, columns, weights):
+                    enter(entry, joint, value)
         shown = {effect.id for effect, _ in self.stack.power_terms if effect.channel == "measurement"}
         real = {place: value for place, value in entries.items() if place[0] not in shown}
         scale = sum(entries.values()) / total if (total := sum(real.values())) else 1.0
         return tuple(LedgerEntry(effect, joint, scale * value) for (effect, joint), value in real.items())
+
+    def _work(self, piece: Motion, columns: np.ndarray, weights: np.ndarray) -> Iterator[tuple[str, str, float]]:
+        """Yield what torque works, J: the entry of a ledger, the joint and the energy; arguments as `Stack.works`."""
+        added = self.stack.shift(piece)
+        for effect, own, works in self.stack.works(piece, columns, weights):
+            acting = [
+                (joint, name)
+                for joint, name in enumerate(self.robot.joint_names)
+                if self.stack.pattern[joint, own].any()
+            ]
+            for (entry, work), (joint, name) in product(works.items(), acting):
+                yield entry, name, float(work[joint] @ self.torque_values[own])
+            if added[own].any():
+                work = np.sum(list(works.values()), axis=0) @ added[own]
+                for joint, name in acting:
+                    yield (effect.entries or (effect.id,))[-1], name, float(work[joint])
 
     def value(self, effect: str, term: Term) -> float:
         """Return the identified value of an effect's coefficient."""
