@@ -38,7 +38,7 @@ def test_both_numbers_are_told_as_the_simulators_and_the_robots(told):
     assert said.status == 0, said.err
     assert re.search(r"Fv[\w ]* +│ +2\.25 │ +4\.[45]\d* │ +2\.\d", said.out), said.out
     assert re.search(r"Fc[\w ]* +│ +3 │ +(2|2\.0\d|1\.9\d) │ +-(1|0\.9\d*|1\.0\d) ", said.out), said.out
-    assert "No number of a joint holds torque offset (joint_1, joint_3)" in said.out
+    assert "No number of a joint holds torque offset (c of joint_1, joint_3)" in said.out
 
 
 def test_the_models_numbers_become_the_robots(told):

@@ -94,11 +94,15 @@ def spreads(stack: Stack, terms: Terms) -> np.ndarray:
     """Return (K,) the standard deviation of each term that is known before any data: of bodies by the pull, too."""
     deviations, places = np.array([term.spread for _, term in terms]), _places(terms)
     if len(places):
-        inverse = np.linalg.inv(described_bodies(stack))
-        known = PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS)
-        widths = np.sqrt(np.diagonal(np.linalg.inv(known), axis1=1, axis2=2))
+        widths = np.sqrt(np.diagonal(np.linalg.inv(known_of_described(stack)), axis1=1, axis2=2))
         deviations[places] = np.minimum(deviations[places], widths)
     return deviations
+
+
+def known_of_described(stack: Stack) -> np.ndarray:
+    """Return (n, 10, 10) the inverse covariance that the pull gives each body's inertial parameters."""
+    inverse = np.linalg.inv(described_bodies(stack))
+    return np.asarray(PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS))
 
 
 def _places(terms: Terms) -> np.ndarray:

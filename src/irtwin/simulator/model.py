@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from irtwin.document.document import CauseParameter
 from irtwin.errors import InputError
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.input_file import checksum
@@ -19,9 +20,11 @@ from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.assembly import add_servo
 from irtwin.simulator.axes import alike, first_unlike
+from irtwin.simulator.bodies import BodiesBeside
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.formats import read_model_file
 from irtwin.simulator.model_file import ModelFile
+from irtwin.twin.twin import Twin
 
 _SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
 _POSES = 64  # over whose inertia a mean is taken
@@ -93,6 +96,15 @@ class Model:
         return np.asarray(np.maximum(np.mean(inertias, axis=0), 1e-9))
 
     @cached_property
+    def unfused(self) -> mujoco.MjModel:
+        """The compiled model in which links that a URDF fixes to others are bodies of their own."""
+
+        def apart(spec: mujoco.MjSpec) -> None:
+            spec.compiler.fusestatic = False
+
+        return compiled_of(self.file, {}, apart)[0] if self.file.is_urdf else self.compiled
+
+    @cached_property
     def stiffest(self) -> np.ndarray:
         """The stiffness (n,), N m/rad, of a joint that swings as fast as it can be played; stiffer ones are rigid."""
         lightest = 1 / np.maximum(self.compiled.dof_armature[self.speeds], 1e-9) + 1 / np.minimum(self.free, self.links)
@@ -149,6 +161,10 @@ class Model:
         place = self.speeds[list(self.called).index(joint)]
         held = [name for name in NUMBERS if self.file.holds(name)]
         return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in held}
+
+    def bodies(self, twin: Twin) -> tuple[CauseParameter, ...]:
+        """Return what a twin of the robot has otherwise of links and rotors, by so much that it matters."""
+        return BodiesBeside(self, twin).told
 
 
 def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:

@@ -90,7 +90,7 @@ class UsdFile(ModelFile):
         elif out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
             raise InputError(f"{out}: is to be a layer over {self.path}; give a file beside that, and with its ending")
 
-    def changed(self, changes: Changes) -> bytes:
+    def _with_numbers(self, changes: Changes) -> bytes:
         """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes.
 
         Of a package a copy, in which such a layer comes first.
