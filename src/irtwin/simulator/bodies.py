@@ -18,8 +18,8 @@ from irtwin.document.document import CauseParameter
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import DEFAULT
-from irtwin.identification.consistent_bodies import known_of_described
-from irtwin.robot.pseudo_inertia import consistent
+from irtwin.identification.consistent_bodies import known_near
+from irtwin.robot.pseudo_inertia import consistent, pseudo_inertias
 from irtwin.simulator.axes import model_axes, poses_of, robot_axes
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model_file import Bodies
@@ -130,9 +130,8 @@ class BodiesBeside:
         known, given = np.zeros((count, count)), self.twin.covariance
         if given is None:
             return known
-        for joint, own in zip(self._joints, known_of_described(self.twin.stack), strict=True):
-            places = self._places(joint)
-            known[np.ix_(places, places)] = own
+        for places in map(self._places, self._joints):
+            known[np.ix_(places, places)] = known_near(pseudo_inertias(self._values(places)[None]))[0]
         return np.asarray(given @ np.linalg.inv(np.eye(count) + known @ given))
 
     def _covariance(self, places: list[int]) -> np.ndarray:

@@ -12,6 +12,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
+_PARTS_OF_LINKS = ("centre_", "inertia_")  # a link is told by its mass
 _SPELT_OUT = 4  # joints of one of them; of more it says how many
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
@@ -190,7 +191,8 @@ def other_numbers(differing: Sequence[OtherNumber]) -> str:
         _, _, model, robot, *_ = number
         return abs(math.log(robot / model)) if robot / (model or math.inf) > 0 else math.inf
 
-    sure = [number for number in differing if not number[-1] or not number[-1][0] <= 0 <= number[-1][1]]
+    whole = [number for number in differing if not number[0].startswith(_PARTS_OF_LINKS)]
+    sure = [number for number in whole if not number[-1] or not number[-1][0] <= 0 <= number[-1][1]]
     told = [
         f"{words.get(name, name)}{f' of {joint}' if joint else ''} "
         f"{wording.quantity(robot, '' if unit == '1' else unit).rstrip()} in place of {wording.number(model)}"
