@@ -29,6 +29,7 @@ from irtwin.twin.twin import Twin
 _SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
 _POSES = 64  # over whose inertia a mean is taken
 _APART = 1e-3  # m, frames that are at one place
+_HOLDS_NONE = 1e-9  # slope of an equality constraint over a joint that it does not hold
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
 EFFORT = " as its actuators turn it"  # behind a joint's name: the sensor of that torque
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
@@ -155,6 +156,19 @@ class Model:
             mujoco.mj_inverse(still, data)
             torque[row] = data.qfrc_inverse[self.speeds]
         return np.asarray(torque + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
+
+    @property
+    def equalities(self) -> tuple[str, ...]:
+        """The equality constraints that hold the robot's joints, by name or number: torque says nothing of them."""
+        dense = copy.copy(self.compiled)
+        dense.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        data = mujoco.MjData(dense)
+        data.qpos[self.positions] = np.random.default_rng(0).uniform(0.1, 0.5, len(self.positions))
+        mujoco.mj_fwdPosition(dense, data)
+        slopes = data.efc_J.reshape(-1, dense.nv)[:, self.speeds]
+        equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        (rows,) = np.nonzero(equal & (np.abs(slopes) > _HOLDS_NONE).any(axis=1))
+        return tuple(dense.equality(own).name or f"number {own + 1}" for own in sorted({*data.efc_id[rows].tolist()}))
 
     def numbers(self, joint: str) -> Mapping[str, float]:
         """Return a joint of the robot's numbers as the model has them, by what MJCF calls them; those that it holds."""
@@ -294,6 +308,11 @@ def with_simulated_runs(data_set: DataSet, model: Model) -> DataSet:
     if not any(run.signals.torque is not None for run in observed):
         raise InputError(
             f"{data_set.folder}: no run has torque to hold the simulator against; log tau_JOINT or i_JOINT"
+        )
+    if model.equalities:
+        raise InputError(
+            f"{model.file.path}: equality constraints hold the robot's joints ({', '.join(model.equalities)}), and "
+            'what torque these take is not worked out; give them active="false", or log commands: they are played so'
         )
     for run in data_set.runs:
         if not run.says_effort:
