@@ -58,11 +58,11 @@ def written(folder, text, ending=".xml"):
     return read_model(file, ROBOT), beside
 
 
-def check_torque(model, rotors):
+def check_torque(model, rotors, digits=9):
     rng = np.random.default_rng(0)
     q, dq, ddq = rng.uniform(-1.5, 1.5, (3, 30, 4))
     alone = inverse_dynamics(ROBOT.model, q, dq, ddq)
-    np.testing.assert_allclose(model.torque(q, dq, ddq), alone + ddq * rotors, atol=1e-9 * np.abs(alone).max())
+    np.testing.assert_allclose(model.torque(q, dq, ddq), alone + ddq * rotors, atol=10.0**-digits * np.abs(alone).max())
 
 
 @pytest.mark.parametrize("form", ["mjcf", "urdf", "sdf"])
@@ -77,6 +77,16 @@ def test_what_else_hangs_on_the_robot_stays_if_its_link_is_a_body_without_it(tmp
     model, _ = written(tmp_path, OTHER_FRAMES.replace('mass="0.3"', f'mass="{mass}"'))
     check_torque(model, ROTORS)
     assert (model.compiled.body("tool").mass[0], model.compiled.body("finger").mass[0]) == (left, 0.05)
+
+
+def test_a_usd_has_them_in_its_layer(tmp_path):
+    pytest.importorskip("pxr", reason="irtwin[usd] is not installed")
+    file = tmp_path / "arm.usda"
+    file.write_text(text_of(twin(WRONG), "usd"), encoding="utf-8")
+    model = read_model(file, ROBOT)
+    layer = tmp_path / "better.usda"
+    layer.write_bytes(model.file.changed({}, BodiesBeside(model, twin()).written))
+    check_torque(read_model(layer, ROBOT), ROTORS, digits=6)
 
 
 def test_what_is_off_is_told_by_link(tmp_path):
