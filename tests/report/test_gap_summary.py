@@ -146,6 +146,18 @@ def test_a_number_that_may_be_the_simulators_is_not_in_the_line():
     )
 
 
+def test_that_a_split_between_links_is_the_descriptions_is_said_beside_a_simulator():
+    told = gap_cases.document("attributed")
+    causes = (
+        replace(told.causes[0], effect="rigid_body", joints=()),
+        replace(told.causes[1], effect="servo_dead_band"),
+    )
+    alone, beside = (replace(told, causes=causes, simulator=simulator) for simulator in (None, "arm"))
+    (said,) = summary.meanings(beside)
+    assert said.startswith("Torque shows sums over links") and summary.meanings(alone) == []
+    assert summary.causes(beside).rows[0]["parameter"] == "Fs of joint_a3"
+
+
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     rows = summary.causes(gap_cases.document("attributed")).rows
     assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [

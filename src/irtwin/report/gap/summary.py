@@ -203,8 +203,9 @@ def meanings(diagnosis: Document) -> list[str]:
         for effect, name in parameters
         if (effect, name) in meaning
     ]
-    of_bodies = any(catalogue()[cause.effect].bodies and diagnosis.simulator for cause in diagnosis.mattering)
-    return [*known, _SPLIT] if of_bodies else known
+    bodies = {effect.id for effect in catalogue().values() if effect.bodies}
+    split = diagnosis.simulator is not None and any(cause.effect in bodies for cause in diagnosis.mattering)
+    return [*known, _SPLIT] if split else known
 
 
 def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:
