@@ -23,7 +23,7 @@ from irtwin.proposed_motion import save_motion
 from irtwin.resources import resources_of
 from irtwin.signals.log import DataSet
 from irtwin.signals.sampling import checked_cutoff
-from irtwin.simulator.differences import drawn, written
+from irtwin.simulator.differences import bodies_beside, drawn, written
 from irtwin.simulator.model import Model, read_model, with_simulated_runs
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
@@ -164,8 +164,8 @@ class _Files:
             announce(f"Writing {self.simulator}")
             for file, content in zip((self.simulator, *self.draws), _models(diagnosis, model, seed), strict=False):
                 write(file, content)
-            if isinstance(diagnosis, Playing) and (lacking := diagnosis.unwritten):
-                announce(f"  {self.simulator} has no place for {', '.join(lacking)}: these stay as they are")
+            for line in _said_of_written(self.simulator, diagnosis, model):
+                announce(f"  {line}")
         if self.sysid is not None:
             _write_script(data_set, diagnosis, self.sysid, announce)
         if self.json is not None:
@@ -185,6 +185,17 @@ class _Files:
             render_alone(data_set, diagnosis.document, diagnosis.curves, self.report, resources)
 
 
+def _said_of_written(file: Path, diagnosis: Diagnosis | Playing, model: Model) -> Iterator[str]:
+    if isinstance(diagnosis, Playing):
+        if lacking := diagnosis.unwritten:
+            yield f"{file} has no place for {', '.join(lacking)}: these stay as they are"
+    elif (beside := bodies_beside(model, diagnosis.document, diagnosis.twin)) is not None:
+        if beside.written:
+            yield f"{file} has all bodies{' and rotors' if beside.rotors else ''} of the twin with the causes"
+        else:
+            yield f"{file} cannot be given other bodies: these and the rotors stay as they are; write them in by hand"
+
+
 def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
     if isinstance(diagnosis, Playing) and diagnosis.chosen.differs.any():
         write(file, script(diagnosis.chosen, diagnosis.document, data_set.folder, file))
@@ -195,7 +206,7 @@ def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path,
 def _models(diagnosis: Diagnosis | Playing, model: Model, seed: int) -> Iterator[bytes]:
     """Yield the model's file with the robot's numbers, then, without end, with these as they could be."""
     rng = np.random.default_rng(seed)
-    yield diagnosis.written() if isinstance(diagnosis, Playing) else written(model, diagnosis.document)
+    yield diagnosis.written() if isinstance(diagnosis, Playing) else written(model, diagnosis.document, diagnosis.twin)
     while True:
         yield (
             diagnosis.drawn(rng)

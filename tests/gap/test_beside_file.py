@@ -11,7 +11,7 @@ from tests.gap_cases import document, parameter
 from irtwin.document.document import CauseParameter
 from irtwin.effects.effect import Term, quantity
 from irtwin.gap import beside_file
-from irtwin.gap.beside_file import alone_in_file, beside
+from irtwin.gap.beside_file import alone_in_file, beside, with_bodies
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.simulator.differences import not_held
@@ -26,7 +26,7 @@ def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model()
     )
     told = beside(lambda joint: {"damping": 19.0}, warm, {})
     assert [(one.simulator, one.robot) for one in told.parameters] == [(None, None), (19.0, 9.5)]
-    assert not_held(SimpleNamespace(causes=(told,))) == (told,)
+    assert not_held(SimpleNamespace(causes=(told,))) == (replace(told, parameters=(thinning,)),)
     coupled = replace(warm, effect="joint_coupling", parameters=(damping,))
     assert beside(lambda joint: {"damping": 19.0}, coupled, {}) == coupled  # a friction of its own
 
@@ -40,6 +40,20 @@ def test_friction_that_goes_with_what_no_file_holds_is_written_as_it_is_best_the
     assert (sure.value, sure.simulator, sure.robot) == (-0.2, 8.0, 7.8)
     (unsure,) = beside(lambda joint: numbers, dry, {key: parameter(-0.1, (-0.3, 0.1))}).parameters
     assert (unsure.value, unsure.simulator, unsure.robot) == (-1.0, None, None)  # the file's number stays
+
+
+def test_where_bodies_differ_links_and_rotors_are_told_by_the_twin():
+    cause = replace(document("attributed").causes[0], scope="changed", confidence=0.9, folded_away=None)
+    bodies = replace(cause, effect="rigid_body", joints=(), parameters=(parameter(0.1, None),))
+    own = CauseParameter(name="Ia", joint="joint_a2", value=0.3, unit="kg m^2", interval95=None, simulator=0.5)
+    rotors = replace(cause, effect="rotor_inertia", joints=("joint_a2",), parameters=(own,))
+    mass = CauseParameter(name="mass (link_4)", joint="joint_a4", value=1.5, unit="kg", interval95=(-2.0, 5.0))
+    told = (mass, replace(own, value=0.4), replace(own, joint="joint_a3"))
+    model = SimpleNamespace(name="m", bodies=lambda twin: told)
+    by_link, of_rotors = with_bodies((bodies, rotors), model, None)
+    assert by_link.parameters == (mass, told[2]) and of_rotors.parameters == (told[1],)
+    for alike in (replace(bodies, confidence=0.3), replace(bodies, folded_away=True)):
+        assert with_bodies((alike, rotors), model, None) == (alike, rotors)
 
 
 def test_what_is_best_in_a_file_is_fitted_without_the_friction_that_it_cannot_hold(monkeypatch: pytest.MonkeyPatch):

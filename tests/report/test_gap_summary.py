@@ -9,6 +9,7 @@ from tests import gap_cases
 
 from irtwin.document.document import Document, FrictionSpread
 from irtwin.report.gap import summary
+from irtwin.simulator.differences import not_held
 
 CAUSES = (
     "(96 % sure): viscous friction (70 %) and stribeck friction (96 %). Adding this to the twin closes 93 % of the gap "
@@ -117,6 +118,46 @@ def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
     played, measured = summary.not_held(document.causes[:2], document)
     assert "keeps that difference, 2.1 mrad (mm) RMS where 0.3 are left with irtwin.simulator.callback." in played
     assert measured.endswith("the simulator's model keeps that difference.")
+
+
+def test_of_a_cause_that_the_model_holds_in_part_the_rest_is_said_with_the_reason():
+    cause = gap_cases.document("attributed").causes[0]
+    number = gap_cases.parameter(-0.7, (-0.9, -0.6), 8.8)
+    warm = replace(number, name="k", simulator=None, robot=None)
+    dry = replace(cause, effect="coulomb_friction", scope="changed", joints=("joint_a2", "joint_a3"), folded_away=None)
+    dry = replace(dry, confidence=0.9, parameters=(number, replace(number, joint="joint_a3", simulator=None)))
+    warm = replace(dry, effect="temperature_dependent_friction", parameters=(number, replace(warm, joint="joint_a3")))
+    told = gap_cases.document("attributed")
+    document = replace(told, causes=(dry, replace(warm, id=told.causes[1].id), *told.causes[2:]))
+    assert summary.not_held(not_held(document), document) == [
+        "The simulator's model keeps its own Fc of joint_a3 (coulomb friction): its format has none, or another is not "
+        "sure to be better in it, without what no number holds.",
+        "No number of a joint holds temperature dependent friction (k of joint_a3): the simulator's model keeps that "
+        "difference.",
+    ]
+
+
+def test_a_number_that_may_be_the_simulators_is_not_in_the_line():
+    cause = replace(gap_cases.document("attributed").causes[0], scope="changed", confidence=0.9, folded_away=None)
+    numbers = (gap_cases.parameter(-0.7, (-0.9, -0.6), 8.8), gap_cases.parameter(0.1, (-0.1, 0.3), 4.0))
+    told = gap_cases.document("attributed")
+    document = replace(told, causes=(replace(cause, parameters=numbers), *told.causes[1:]))
+    said = summary.line(document, "simulated")
+    assert "simulator: frictionloss (Fc) of joint_a2 8.10 N m in place of 8.80. " in said.replace(
+        "\N{NO-BREAK SPACE}", " "
+    )
+
+
+def test_that_a_split_between_links_is_the_descriptions_is_said_beside_a_simulator():
+    told = gap_cases.document("attributed")
+    causes = (
+        replace(told.causes[0], effect="rigid_body", joints=()),
+        replace(told.causes[1], effect="servo_dead_band"),
+    )
+    alone, beside = (replace(told, causes=causes, simulator=simulator) for simulator in (None, "arm"))
+    (said,) = summary.meanings(beside)
+    assert said.startswith("Torque shows sums over links") and summary.meanings(alone) == []
+    assert summary.causes(beside).rows[0]["parameter"] == "Fs of joint_a3"
 
 
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():

@@ -54,8 +54,10 @@ def test_numbers_of_the_simulator_are_said_the_farthest_first():
     numbers = [("k", None, None), ("Fv", 19.2, 8.71), ("Fc", 7.55, 5.89), ("mu", 0.0, 0.04), ("Ia", 2.0, 2.1)]
     parameters = [
         {"cause": "c1", "name": name, "joint": "j1", "simulator": simulator, "robot": robot, "unit": "N m"}
+        | {"lower": None, "upper": None}
         for name, simulator, robot in numbers
     ]
+    parameters.append(parameters[-1] | {"name": "offset", "simulator": 0.0, "lower": -0.01, "upper": 0.007})
     said = plain(sentence(answers("changed", simulated=True, parameters=parameters)))
     assert said.startswith(
         "The robot has other numbers than the simulator: mu of j1 0.0400 N m in place of 0, damping (Fv) of j1 8.71 "

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from tests import data_sets, mujoco_models, synthetic
 from tests.data_sets import irtwin, irtwin_refuses
 
 from irtwin.simulator.model import read_model
+from irtwin.twin.files import load
 
 pytestmark = pytest.mark.slow
 ROBOT = synthetic.arm(3)
@@ -38,7 +40,7 @@ def test_both_numbers_are_told_as_the_simulators_and_the_robots(told):
     assert said.status == 0, said.err
     assert re.search(r"Fv[\w ]* +│ +2\.25 │ +4\.[45]\d* │ +2\.\d", said.out), said.out
     assert re.search(r"Fc[\w ]* +│ +3 │ +(2|2\.0\d|1\.9\d) │ +-(1|0\.9\d*|1\.0\d) ", said.out), said.out
-    assert "No number of a joint holds torque offset (joint_1, joint_3)" in said.out
+    assert "No number of a joint holds torque offset (c of joint_1, joint_3)" in said.out
 
 
 def test_the_models_numbers_become_the_robots(told):
@@ -56,6 +58,38 @@ def test_draws_of_it_lie_where_its_numbers_could(told):
     dampings = [numbers("joint_2")["damping"] for numbers in drawn]
     assert len(set(dampings)) == 3 and dampings == pytest.approx([TRUE["Fv"][1]] * 3, rel=0.1)
     assert all(numbers("joint_1") == before.numbers("joint_1") for numbers in drawn)
+
+
+def test_a_mass_and_a_rotor_that_are_off_together_are_told_and_written(tmp_path):
+    """The rotor shows beside its link alone, which is not off: both are asked for once bodies are taken in."""
+    robot = synthetic.arm(4)
+    true = synthetic.truth(robot)
+    runs = [
+        synthetic.as_run(synthetic.measure(robot, synthetic.swing(robot, seed, 8.0), noise=0.1, seed=seed), power=None)
+        for seed in range(5)
+    ]
+    *fitted, held_out = [replace(run, signals=replace(run.signals, current=None)) for run in runs]
+    data = data_sets.write(tmp_path / "data", robot, fitted, head="torque_scale_uncertainty = 0.0")
+    rotors = true["Ia"] * [1.0, 0.5, 1.0, 1.0]
+    lighter = synthetic.heavier(robot, 1.0, 1.0, 1.0, 0.5)
+    wrong = mujoco_models.write(
+        tmp_path / "arm.xml", lighter, armature=rotors, damping=true["Fv"], frictionloss=true["Fc"]
+    )
+    new, closed = tmp_path / "better.xml", tmp_path / "closed.json"
+    said = irtwin("diagnose", data, "--simulator", wrong, "--save-simulator", new, "--save-twin", closed)
+    assert said.status == 0, said.err
+    assert re.search(r"mass \(link_4\) of joint_4 +│ +1 │ +(1\.[89]|2|2\.[01])\d* ", said.out), said.out
+    assert re.search(r"Ia of joint_2 ", said.out), said.out
+    assert f"{new} has all bodies and rotors of the twin with the causes" in said.err
+    before, after = read_model(wrong, robot), read_model(new, robot)
+    assert after.numbers("joint_2")["armature"] == pytest.approx(true["Ia"][1], rel=0.1)
+    motion = synthetic.swing(robot, 4, 8.0)
+    torques = [model.torque(motion.q, motion.dq, motion.ddq) for model in (before, after)]
+    left = [
+        np.std(held_out.signals.torque - torque, axis=0).mean()  # a file has no offsets
+        for torque in (*torques, load(closed).torque(motion))
+    ]
+    assert left[1] < 1.1 * left[2] < 0.5 * left[0], left
 
 
 def test_a_file_for_the_model_needs_a_model(tmp_path):

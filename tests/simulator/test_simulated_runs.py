@@ -65,3 +65,26 @@ def test_a_run_of_commands_alone_beside_runs_with_torque_is_refused(tmp_path):
     alone = replace(second, signals=replace(second.signals, torque=None, current=None, power=None))
     with pytest.raises(InputError, match=r"has commands and no torque, where other runs have torque; leave it out"):
         with_simulated_runs(replace(data_set, runs=(first, alone)), model)
+
+
+@pytest.mark.parametrize(
+    ("constraint", "names"),
+    [
+        ('<joint name="tied" joint1="joint_3" joint2="joint_2"/>', r"\(tied\)"),
+        ('<connect body1="link_3" anchor="0.1 0 0"/>', r"\(number 1\)"),
+        ('<joint joint1="joint_3" active="false"/>', None),
+        ('<joint joint1="left" joint2="right"/>', None),
+    ],
+)
+def test_constraints_that_hold_the_arm_are_refused_beside_torque(tmp_path, constraint, names):
+    data_set, _ = made(tmp_path)
+    file = tmp_path / "arm.xml"
+    fingers = [f'<body><joint name="{side}" type="slide"/><geom size="0.01"/></body>' for side in ("left", "right")]
+    text = file.read_text().replace("</worldbody>", f"{''.join(fingers)}</worldbody>")
+    file.write_text(text.replace("</mujoco>", f"<equality>{constraint}</equality></mujoco>"), encoding="utf-8")
+    model = read_model(file, ROBOT)
+    if names is None:
+        assert len(with_simulated_runs(data_set, model).runs) == 4
+    else:
+        with pytest.raises(InputError, match=rf"equality constraints hold the robot's joints {names}, and what"):
+            with_simulated_runs(data_set, model)

@@ -22,14 +22,17 @@ def test_a_family_and_an_effect_stand_for_numbers_of_servos_too():
     assert trusted(()) == NOTHING
     bodies = trusted(["bodies"])
     assert bodies.effects == ("rigid_body", "rotor_inertia") and bodies.numbers == {"armature"}
+    masses = trusted(["masses"])
+    assert masses.effects == ("rigid_body",) and not masses.numbers
     some = trusted(["coulomb_friction", "command_delay", "external_contact"])
     assert some.effects == ("coulomb_friction", "external_contact")
     assert some.numbers == {"friction", "delay", "push"} and some.pushes
 
 
 def test_what_is_neither_is_refused_with_the_families():
-    with pytest.raises(InputError, match=r"trust masses: is neither a family of effects \(bodies, drive, .*\) nor an"):
-        trusted(["masses"])
+    said = r"trust weights: is neither a family of effects \(bodies, drive, .*\), nor masses, .*, nor an effect's id"
+    with pytest.raises(InputError, match=said):
+        trusted(["weights"])
 
 
 @pytest.mark.slow

@@ -209,7 +209,8 @@ def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, 
     "--trust",
     metavar="FAMILY",
     multiple=True,
-    help="Hold these to be right, as bodies or friction, or one effect: no cause is looked for there. Repeatable.",
+    help="Hold these to be right, as bodies, masses (bodies without rotors) or friction, or one effect: no cause is "
+    "looked for there. Repeatable.",
 )
 @click.option(
     "--cutoff",

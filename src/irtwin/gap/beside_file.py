@@ -14,6 +14,7 @@ from irtwin.gap.isolation.finding import ChannelFinding, numbers_without
 from irtwin.gap.regression.hypotheses import CHANGED
 from irtwin.gap.writing import least_change, parameter
 from irtwin.twin.torque_scale import FittedTorqueScale
+from irtwin.twin.twin import Twin
 
 Changes = Mapping[tuple[str, str], CauseParameter]  # by joint and name
 Numbers = Callable[[str], Mapping[str, float]]  # a simulator's, of a joint, by what MJCF calls them
@@ -28,6 +29,9 @@ class Simulator(Protocol):
 
     def numbers(self, joint: str) -> Mapping[str, float]:
         """Return a joint's numbers, by what MJCF calls them."""
+
+    def bodies(self, twin: Twin) -> Sequence[CauseParameter]:
+        """Return what a twin has otherwise of links and rotors, by so much that it matters."""
 
 
 def of_simulated_runs(findings: Sequence[ChannelFinding]) -> Numbers:
@@ -58,6 +62,35 @@ def beside(numbers: Numbers, cause: Cause, alone: Changes) -> Cause:
         return replace(in_file, simulator=own, robot=max(0.0, own + in_file.value))
 
     return replace(cause, parameters=tuple(map(told, cause.parameters)))
+
+
+def bodies_differ(causes: Sequence[Cause]) -> bool:
+    """Return whether bodies that the verdict counts are among the causes."""
+    return any(map(_is_of_bodies, causes))
+
+
+def _is_of_bodies(cause: Cause) -> bool:
+    return cause.likely and cause.scope == CHANGED and not cause.folded_away and catalogue()[cause.effect].bodies
+
+
+def with_bodies(causes: Sequence[Cause], simulator: Simulator, twin: Twin) -> tuple[Cause, ...]:
+    """Return the causes with what differs link by link, by the twin that has them, where bodies differ.
+
+    Rotors, too: data tell a link's inertia about its own axis from its rotor's by what the twin knew before alone.
+    """
+    if not bodies_differ(causes):
+        return tuple(causes)
+    told = {(number.joint, number.name): number for number in simulator.bodies(twin)}
+    named = {(number.joint, number.name) for cause in causes if not _is_of_bodies(cause) for number in cause.parameters}
+    own = tuple(number for place, number in told.items() if place not in named)
+
+    def beside_bodies(cause: Cause) -> Cause:
+        if _is_of_bodies(cause):
+            return replace(cause, parameters=own)
+        numbers = (told.get((number.joint, number.name), number) for number in cause.parameters)
+        return replace(cause, parameters=tuple(numbers))
+
+    return tuple(map(beside_bodies, causes))
 
 
 def alone_in_file(causes: Sequence[tuple[ChannelFinding, FoundCause]], scale: FittedTorqueScale | None) -> Changes:

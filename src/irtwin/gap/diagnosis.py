@@ -13,7 +13,7 @@ from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
-from irtwin.gap.beside_file import Simulator, alone_in_file, beside, of_simulated_runs
+from irtwin.gap.beside_file import Simulator, alone_in_file, beside, of_simulated_runs, with_bodies
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
@@ -122,6 +122,8 @@ class Diagnosis:
             findings = writing.between_sides(findings, self.channels, ids_of)
         findings = apart.findings(findings, causes, self.thresholds.matters)
         causes = writing.folded(causes, findings)
+        if self.simulator is not None and self.twin is not None:
+            causes = with_bodies(causes, self.simulator, self.twin)
         judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
         shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, between=between)

@@ -95,11 +95,18 @@ def spreads(stack: Stack, terms: Terms) -> np.ndarray:
     """Return (K,) the standard deviation of each term that is known before any data: of bodies by the pull, too."""
     deviations, places = np.array([term.spread for _, term in terms]), _places(terms)
     if len(places):
-        inverse = np.linalg.inv(described_bodies(stack))
-        known = PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS)
-        widths = np.sqrt(np.diagonal(np.linalg.inv(known), axis1=1, axis2=2))
+        widths = np.sqrt(np.diagonal(np.linalg.inv(known_near(described_bodies(stack))), axis1=1, axis2=2))
         deviations[places] = np.minimum(deviations[places], widths)
     return deviations
+
+
+def known_near(bodies: np.ndarray) -> np.ndarray:
+    """Return (n, 10, 10) the inverse covariance that the pull gives the inertial parameters of pseudo-inertias.
+
+    It is the curvature of the divergence there, wherever the described bodies are.
+    """
+    inverse = np.linalg.inv(bodies)
+    return np.asarray(PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS))
 
 
 def _places(terms: Terms) -> np.ndarray:

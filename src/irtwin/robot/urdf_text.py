@@ -90,7 +90,7 @@ def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping
     for element in reversed(outermost(content).children):  # from behind: places before stay right
         name = element.attributes.get("name", "")
         if element.tag == "link" and name in bodies:
-            content = with_child(content, element, "inertial", _inertial(bodies[name]))
+            content = with_child(content, element, "inertial", inertial(bodies[name]))
         elif element.tag == "joint" and dynamics.get(name):
             present = next((child.attributes for child in element.children if child.tag == "dynamics"), {})
             words = present | {key: repr(value) for key, value in dynamics[name].items()}
@@ -99,7 +99,8 @@ def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping
     return content.decode("utf-8")
 
 
-def _inertial(body: pin.Inertia) -> str:
+def inertial(body: pin.Inertia) -> str:
+    """Return a body's element, in its link's frame."""
     centre = " ".join(map(repr, body.lever.tolist()))
     moments = " ".join(f'{name}="{value!r}"' for name, value in zip(MOMENTS, six_numbers(body.inertia), strict=True))
     return f'<inertial><origin xyz="{centre}"/><mass value="{float(body.mass)!r}"/><inertia {moments}/></inertial>'

@@ -39,26 +39,38 @@ class Axes:
         return Axes(self.direction[:, :count], self.point[:, :count], self.turns[:count])
 
     def _alike(self, other: Axes) -> bool:
-        turned = other._turned_as(self)
-        apart = np.linalg.norm(turned.direction - self.direction, axis=2)
-        across = np.eye(3) - self.direction[..., None] * self.direction[..., None, :]
-        across, gap = across[:, self.turns], (self.point - turned.point)[:, self.turns]
-        normal, right = across.sum(axis=(0, 1)), np.einsum("pnij,pnj->i", across, gap)
-        moved = gap - np.linalg.lstsq(normal, right, rcond=None)[0]
-        off = np.linalg.norm(np.einsum("pnij,pnj->pni", across, moved), axis=2)
+        turn, shift = other.base_in(self)
+        apart = np.linalg.norm(other.direction @ turn.T - self.direction, axis=2)
+        gap = self.point - other.point @ turn.T - shift
+        off = np.linalg.norm((gap - self._along(gap))[:, self.turns], axis=2)
         reach = np.linalg.norm(self.point - self.point[:, :1], axis=2).max()
         return bool(apart.max() <= _ALIKE and off.max(initial=0.0) <= max(_ALIKE * reach, 1e-6))
 
-    def _turned_as(self, other: Axes) -> Axes:
-        """Return them in the frame in which they are turned as another's are, by least squares (Kabsch)."""
+    def base_in(self, other: Axes) -> tuple[np.ndarray, np.ndarray]:
+        """Return how the base frame lies in that of another's drawing: its axes (3, 3) and its place (3,), m.
+
+        By least squares; where all axes are parallel nothing says how far along them: there it stays.
+        """
+        turn = self._turn_to(other)
+        across = np.eye(3) - other.direction[..., None] * other.direction[..., None, :]
+        gap = other.point - self.point @ turn.T
+        normal = across[:, other.turns].sum(axis=(0, 1))
+        right = np.einsum("pnij,pnj->i", across[:, other.turns], gap[:, other.turns])
+        return turn, np.linalg.lstsq(normal, right, rcond=None)[0]
+
+    def _along(self, vectors: np.ndarray) -> np.ndarray:
+        """Return the part of vectors (P, n, 3) along the axes."""
+        return np.asarray(np.sum(vectors * self.direction, axis=2, keepdims=True) * self.direction)
+
+    def _turn_to(self, other: Axes) -> np.ndarray:
+        """Return the turn (3, 3) of its vectors to another's, by least squares (Kabsch)."""
         pairs = [(self.direction, other.direction)]
         values = np.linalg.svd(other.direction.reshape(-1, 3), compute_uv=False)
         if values[1] < _PARALLEL * values[0]:  # what turns about them shows by how they move
             pairs.append((self.point - self.point.mean(axis=0), other.point - other.point.mean(axis=0)))
         own, its = (np.concatenate([vectors.reshape(-1, 3) for vectors in some]) for some in zip(*pairs, strict=True))
         left, _, right = np.linalg.svd(own.T @ its)
-        turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-        return Axes(self.direction @ turn, self.point @ turn, self.turns)
+        return np.asarray((left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right).T)
 
 
 def poses_of(robot: Robot) -> np.ndarray:

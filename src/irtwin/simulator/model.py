@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from irtwin.document.document import CauseParameter
 from irtwin.errors import InputError
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.input_file import checksum
@@ -19,13 +20,16 @@ from irtwin.signals.conditioning import condition_for_fit
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator.assembly import add_servo
 from irtwin.simulator.axes import alike, first_unlike
+from irtwin.simulator.bodies import BodiesBeside
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.formats import read_model_file
 from irtwin.simulator.model_file import ModelFile
+from irtwin.twin.twin import Twin
 
 _SWING = 2.0  # of an angle that a spring turns in a step, squared, at most: beyond 4 the integration diverges
 _POSES = 64  # over whose inertia a mean is taken
 _APART = 1e-3  # m, frames that are at one place
+_HOLDS_NONE = 1e-9  # slope of an equality constraint over a joint that it does not hold
 _SLIDES = 2  # of MuJoCo's kinds of joints, as 3 turns; the others have more coordinates than one
 EFFORT = " as its actuators turn it"  # behind a joint's name: the sensor of that torque
 NUMBERS = ("armature", "damping", "frictionloss")  # of a joint, kg m^2, N m s/rad, N m
@@ -93,6 +97,15 @@ class Model:
         return np.asarray(np.maximum(np.mean(inertias, axis=0), 1e-9))
 
     @cached_property
+    def unfused(self) -> mujoco.MjModel:
+        """The compiled model in which links that a URDF fixes to others are bodies of their own."""
+
+        def apart(spec: mujoco.MjSpec) -> None:
+            spec.compiler.fusestatic = False
+
+        return compiled_of(self.file, {}, apart)[0] if self.file.is_urdf else self.compiled
+
+    @cached_property
     def stiffest(self) -> np.ndarray:
         """The stiffness (n,), N m/rad, of a joint that swings as fast as it can be played; stiffer ones are rigid."""
         lightest = 1 / np.maximum(self.compiled.dof_armature[self.speeds], 1e-9) + 1 / np.minimum(self.free, self.links)
@@ -144,11 +157,28 @@ class Model:
             torque[row] = data.qfrc_inverse[self.speeds]
         return np.asarray(torque + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
+    @property
+    def equalities(self) -> tuple[str, ...]:
+        """The equality constraints that hold the robot's joints, by name or number: torque says nothing of them."""
+        dense = copy.copy(self.compiled)
+        dense.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        data = mujoco.MjData(dense)
+        data.qpos[self.positions] = np.random.default_rng(0).uniform(0.1, 0.5, len(self.positions))
+        mujoco.mj_fwdPosition(dense, data)
+        slopes = data.efc_J.reshape(-1, dense.nv)[:, self.speeds]
+        equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        (rows,) = np.nonzero(equal & (np.abs(slopes) > _HOLDS_NONE).any(axis=1))
+        return tuple(dense.equality(own).name or f"number {own + 1}" for own in sorted({*data.efc_id[rows].tolist()}))
+
     def numbers(self, joint: str) -> Mapping[str, float]:
         """Return a joint of the robot's numbers as the model has them, by what MJCF calls them; those that it holds."""
         place = self.speeds[list(self.called).index(joint)]
         held = [name for name in NUMBERS if self.file.holds(name)]
         return {name: float(getattr(self.compiled, f"dof_{name}")[place]) for name in held}
+
+    def bodies(self, twin: Twin) -> tuple[CauseParameter, ...]:
+        """Return what a twin of the robot has otherwise of links and rotors, by so much that it matters."""
+        return BodiesBeside(self, twin).told
 
 
 def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
@@ -278,6 +308,11 @@ def with_simulated_runs(data_set: DataSet, model: Model) -> DataSet:
     if not any(run.signals.torque is not None for run in observed):
         raise InputError(
             f"{data_set.folder}: no run has torque to hold the simulator against; log tau_JOINT or i_JOINT"
+        )
+    if model.equalities:
+        raise InputError(
+            f"{model.file.path}: equality constraints hold the robot's joints ({', '.join(model.equalities)}), and "
+            'what torque these take is not worked out; give them active="false", or log commands: they are played so'
         )
     for run in data_set.runs:
         if not run.says_effort:

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
+import pinocchio as pin
+
 from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
-from irtwin.robot.xml_elements import Element, outermost
+from irtwin.robot.structure import six_numbers
+from irtwin.robot.urdf_text import inertial
+from irtwin.robot.xml_elements import Element, outermost, with_child, words
 from irtwin.simulator.engine import mujoco
 
 _MOST = 20_000_000  # bytes
@@ -19,6 +23,8 @@ _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture"
 
 
 Changes = Mapping[Element, Mapping[str, float | str | None]]
+Bodies = Mapping[str, pin.Inertia]
+"""Bodies by name, each in its own frame."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +35,15 @@ class ModelFile:
     content: bytes
     elements: tuple[Element, ...]
 
-    def changed(self, changes: Changes) -> bytes:
-        """Return the file with attributes of elements changed; all else stays, byte for byte.
+    def changed(self, changes: Changes, bodies: Bodies | None = None) -> bytes:
+        """Return the file with attributes of elements, and bodies, changed; all else stays, byte for byte.
 
         A number takes the place of the first one of several, a text that of all, None takes the attribute out. The key
         "" gives the element another name.
         """
+        return self._with_bodies(self._with_numbers(changes), bodies or {})
+
+    def _with_numbers(self, changes: Changes) -> bytes:
         content = self.content
         for own in sorted(changes, key=lambda element: -element.start):  # from behind: places before stay right
             text, after = content[own.start : own.inside] or f"<{own.tag}/>".encode(), content[own.inside :]
@@ -47,6 +56,26 @@ class ModelFile:
                         after = after.replace(f"</{own.tag}".encode(), f"</{value}".encode(), 1)
             content = content[: own.start] + text + after
         return content
+
+    def _with_bodies(self, content: bytes, bodies: Bodies) -> bytes:
+        for name, body in bodies.items():
+            element = next(own for own in outermost(content).walk() if _is_body(own, name))
+            content = with_child(content, element, "inertial", self._inertial(body))
+        return content
+
+    def _inertial(self, body: pin.Inertia) -> str:
+        if self.is_urdf:
+            return inertial(body)
+        if not body.mass:  # MuJoCo takes no six zeros
+            return '<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>'
+        centre, moments = words(*body.lever), words(*six_numbers(body.inertia))
+        return f'<inertial pos="{centre}" mass="{float(body.mass)!r}" fullinertia="{moments}"/>'
+
+    def holds_body(self, name: str) -> bool:
+        """Return whether a body is the file's own, and has the inertia that the file says."""
+        compilers = [element.attributes for element in self.elements if element.tag == "compiler"]
+        otherwise = any(own.get("inertiafromgeom") == "true" or "settotalmass" in own for own in compilers)
+        return not otherwise and any(_is_body(element, name) for element in self.elements)
 
     def element(self, tags: Sequence[str], key: str, value: str) -> Element:
         """Return the element of one of some tags with an attribute's value.
@@ -127,6 +156,10 @@ def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
             )
         if element == "include" and place not in seen:
             check_inside(read_xml(place), folder, seen)
+
+
+def _is_body(element: Element, name: str) -> bool:
+    return element.tag in ("body", "link") and element.attributes.get("name") == name
 
 
 def _files(file: ModelFile) -> Iterator[tuple[str, str]]:

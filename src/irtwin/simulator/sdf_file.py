@@ -18,9 +18,9 @@ from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell
-from irtwin.robot.structure import inertia_of
+from irtwin.robot.structure import MOMENTS, inertia_of, six_numbers
 from irtwin.robot.xml_elements import Element as XmlElement
-from irtwin.robot.xml_elements import numbers, outermost, with_child
+from irtwin.robot.xml_elements import numbers, outermost, with_child, words
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model_file import Changes, ModelFile
@@ -62,7 +62,13 @@ class SdfFile(ModelFile):
         """Return the joint, and the element of its <dynamics> that holds a number."""
         return self.element(["joint"], "name", joint), _IN_SDF[number]
 
-    def changed(self, changes: Changes) -> bytes:
+    def _inertial(self, body: pin.Inertia) -> str:
+        moments = zip(MOMENTS, six_numbers(body.inertia), strict=True)
+        inertia = "".join(f"<{name}>{value!r}</{name}>" for name, value in moments)
+        pose, mass = words(*body.lever, 0, 0, 0), float(body.mass)
+        return f"<inertial><pose>{pose}</pose><mass>{mass!r}</mass><inertia>{inertia}</inertia></inertial>"
+
+    def _with_numbers(self, changes: Changes) -> bytes:
         """Return the file with numbers of joints and controllers changed; all else stays, byte for byte."""
         content = self.content
         for own in sorted(changes, key=lambda element: -element.start):  # from behind: places before stay right

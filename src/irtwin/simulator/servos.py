@@ -319,21 +319,28 @@ def servos(model: Model) -> Servos:
 
 def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
     """Return a joint's position servo. Raises InputError, naming `source`, where it is not driven by one alone."""
-    drive = _servo(compiled, joint)
+    drive, drives = _servo(compiled, joint), _drives(compiled, joint)
     if drive is None:
+        gear = float(compiled.actuator_gear[drives[0], 0]) if len(drives) == 1 else 1.0
+        geared = f" of gear 1, not {gear:g} (kp and kv times the gear's square, forcerange times it)"
         raise InputError(
-            f"{source}: joint {joint} is not driven by one position servo; its commands need one to be "
-            f'played: <position joint="{joint}" kp="..."/>'
+            f"{source}: joint {joint} is not driven by one position servo{geared if gear != 1 else ''}; its commands "
+            f'need one to be played: <position joint="{joint}" kp="..."/>'
         )
     return drive
 
 
 def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:
     """Return the actuator that alone drives a joint, if it is a position servo."""
-    place = compiled.joint(joint).id
-    own = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (compiled.actuator_trnid[:, 0] == place)
-    (drives,) = np.nonzero(own)
-    return int(drives[0]) if len(drives) == 1 and _follows_position(compiled, int(drives[0])) else None
+    drives = _drives(compiled, joint)
+    return drives[0] if len(drives) == 1 and _follows_position(compiled, drives[0]) else None
+
+
+def _drives(compiled: mujoco.MjModel, joint: str) -> list[int]:
+    """Return the actuators of a joint."""
+    at_joint = compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    own: list[int] = np.flatnonzero(at_joint & (compiled.actuator_trnid[:, 0] == compiled.joint(joint).id)).tolist()
+    return own
 
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:

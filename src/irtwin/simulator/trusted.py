@@ -10,6 +10,8 @@ from irtwin.errors import InputError
 from irtwin.simulator.writing import PUSH
 from irtwin.simulator.writing import effects as of_servos
 
+_MASSES = "masses"
+
 
 @dataclass(frozen=True)
 class Trusted:
@@ -28,17 +30,23 @@ NOTHING = Trusted()
 
 
 def trusted(words: Iterable[str]) -> Trusted:
-    """Return what families, or ids of effects, stand for. Raises InputError where one is neither."""
-    families = {effect.id: effect.family for effect in catalogue().values()}
+    """Return what families, "masses" or ids of effects stand for. Raises InputError where one is none of these."""
+    words_of = {
+        effect.id: {effect.id, effect.family, *([_MASSES] if effect.bodies else [])} for effect in catalogue().values()
+    }
     numbers: Mapping[str, tuple[str, str]] = {name: told[:2] for name, told in of_servos().items()}
     effects: dict[str, None] = {}
     trusts: set[str] = set()
     for word in words:
-        own = [effect for effect, family in families.items() if word in (effect, family)]
+        own = [effect for effect, known in words_of.items() if word in known]
         those = [name for name, told in numbers.items() if word in told]
         if not own and not those:
-            known = sorted({*families.values(), *(family for _, family in numbers.values())})
-            raise InputError(f"trust {word}: is neither a family of effects ({', '.join(known)}) nor an effect's id")
+            of_effects = {effect.family for effect in catalogue().values()}
+            known = ", ".join(sorted({*of_effects, *(family for _, family in numbers.values())}))
+            raise InputError(
+                f"trust {word}: is neither a family of effects ({known}), nor {_MASSES}, which are bodies without "
+                "rotors, nor an effect's id"
+            )
         effects |= dict.fromkeys(own)
         trusts.update(those)
     return Trusted(tuple(effects), frozenset(trusts))

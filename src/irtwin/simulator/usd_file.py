@@ -13,15 +13,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import scipy
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input, real_path
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.engine import mujoco
-from irtwin.simulator.model_file import Changes, ModelFile
+from irtwin.simulator.model_file import Bodies, Changes, ModelFile
 from irtwin.simulator.usd_package import PACKAGE, check_package, new_name, packed
 
 _MOST = 200_000_000  # bytes; meshes are within
@@ -90,21 +91,27 @@ class UsdFile(ModelFile):
         elif out.absolute().parent != self.path.absolute().parent or out.suffix.lower() != self.path.suffix.lower():
             raise InputError(f"{out}: is to be a layer over {self.path}; give a file beside that, and with its ending")
 
-    def changed(self, changes: Changes) -> bytes:
-        """Return a layer that has the file beneath and numbers of joints anew; the file itself where none changes.
+    def holds_body(self, name: str) -> bool:
+        """Return whether a prim is a body whose lengths are stretched alike: others have axes that are not square."""
+        prim = self.stage.GetPrimAtPath(name)
+        stretch = _world(self, prim)[1] if prim else np.zeros(3)
+        return bool(stretch.min() > 0 and np.allclose(stretch, stretch[0]))
+
+    def changed(self, changes: Changes, bodies: Bodies | None = None) -> bytes:
+        """Return a layer that has the file beneath and numbers and bodies anew; the file itself where none changes.
 
         Of a package a copy, in which such a layer comes first.
         """
-        if not changes:
+        if not changes and not bodies:
             return self.content
         with tempfile.TemporaryDirectory() as folder:
             if self.is_package:
                 names = check_package(self.path)
                 layer = Path(folder, new_name(names))
-                self._write_layer(layer, names[0], changes)
+                self._write_layer(layer, names[0], changes, bodies or {})
                 return packed(self.path, names, layer)
             layer = Path(folder, self.path.name)
-            self._write_layer(layer, self.path.name, changes)
+            self._write_layer(layer, self.path.name, changes, bodies or {})
             return layer.read_bytes()
 
     @property
@@ -112,7 +119,7 @@ class UsdFile(ModelFile):
         """Whether it is a package of USD files."""
         return self.path.suffix.lower() == PACKAGE
 
-    def _write_layer(self, place: Path, beneath: str, changes: Changes) -> None:
+    def _write_layer(self, place: Path, beneath: str, changes: Changes, bodies: Bodies) -> None:
         layer = Sdf.Layer.CreateNew(str(place))
         root, own = layer.pseudoRoot, self.stage.GetRootLayer().pseudoRoot
         for key in set(own.ListInfoKeys()) - _OF_LAYER:
@@ -122,6 +129,8 @@ class UsdFile(ModelFile):
             for number, value in values.items():
                 if value is not None:  # of a range the end, as drives have no least
                     self._put(layer, element.attributes["path"], number, float(str(value).split()[-1]))
+        for path, body in bodies.items():
+            self._put_body(layer, path, body)
         layer.Save()
 
     def spec(self) -> mujoco.MjSpec:
@@ -155,6 +164,22 @@ class UsdFile(ModelFile):
             own = prim.GetAttribute(name)
             attribute = Sdf.AttributeSpec(over, name, own.GetTypeName() if own else Sdf.ValueTypeNames.Float)
             attribute.default = value / self.unit(number, kind, place.per_degree)
+
+    def _put_body(self, layer: Any, path: str, body: pin.Inertia) -> None:
+        (length, mass), (_, stretch) = self.units, _world(self, self.stage.GetPrimAtPath(path))
+        over = Sdf.CreatePrimInLayer(layer, path)
+        if not self.stage.GetPrimAtPath(path).HasAPI(UsdPhysics.MassAPI):
+            over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["PhysicsMassAPI"]))
+        moments, axes = np.linalg.eigh(body.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        turn = scipy.spatial.transform.Rotation.from_matrix(axes).as_quat(scalar_first=True)
+        for name, kind, value in (
+            ("mass", Sdf.ValueTypeNames.Float, body.mass / mass),
+            ("centerOfMass", Sdf.ValueTypeNames.Point3f, Gf.Vec3f(*(body.lever / stretch))),
+            ("diagonalInertia", Sdf.ValueTypeNames.Float3, Gf.Vec3f(*(moments / mass / length**2))),
+            ("principalAxes", Sdf.ValueTypeNames.Quatf, Gf.Quatf(*turn)),
+        ):
+            Sdf.AttributeSpec(over, f"physics:{name}", kind).default = value
 
     def unit(self, number: str, kind: str, per_degree: bool) -> float:
         """Return what a joint's number of one is in SI units of a radian."""

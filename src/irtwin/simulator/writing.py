@@ -28,7 +28,7 @@ from irtwin.simulator.tracking import Parts, Tracked
 AGREES = 2e-3  # rad (m), a tracking error that is no gap where no number differs
 _NONE = 1e-9  # as good as none of what the model leaves
 _ATTRIBUTED = 0.5  # of the mean square that closes on motions held out, from which the numbers explain the gap
-_NOT_HELD = "dead_band"  # no number of MuJoCo's servos
+IN_NO_FILE = frozenset({"dead_band"})  # numbers of servos that MuJoCo's have not: zero in any file
 _COMPLIANCES = tuple(NAMES[row] for row in SOFT)
 _CALLED = {"spring": "k"}  # by its effect
 PUSH = "push"  # of a robot for a while; with its place
@@ -261,7 +261,6 @@ def _parameters(robot: Robot, chosen: DifferingNumbers, name: str) -> Iterator[s
 def _parameter(chosen: DifferingNumbers, name: str, place: int, joint: str | None, unit: str) -> said.CauseParameter:
     row = row_of(name)
     simulator, robots = float(chosen.fit.servos.numbers[row, place]), float(chosen.numbers[row, place])
-    held = name != _NOT_HELD
     lower, upper = chosen.interval[:, row, place] - simulator
     return said.CauseParameter(
         name=name,
@@ -269,8 +268,8 @@ def _parameter(chosen: DifferingNumbers, name: str, place: int, joint: str | Non
         value=robots - simulator,
         unit=unit,
         interval95=(float(lower), float(upper)) if upper > lower else None,
-        simulator=simulator if held else None,
-        robot=robots if held else None,
+        simulator=simulator,
+        robot=robots,
     )
 
 

@@ -12,11 +12,15 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.report import wording
 
 _NAMED = 3  # findings that a sentence names; the rest are counted
+_PARTS_OF_LINKS = ("centre_", "inertia_")  # a link is told by its mass
 _SPELT_OUT = 4  # joints of one of them; of more it says how many
 
 Alternative = tuple[str, float]  # what an effect is called, and its confidence
-OtherNumber = tuple[str, str | None, float, float, str]
-"""A number of a simulator's model that the robot has otherwise: name, joint, the model's, the robot's, unit."""
+OtherNumber = tuple[str, str | None, float, float, str, Sequence[float] | None]
+"""A number of a simulator's model that the robot has otherwise: name, joint, the model's, the robot's, unit, interval.
+
+The interval is of the change; None where it has none.
+"""
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,7 @@ def _closes(finding: ToldFinding, count: int) -> str:
 
 
 def other_numbers(differing: Sequence[OtherNumber]) -> str:
-    """Say which numbers of the simulator's model the robot has otherwise, the farthest first; may be empty.
+    """Say which numbers of the simulator's model the robot has otherwise for sure, the farthest first; may be empty.
 
     It comes before what the verdict says: who has a model looks for its numbers.
 
@@ -183,15 +187,17 @@ def other_numbers(differing: Sequence[OtherNumber]) -> str:
     words = {name: f"{word} ({name})" for effect in catalogue().values() for name, word in effect.in_mjcf.items()}
 
     def apart(number: OtherNumber) -> float:
-        _, _, model, robot, _ = number
+        _, _, model, robot, *_ = number
         return abs(math.log(robot / model)) if robot / (model or math.inf) > 0 else math.inf
 
+    whole = [number for number in differing if not number[0].startswith(_PARTS_OF_LINKS)]
+    sure = [number for number in whole if not number[-1] or not number[-1][0] <= 0 <= number[-1][1]]
     told = [
         f"{words.get(name, name)}{f' of {joint}' if joint else ''} "
         f"{wording.quantity(robot, '' if unit == '1' else unit).rstrip()} in place of {wording.number(model)}"
-        for name, joint, model, robot, unit in sorted(differing, key=apart, reverse=True)[:_NAMED]
+        for name, joint, model, robot, unit, _ in sorted(sure, key=apart, reverse=True)[:_NAMED]
     ]
-    rest = len(differing) - len(told)
+    rest = len(sure) - len(told)
     more = f", and {rest} more" if rest else ""
     return f"The robot has other numbers than the simulator: {', '.join(told)}{more}. " if told else ""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
-from irtwin.document.document import Cause, Document, Finding, pooled
+from irtwin.document.document import Cause, CauseParameter, Document, Finding, pooled
+from irtwin.effects.catalogue import catalogue
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
 from irtwin.knowledge.vocabulary import EFFECT
@@ -18,6 +19,10 @@ _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
 _WORTH_SAYING = 0.01  # of friction, from run to run
 _STEPS = 3  # motions to log that are told
+_SPLIT = (
+    "Torque shows sums over links (base parameters) alone: the mass, centre or inertia of a link, or a rotor, whose "
+    "interval holds zero is not in the data, but split as the robot's description has it."
+)
 _MEANINGS = """SELECT ?effect ?name ?meaning {
     ?effect irt:has_Effect_Parameter ?parameter . ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
 }"""
@@ -47,7 +52,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         agrees(against, tracking, torque),
     )
     numbers = findings.other_numbers([
-        (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit)
+        (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit, parameter.interval95)
         for cause in diagnosis.mattering
         for parameter in cause.parameters
         if cause.likely and parameter.simulator is not None and parameter.robot is not None
@@ -169,7 +174,7 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
             lower, upper = parameter.interval95 or (None, None)
             yield first | {
                 "parameter": f"{parameter.name} of {parameter.joint}"
-                if parameter.joint and len(cause.joints) > 1
+                if parameter.joint and len(cause.joints) != 1
                 else parameter.name,
                 "simulator": _short(parameter.simulator),
                 "robot": _short(parameter.robot),
@@ -193,20 +198,42 @@ def meanings(diagnosis: Document) -> list[str]:
     with KnowledgeGraph() as graph:
         graph.load_ontology()
         meaning = {(row["effect"].removeprefix(EFFECT), row["name"]): row["meaning"] for row in graph.query(_MEANINGS)}
-    return [
+    known = [
         f"{name} of {effect.replace('_', ' ')}: {meaning[effect, name]}"
         for effect, name in parameters
         if (effect, name) in meaning
     ]
+    bodies = {effect.id for effect in catalogue().values() if effect.bodies}
+    split = diagnosis.simulator is not None and any(cause.effect in bodies for cause in diagnosis.mattering)
+    return [*known, _SPLIT] if split else known
 
 
 def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:
-    """Return a line for each cause that no number of the simulator's model can hold, and what it keeps of a gap."""
-    return [
-        f"No number of a joint holds {_words(cause.effect)} ({', '.join(cause.joints) or 'whole robot'}): "
-        f"the simulator's model keeps that difference{_kept(cause, diagnosis)}."
-        for cause in causes
-    ]
+    """Return lines on each cause of which the simulator's model keeps something: what, why, and how much of a gap."""
+    lines = []
+    for cause in causes:
+        file_has = catalogue()[cause.effect].changed_in_mjcf if cause.effect in catalogue() else {}
+        unsure = [own for own in cause.parameters if own.joint and own.name in file_has]
+        others = [own for own in cause.parameters if own not in unsure]
+        if others:
+            lines.append(
+                f"No number of a joint holds {_words(cause.effect)} ({_named(others) or 'whole robot'}): "
+                f"the simulator's model keeps that difference{_kept(cause, diagnosis)}."
+            )
+        if unsure:
+            lines.append(
+                f"The simulator's model keeps its own {_named(unsure)} ({_words(cause.effect)}): its format has none, "
+                "or another is not sure to be better in it, without what no number holds."
+            )
+    return lines
+
+
+def _named(parameters: Sequence[CauseParameter]) -> str:
+    """Return names with the joints of each: "k of joint_2, joint_3; d of joint_2"."""
+    joints: dict[str, list[str]] = {}
+    for parameter in parameters:
+        joints.setdefault(parameter.name, []).extend([parameter.joint] if parameter.joint else [])
+    return "; ".join(f"{name} of {', '.join(on)}" if on else name for name, on in joints.items())
 
 
 def _kept(cause: Cause, diagnosis: Document) -> str:

@@ -19,11 +19,11 @@ def sentence(answers: Answers) -> str:
     """Return the verdict in plain words, the largest finding first."""
     judged = answers["diagnosis"].rows[0]
     place, closed = answers["locations"].first, answers["closed"].first
-    ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
+    ends = None if closed is None else _ends(closed)
     played = judged["tracking_error"] is not None
     likely = {cause["cause"] for cause in answers["causes"].rows if cause["told"] and cause["confidence"] >= LIKELY}
     numbers = findings.other_numbers([
-        (number["name"], number["joint"], number["simulator"], number["robot"], number["unit"])
+        (*(number[of] for of in ("name", "joint", "simulator", "robot", "unit")), _ends(number))
         for number in answers["cause_parameters"].rows
         if number["simulator"] is not None and number["cause"] in likely
     ])  # fmt: skip
@@ -42,6 +42,10 @@ def sentence(answers: Answers) -> str:
         agrees(_against(judged), judged["tracking_error"], judged["torque_error"]),
     )  # fmt: skip
     return numbers + words + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
+
+
+def _ends(row: Row) -> tuple[float, float] | None:
+    return None if row["lower"] is None else (row["lower"], row["upper"])
 
 
 def _odd_stretches(answers: Answers) -> list[OddStretch]:
