@@ -14,8 +14,9 @@ from tests import gap_cases, servo_arm
 from tests.data_sets import irtwin, irtwin_does, irtwin_refuses
 
 from irtwin.document.document import Change, Document
+from irtwin.errors import InputError
 from irtwin.report.gap.summary import line
-from irtwin.simulator.playing import diagnose
+from irtwin.simulator.playing import commanded_runs, diagnose
 from irtwin.simulator.writing import together
 
 
@@ -152,6 +153,16 @@ def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     irtwin_does("diagnose", data, "--simulator", model)
 
 
+@pytest.mark.parametrize(("alter", "words"), [
+    (lambda run: replace(run, role="reference"), "no run is observed; there is nothing to hold the model against"),
+    (lambda run: replace(run, signals=replace(run.signals, command=None)), "a.parquet: has no commands to play; log"),
+])  # fmt: skip
+def test_observed_runs_with_commands_are_needed(alter, words, tmp_path):
+    data_set = servo_arm.read(*logs(tmp_path))[0]
+    with pytest.raises(InputError, match=words):
+        commanded_runs(replace(data_set, runs=tuple(map(alter, data_set.runs))))
+
+
 @pytest.mark.parametrize(
     ("change", "calls", "options", "told"),
     [
@@ -196,13 +207,21 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
 
 
 def test_commands_that_the_model_clips_and_joints_that_the_robot_lacks_are_said(tmp_path):
-    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1)
+    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.8 0.8", 1)
     door = '<body><joint name="door"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
     data, model = logs(tmp_path, text=text.replace("</worldbody>", door))
     said = irtwin("diagnose", data, "--simulator", model)
     assert f"{model}: joints that the robot lacks are told nothing: door\n" in said.err
-    clips = r"read: lift: \d\d % of its commands are beyond the model's ctrlrange, which clips them"
+    clips = r"read: lift: \d(\.\d+)? % of its commands are beyond the model's ctrlrange, which clips them"
     assert re.search(clips, " ".join(said.out.split())), said.out
+
+
+def test_a_model_that_clips_many_commands_is_refused(tmp_path):
+    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1))
+    said = irtwin_refuses("diagnose", data, "--simulator", model)
+    assert re.search(
+        r"lift: \d\d % of its commands are beyond the model's ctrlrange.*; correct ctrlrange, or", said.err
+    )
 
 
 def with_torque(folder, **numbers):
