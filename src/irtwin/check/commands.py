@@ -143,7 +143,7 @@ def _by_joint(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
             for some in ([log.told for log in logs], [log.q for log in logs])
         )
         column, measured = _column("command", joint), _column("q", joint)
-        if np.ptp(told) > _UNMOVED and np.array_equal(told, q):
+        if np.ptp(told) > _UNMOVED and all(np.array_equal(log.told[:, k], log.q[:, k]) for log in logs):
             yield _finding("copy", run, column, f"is {measured}; log what the joint was told")
         if told @ q < -_FOLLOWS * np.linalg.norm(told) * np.linalg.norm(q):
             yield _finding("sign", run, column, f"goes against {measured}, as in all runs; reverse the sign of one")
