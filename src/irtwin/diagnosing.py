@@ -30,7 +30,7 @@ from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
 from irtwin.simulator.sysid import script
 from irtwin.simulator.trusted import Trusted, trusted
-from irtwin.storage.files import check_place, write
+from irtwin.storage.files import check_new, check_place, write
 from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
@@ -87,7 +87,7 @@ def diagnose(
     files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
     model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
     if model is not None:
-        _take_in(model, files.simulator, announce)
+        _take_in(model, files, announce)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:
@@ -110,14 +110,6 @@ def diagnose(
         keep_diagnosis(location, data_set, diagnosis, announce)
     files.write(data_set, diagnosis, model, location, seed, announce)
     return diagnosis
-
-
-def _take_in(model: Model, out: Path | None, announce: Announce) -> None:
-    """Say what of a model is not the robot's. Raises InputError where it cannot be written to a file, if to one."""
-    if model.others:
-        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
-    if out is not None:
-        model.file.check_written(out)
 
 
 @dataclass(frozen=True)
@@ -183,6 +175,16 @@ class _Files:
             announce(f"Writing the report {self.report}")
             resources = resources_of(None if location is None else location.folder)
             render_alone(data_set, diagnosis.document, diagnosis.curves, self.report, resources)
+
+
+def _take_in(model: Model, files: _Files, announce: Announce) -> None:
+    """Say what of a model is not the robot's. Raises InputError where it cannot be written to files, if to any."""
+    if model.others:
+        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
+    if files.simulator is not None:
+        model.file.check_written(files.simulator)
+        for file in (files.simulator, *files.draws):
+            check_new(file)
 
 
 def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
