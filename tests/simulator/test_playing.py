@@ -86,6 +86,39 @@ def test_the_document_says_simulator_robot_and_change(told):
 
 
 @pytest.mark.slow
+def test_runs_that_are_held_out_judge_what_the_others_say(tmp_path):
+    data, model = logs(tmp_path, stiffness=(20.0, 10.0), runs=("a", "b", "c"))
+    data_set, arm, own = servo_arm.read(data, model)
+    other = servo_arm.played(data_set, own, servo_arm.changed(own, stiffness=(20.0, 7.0)))
+    servo_arm.log(data_set.runs[2].file, data_set.robot, other.runs[2].signals)
+    found = diagnose(servo_arm.read(data, model)[0], arm, held_out_runs=["c"])
+    (number,) = found.document.causes[0].parameters
+    assert number.robot == pytest.approx(10.0, rel=0.02)
+    assert found.document.shrink.held_out_runs == ("c",)
+    assert {of.run for of in found.curves.runs} == {"c"}
+    assert found.document.shrink.position_rmse.after > 5e-3  # as c is of another robot
+
+
+@pytest.mark.parametrize(("held_out", "options", "words"), [
+    (["d"], (), 'no observed run is named "d"; there are a, b'),
+    (["a", "b"], (), "all runs are held out; leave some to fit to"),
+    (["a"], ("--save-sysid", "fit.py"), "the script fits all runs; hold none out for it"),
+])  # fmt: skip
+def test_runs_that_cannot_be_held_out_are_told(held_out, options, words, tmp_path):
+    data, model = logs(tmp_path)
+    options = [*options, *(word for run in held_out for word in ("--held-out", run))]
+    assert words in irtwin_refuses("diagnose", data, "--simulator", model, *options).err
+
+
+def test_nothing_is_held_out_where_nothing_is_played(tmp_path):
+    data_set, _ = with_torque(tmp_path)
+    for run in data_set.runs:
+        servo_arm.log(run.file, data_set.robot, run.signals)
+    said = irtwin_refuses("diagnose", tmp_path / "data", "--held-out", "a")
+    assert "runs are held out where logs are played: this needs commands (cmd_JOINT) in all runs" in said.err
+
+
+@pytest.mark.slow
 def test_the_page_of_a_workspace_says_it_too(told):
     page = (told[1].parent / "w" / "reports" / "arm.gap.html").read_text()
     for said in ("Tracking error of each run", "differs from the simulator’s", "servo stiffness", "Simulator</th>"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,14 +63,17 @@ class Playing:
         return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
 
 
-def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playing:
+def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out_runs: Collection[str] = ()) -> Playing:
     """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
 
-    What it is to `trust` differs in no number.
+    What it is to `trust` differs in no number. Runs that are held out, by name, judge numbers that all others say;
+    without any, each run judges those of others.
 
-    Raises InputError where `commanded_runs` does, or the model has no position servos, or clips commands.
+    Raises InputError where `commanded_runs` does, or the model has no position servos, or clips commands, or no run has
+    a name that is held out, or all have.
     """
     runs = commanded_runs(data_set)
+    apart = _apart(runs, held_out_runs)
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = replace(servos(model), trusted=trust.numbers)
@@ -78,21 +81,26 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playi
     for line in clipped:
         tell(f"  {line}")
     tell("Fitting numbers of servos")
-    stretches = _stretches(runs, _LASTS)
-    if _falls(own, stretches):
-        stretches = _stretches(runs, _BRIEF)
+    fitted, judged = (
+        [run for run in runs if run.name not in apart],
+        [run for run in runs if run.name in apart or not apart],
+    )
+    lasts = _BRIEF if _falls(own, _stretches(fitted, _LASTS)) else _LASTS
+    stretches = _stretches(fitted, lasts)
     step = max(_STEP, model.compiled.opt.timestep)
     chosen, pushes = _chosen(own, stretches, step, trust.pushes)
     chosen = softened(chosen)
-    tell("Playing all runs")
-    numbers, names = held_out(chosen, runs), [run.name for run in runs]
-    before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
-    after = tracked(data_set.robot, own, runs, numbers, _of(pushes))
+    tell("Playing the runs that are held out" if apart else "Playing all runs")
+    names = [run.name for run in judged]
+    numbers = dict.fromkeys(names, chosen.numbers) if apart else held_out(chosen, runs)
+    before = tracked(data_set.robot, own, judged, dict.fromkeys(names, own.numbers))
+    after = tracked(data_set.robot, own, judged, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
     named = {f"{writing.PUSH} {place}": found_push for place, found_push in enumerate(pushes)}
     families = writing.families([*differing, *named])
-    closed = parts(chosen, numbers, families, {name: found_push.push for name, found_push in named.items()})
-    horizons = restarted(own, runs, numbers, _of(pushes))
+    judging = _stretches(judged, lasts) if apart else chosen.fit.stretches
+    closed = parts(own, judging, numbers, families, {name: found_push.push for name, found_push in named.items()})
+    horizons = restarted(own, judged, numbers, _of(pushes))
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
@@ -101,6 +109,18 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playi
         writing.curves(data_set.robot, names, before, after),
         chosen,
     )
+
+
+def _apart(runs: Sequence[Run], names: Collection[str]) -> set[str]:
+    """Return the names of runs that are held out, with all pieces of those with holes. Raises InputError."""
+    pieces = {name: {run.name for run in runs if name in (run.name, run.file.stem)} for name in names}
+    apart = set[str]().union(*pieces.values())
+    for name, own in pieces.items():
+        if not own:
+            raise InputError(f'no observed run is named "{name}"; there are {", ".join(run.name for run in runs)}')
+    if len(apart) == len(runs):
+        raise InputError("all runs are held out; leave some to fit to")
+    return apart
 
 
 def _chosen(
