@@ -94,6 +94,21 @@ def test_faults_are_told_by_check_and_refused_by_a_diagnosis(change, fault, word
     assert str(error.value) == say
 
 
+@pytest.mark.parametrize(("change", "fault", "words"), [
+    (lambda told: told[:, [1, 0, 2]], "swap", "stand in each other's columns: joint_1 follows cmd_joint_2"),
+    (lambda told: np.roll(told, 50, axis=0), "delay", "column cmd_JOINT comes some 0.46 s after the positions"),
+])  # fmt: skip
+def test_a_fault_of_one_run_of_several_is_told_with_its_file(change, fault, words):
+    found = logged()
+    wrong = replace(
+        found.runs[1], signals=replace(found.runs[1].signals, command=change(found.runs[1].signals.command))
+    )
+    many = [replace(found.runs[0], name=f"run_{name}") for name in "abc"]
+    (finding,) = check(replace(found, runs=(*many, wrong))).findings
+    assert (finding.fault, finding.runs, words in finding.say) == (fault, ("run_1",), True)
+    assert finding.say.startswith("run_1.csv: ")
+
+
 def test_beside_torque_nothing_has_to_be_cured():
     turned = logged(lambda told, q: (-told, q), torque=lambda q: 3.0 * q + 1.0)
     assert [finding.stops for finding in of_commands(turned)] == [False] * 3

@@ -40,10 +40,14 @@ def faults(robot: Robot, runs: Sequence[Run]) -> list[LogFinding]:
     """Return what is wrong with the commands that all of these runs have: one finding a column, of the first kind."""
     if not runs:
         return []
-    logs = [_Log(run, np.asarray(run.signals.command)) for run in runs]
-    for kind in (_late, _exchanged, _by_run, _by_joint, _foreign):
+    together = [_Log(run, np.asarray(run.signals.command)) for run in runs]
+    whole, each = [together], [[log] for log in together]
+    for kind, groups in (
+        (_late, whole), (_exchanged, whole), (_late, each), (_by_run, each), (_exchanged, each), (_by_joint, whole),
+        (_foreign, each),
+    ):  # fmt: skip
         by_column: dict[str, LogFinding] = {}
-        for finding in kind(robot, logs):
+        for finding in (finding for logs in groups for finding in kind(robot, logs)):
             known = by_column.get(finding.channel)
             by_column[finding.channel] = replace(known, runs=known.runs + finding.runs) if known else finding
         if by_column:
@@ -67,7 +71,7 @@ class _Log:
         """Sums of command times position (L, n, n), by lag, of squared commands (L, n) and positions (n,)."""
         lags, n, time = _lags(), self.q.shape[1], self.run.signals.time
         most, both, of_told = lags.max(), np.zeros((len(lags), n, n)), np.zeros((len(lags), n))
-        at = np.arange(time[0], time[-1], _STEP)[:_MOST]
+        at = time[0] + _STEP * np.arange(min(_MOST, (time[-1] - time[0]) // _STEP))
         if len(at) <= _LEAST * most:
             return both, of_told, np.zeros(n)
         told, q = (np.column_stack([np.interp(at, time, column) for column in some.T]) for some in (self.told, self.q))
@@ -91,31 +95,31 @@ def _exchanged(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
     names = CHANNELS["command"].columns(robot.joint_names)
     exchanged = [names[joint] for joint in sorted({*np.flatnonzero(followed), *place[followed]})]
     follow = ", ".join(f"{robot.joint_names[joint]} follows {names[place[joint]]}" for joint in own[followed])
-    run, each_other = logs[0].run, "stand in each other's columns, as in all runs"
-    say = f"{run.file}: {', '.join(exchanged)} {each_other}: {follow}; name them by their joints"
+    run, all_runs = logs[0].run, ", as in all runs" if len(logs) > 1 else ""
+    say = f"{run.file}: {', '.join(exchanged)} stand in each other's columns{all_runs}: {follow}; "
+    say += "name them by their joints"
     fault = "swap" if len(exchanged) == 2 else "order"
     yield LogFinding(fault, " <-> ".join(exchanged), (run.name,), True, False, {}, say)
 
 
 def _by_run(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
-    """Yield dead positions, dead commands and degrees."""
-    for k, joint in enumerate(robot.joints):
-        own = [(log.run, log.told[:, k], log.q[:, k]) for log in logs]
-        for run, told, q in own:
-            if np.ptp(q) == 0 and np.ptp(told) > _UNMOVED:
-                yield _finding(
-                    "dead", run, _column("q", joint), f"does not change, though the joint is told to move by "
-                    f"{np.ptp(told):.2g} {joint.unit}: a dead channel, or a joint without power; leave the run out",
-                )  # fmt: skip
-            if joint.unit == "rad" and _in_degrees(told, q):
-                yield _finding(
-                    "unit", run, _column("command", joint), "is in degrees beside positions in rad; give it in rad"
-                )
-            if (still := _frozen(run, told, q)) is not None:
-                yield _finding(
-                    "dead", run, _column("command", joint), f"does not change from {still:.4g} s on, though the joint "
-                    "goes on moving; log what the joint was told, or leave the run out",
-                )  # fmt: skip
+    """Yield dead positions, dead commands and degrees of a run alone."""
+    (log,) = logs
+    for joint, told, q in zip(robot.joints, log.told.T, log.q.T, strict=True):
+        if np.ptp(q) == 0 and np.ptp(told) > _UNMOVED:
+            yield _finding(
+                "dead", log.run, _column("q", joint), f"does not change, though the joint is told to move by "
+                f"{np.ptp(told):.2g} {joint.unit}: a dead channel, or a joint without power; leave the run out",
+            )  # fmt: skip
+        if joint.unit == "rad" and _in_degrees(told, q):
+            yield _finding(
+                "unit", log.run, _column("command", joint), "is in degrees beside positions in rad; give it in rad"
+            )
+        if (still := _frozen(log.run, told, q)) is not None:
+            yield _finding(
+                "dead", log.run, _column("command", joint), f"does not change from {still:.4g} s on, though the joint "
+                "goes on moving; log what the joint was told, or leave the run out",
+            )  # fmt: skip
 
 
 def _in_degrees(told: np.ndarray, q: np.ndarray) -> bool:
@@ -150,15 +154,14 @@ def _by_joint(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
 
 
 def _foreign(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
-    """Yield runs whose joints do not follow their commands."""
-    for log in logs:
-        joints = _followed([log])
-        left = _left([log])[_behind()].min(axis=0).diagonal()[joints]
-        if len(joints) and (1 - left).mean() < _FOREIGN:
-            yield _finding(
-                "foreign", log.run, CHANNELS["command"].prefix + "_JOINT", "is not followed by the joints that it "
-                "tells to move, as if it were of another run; leave the run out, or log what they were told",
-            )  # fmt: skip
+    """Yield that the joints do not follow the commands."""
+    joints = _followed(logs)
+    left = _left(logs)[_behind()].min(axis=0).diagonal()[joints]
+    if len(joints) and (1 - left).mean() < _FOREIGN:
+        yield _finding(
+            "foreign", logs[0].run, CHANNELS["command"].prefix + "_JOINT", "is not followed by the joints that it "
+            "tells to move, as if it were of another run; leave the run out, or log what they were told",
+        )  # fmt: skip
 
 
 def _late(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
