@@ -30,7 +30,7 @@ from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
 from irtwin.simulator.sysid import script
 from irtwin.simulator.trusted import Trusted, trusted
-from irtwin.storage.files import check_place, write
+from irtwin.storage.files import check_new, check_place, write
 from irtwin.twin.doubts import doubts
 from irtwin.twin.files import load, to_json
 from irtwin.twin.twin import Twin
@@ -44,6 +44,7 @@ def diagnose(
     joints: Sequence[str] = (),
     withhold: Sequence[str] = (),
     trust: Sequence[str] = (),
+    held_out: Sequence[str] = (),
     cutoff: float | None = None,
     seed: int = 0,
     repair: bool = False,
@@ -63,7 +64,8 @@ def diagnose(
     in their shapes, and its numbers as the prior. `simulator` is the file of a model, MJCF, URDF, SDF or USD: what it
     says of the observed motions is held against the robot, as runs of a simulator are, its `joints` named in the
     robot's order where it calls them otherwise; commands of runs are played through its servos (channel "position"),
-    and their torque is held against them. `withhold` takes effects out of the twin and leaves them in the catalogue;
+    and their torque is held against them. Runs that are `held_out`, by name, take no part in that fit, and the tracking
+    error is told of them alone. `withhold` takes effects out of the twin and leaves them in the catalogue;
     `trust`, families or ids of effects, are right: no cause is looked for among them.
     `cutoff`, Hz, is the filter's, in place of what the data set says. With a `workspace` the diagnosis is kept there,
     in the graph too, so that `adopt` can make its twin the robot's. Files to write, each whole or not at all:
@@ -87,18 +89,24 @@ def diagnose(
     files.check_apart([*data_set.sha256, *(run.file for run in (*data_set.runs, *data_set.plans))])
     model = None if simulator is None else read_model(Path(simulator), data_set.robot, joints)
     if model is not None:
-        _take_in(model, files.simulator, announce)
+        _take_in(model, files, announce)
     lacking = {"a twin": twin, "a twin's file": twin_file, "a motion": motion_file, "a cutoff": cutoff}
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:
-        _check_playable(data_set, model, asked)
+        _check_playable(data_set, model, asked, "a script for mujoco.sysid fits what is played")
+    if held_out:
+        if sysid_file is not None:
+            raise InputError(f"{sysid_file}: the script fits all runs; hold none out for it")
+        _check_playable(data_set, model, asked, "runs are held out where logs are played")
     data_set = _with_cutoff(data_set, cutoff)
     if location is not None:
         from irtwin.workflow import as_asserted
 
         data_set = as_asserted(location, data_set)
     with telling(announce):
-        diagnosis: Diagnosis | Playing | None = None if asked or model is None else _played(data_set, model, right)
+        diagnosis: Diagnosis | Playing | None = (
+            None if asked or model is None else _played(data_set, model, right, held_out)
+        )
         if diagnosis is None:
             data_set = data_set if model is None else with_simulated_runs(data_set, model)
             diagnosis = gap.diagnose(
@@ -110,14 +118,6 @@ def diagnose(
         keep_diagnosis(location, data_set, diagnosis, announce)
     files.write(data_set, diagnosis, model, location, seed, announce)
     return diagnosis
-
-
-def _take_in(model: Model, out: Path | None, announce: Announce) -> None:
-    """Say what of a model is not the robot's. Raises InputError where it cannot be written to a file, if to one."""
-    if model.others:
-        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
-    if out is not None:
-        model.file.check_written(out)
 
 
 @dataclass(frozen=True)
@@ -196,6 +196,16 @@ def _said_of_written(file: Path, diagnosis: Diagnosis | Playing, model: Model) -
             yield f"{file} cannot be given other bodies: these and the rotors stay as they are; write them in by hand"
 
 
+def _take_in(model: Model, files: _Files, announce: Announce) -> None:
+    """Say what of a model is not the robot's. Raises InputError where it cannot be written to files, if to any."""
+    if model.others:
+        announce(f"  {model.file.path}: joints that the robot lacks are told nothing: {', '.join(model.others)}")
+    if files.simulator is not None:
+        model.file.check_written(files.simulator)
+        for file in (files.simulator, *files.draws):
+            check_new(file)
+
+
 def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
     if isinstance(diagnosis, Playing) and diagnosis.chosen.differs.any():
         write(file, script(diagnosis.chosen, diagnosis.document, data_set.folder, file))
@@ -236,19 +246,19 @@ def _asked(data_set: DataSet, lacking: Mapping[str, object]) -> bool:
     return bool(asked)
 
 
-def _played(data_set: DataSet, model: Model, right: Trusted) -> Playing | None:
+def _played(data_set: DataSet, model: Model, right: Trusted, held_out: Sequence[str]) -> Playing | None:
     """Return the diagnosis by playing; None where what the model lacks is to be looked for in the torque."""
     if not data_set.is_commanded and not _can_play(data_set, model):
         return None
-    played = diagnose_by_playing(data_set, model, right)
-    return None if played.is_open else played
+    played = diagnose_by_playing(data_set, model, right, held_out)
+    return None if played.is_open and not held_out else played
 
 
-def _check_playable(data_set: DataSet, model: Model | None, asked: bool) -> None:
-    """Raise InputError where nothing is played that MuJoCo's own system identification could fit."""
+def _check_playable(data_set: DataSet, model: Model | None, asked: bool, why: str) -> None:
+    """Raise InputError where nothing is played."""
     if asked or model is None or not (data_set.is_commanded or _can_play(data_set, model)):
         raise InputError(
-            f"{data_set.folder}: a script for mujoco.sysid fits what is played: it needs commands (cmd_JOINT) in all "
+            f"{data_set.folder}: {why}: this needs commands (cmd_JOINT) in all "
             "runs, and a simulator's model with position servos, or the gains of its controller (kp, kd)"
         )
 

@@ -32,7 +32,7 @@ from irtwin.signals.conditioning import condition
 from irtwin.signals.log import DataSet, Run, own_runs, read_data_set
 from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import as_sampled
-from irtwin.storage.files import check_place, write
+from irtwin.storage.files import check_new, check_place, write
 from irtwin.twin import predict as predicted
 from irtwin.twin.described import places, text_of
 from irtwin.twin.doubts import doubts
@@ -189,9 +189,9 @@ def _motions(twin: Twin, run: Run) -> list[Motion]:
 def write_model(twin: Twin, form: str, out: Path) -> list[str]:
     """Write a twin's robot as "urdf", "mjcf", "sdf" or "usd"; return lines on what that holds, and does not.
 
-    Raises InputError where there is no place to write, or a body of the twin is not consistent.
+    Raises InputError where there is no place to write, or a file, or a body of the twin is not consistent.
     """
-    check_place(out)
+    check_new(out)
     if form == "usd" and out.suffix not in (".usda", ".usd"):  # readers go by it
         raise InputError(f"{out}: USD is written as text; name the file {out.stem}.usda")
     write(out, text_of(twin, form).encode())

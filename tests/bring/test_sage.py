@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 from tests import servo_arm
 from tests.data_sets import irtwin_does
@@ -20,7 +21,11 @@ TIME = np.arange(len(Q)) / 50
 
 
 def motion(
-    folder: Path, kind: tuple[str, str] = ("CONTROL", "STATE_MOTOR"), begin: float = 0.0, scale: float = 1.0
+    folder: Path,
+    kind: tuple[str, str] = ("CONTROL", "STATE_MOTOR"),
+    begin: float = 0.0,
+    scale: float = 1.0,
+    torque: Callable[[float], float] = float,
 ) -> Path:
     """Write a motion whose states lag behind its commands, of a gripper besides the robot's two joints."""
     folder.mkdir()
@@ -30,7 +35,8 @@ def motion(
         q = 0.9 * command
         told.append(f'{kind[0]},{time:.15g},"[0.0, {command[1]}, {command[0]}]"')
         states.append(
-            f'{kind[1]},{time + 0.004 * scale:.15g},"[0 {q[1]} {q[0]}]","[0, {q[1]}, 1e-3]","[0, {1.5 + q[1]}, {q[0]}]"'
+            f'{kind[1]},{time + 0.004 * scale:.15g},"[0 {q[1]} {q[0]}]","[0, {q[1]}, 1e-3]",'
+            f'"[0, {1.5 + q[1]}, {torque(q[0])}]"'
         )
     (folder / "control.csv").write_text("\n".join(told) + "\n")
     (folder / "state_motor.csv").write_text("\n".join(states) + "\n")
@@ -62,6 +68,18 @@ def test_it_is_imported_from_a_simulator_in_s_and_from_a_robot_in_us(
     np.testing.assert_allclose(run.signals.command, Q)
     np.testing.assert_allclose(run.signals.q, 0.9 * Q)
     assert run.signals.torque is not None
+
+
+def test_torque_without_its_sign_is_written_as_that_and_the_commands_are_of_use(tmp_path: Path) -> None:
+    folder = motion(tmp_path / "wave", torque=abs)
+    (tmp_path / "arm.urdf").write_text(servo_arm.URDF)
+    said = irtwin_does("import", folder, "--robot", tmp_path / "arm.urdf", "--out", tmp_path / "set")
+    assert "tau_abs_JOINT is torque without its sign, as of a current's size, and no torque: left out" in said.err
+    assert f"then: irtwin diagnose {tmp_path / 'set'} --simulator MODEL.xml" in said.err
+    (run,) = servo_arm.read_data_set(tmp_path / "set", commanded=True).runs
+    assert run.signals.torque is None
+    written = pyarrow.parquet.read_table(run.file)
+    np.testing.assert_allclose(written["tau_abs_lift"].to_numpy(), abs(0.9 * Q[:, 0]))
 
 
 def replaced(name: str, old: str, new: str) -> Callable[[Path], None]:

@@ -62,6 +62,8 @@ def test_a_table_becomes_a_urdf_and_is_found_in_it(pendulum, tmp_path):
     out = tmp_path / "pendulum.urdf"
     assert done("robot", "urdf", pendulum, "--out", out) == f"{out}\n"
     assert done("robot", "dh", out) == done("robot", "dh", pendulum / "dataset.toml")
+    assert "is there already, and no model is written over" in refused("robot", "urdf", KR6, "--out", out)
+    out = tmp_path / "kr6.urdf"
     done("robot", "urdf", KR6, "--out", out)
     assert out.read_text(encoding="utf-8") == KR6.read_text(encoding="utf-8")
 

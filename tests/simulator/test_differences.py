@@ -99,6 +99,19 @@ def test_a_file_for_the_model_needs_a_model(tmp_path):
     assert (said.status, "--draws writes models beside that of --save-simulator" in said.err) == (2, True)
 
 
+@pytest.mark.parametrize("name", ["better.xml", "better-2.xml"])
+def test_a_model_that_is_there_is_not_written_over(tmp_path, name):
+    run = synthetic.as_run(synthetic.measure(ROBOT, synthetic.swing(ROBOT, 0, seconds=1.0)))
+    data_sets.write(tmp_path / "data", ROBOT, [run])
+    model, mine = mujoco_models.write(tmp_path / "arm.xml", ROBOT), tmp_path / name
+    mine.write_text("mine")
+    said = irtwin_refuses(
+        "diagnose", tmp_path / "data", "--simulator", model, "--save-simulator", tmp_path / "better.xml", "--draws", 2
+    )
+    assert said.err.endswith(f"{mine}: is there already, and no model is written over; remove it, or name another\n")
+    assert mine.read_text() == "mine" and len(list(tmp_path.glob("better*"))) == 1
+
+
 @pytest.mark.parametrize(
     ("option", "name"),
     [

@@ -14,8 +14,9 @@ from tests import gap_cases, servo_arm
 from tests.data_sets import irtwin, irtwin_does, irtwin_refuses
 
 from irtwin.document.document import Change, Document
+from irtwin.errors import InputError
 from irtwin.report.gap.summary import line
-from irtwin.simulator.playing import diagnose
+from irtwin.simulator.playing import commanded_runs, diagnose
 from irtwin.simulator.writing import together
 
 
@@ -82,6 +83,39 @@ def test_the_document_says_simulator_robot_and_change(told):
     assert [one.seconds for one in document.horizons] == [0.1, 0.2, 0.3, 0.4, 0.5]
     (finding,) = document.findings
     assert finding.share_interval95[0] < finding.share <= finding.share_interval95[1]
+
+
+@pytest.mark.slow
+def test_runs_that_are_held_out_judge_what_the_others_say(tmp_path):
+    data, model = logs(tmp_path, stiffness=(20.0, 10.0), runs=("a", "b", "c"))
+    data_set, arm, own = servo_arm.read(data, model)
+    other = servo_arm.played(data_set, own, servo_arm.changed(own, stiffness=(20.0, 7.0)))
+    servo_arm.log(data_set.runs[2].file, data_set.robot, other.runs[2].signals)
+    found = diagnose(servo_arm.read(data, model)[0], arm, held_out_runs=["c"])
+    (number,) = found.document.causes[0].parameters
+    assert number.robot == pytest.approx(10.0, rel=0.02)
+    assert found.document.shrink.held_out_runs == ("c",)
+    assert {of.run for of in found.curves.runs} == {"c"}
+    assert found.document.shrink.position_rmse.after > 5e-3  # as c is of another robot
+
+
+@pytest.mark.parametrize(("held_out", "options", "words"), [
+    (["d"], (), 'no observed run is named "d"; there are a, b'),
+    (["a", "b"], (), "all runs are held out; leave some to fit to"),
+    (["a"], ("--save-sysid", "fit.py"), "the script fits all runs; hold none out for it"),
+])  # fmt: skip
+def test_runs_that_cannot_be_held_out_are_told(held_out, options, words, tmp_path):
+    data, model = logs(tmp_path)
+    options = [*options, *(word for run in held_out for word in ("--held-out", run))]
+    assert words in irtwin_refuses("diagnose", data, "--simulator", model, *options).err
+
+
+def test_nothing_is_held_out_where_nothing_is_played(tmp_path):
+    data_set, _ = with_torque(tmp_path)
+    for run in data_set.runs:
+        servo_arm.log(run.file, data_set.robot, run.signals)
+    said = irtwin_refuses("diagnose", tmp_path / "data", "--held-out", "a")
+    assert "runs are held out where logs are played: this needs commands (cmd_JOINT) in all runs" in said.err
 
 
 @pytest.mark.slow
@@ -152,6 +186,16 @@ def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     irtwin_does("diagnose", data, "--simulator", model)
 
 
+@pytest.mark.parametrize(("alter", "words"), [
+    (lambda run: replace(run, role="reference"), "no run is observed; there is nothing to hold the model against"),
+    (lambda run: replace(run, signals=replace(run.signals, command=None)), "a.parquet: has no commands to play; log"),
+])  # fmt: skip
+def test_observed_runs_with_commands_are_needed(alter, words, tmp_path):
+    data_set = servo_arm.read(*logs(tmp_path))[0]
+    with pytest.raises(InputError, match=words):
+        commanded_runs(replace(data_set, runs=tuple(map(alter, data_set.runs))))
+
+
 @pytest.mark.parametrize(
     ("change", "calls", "options", "told"),
     [
@@ -196,13 +240,21 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
 
 
 def test_commands_that_the_model_clips_and_joints_that_the_robot_lacks_are_said(tmp_path):
-    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1)
+    text = servo_arm.MODEL.replace("-1.5 1.5", "-0.8 0.8", 1)
     door = '<body><joint name="door"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
     data, model = logs(tmp_path, text=text.replace("</worldbody>", door))
     said = irtwin("diagnose", data, "--simulator", model)
     assert f"{model}: joints that the robot lacks are told nothing: door\n" in said.err
-    clips = r"read: lift: \d\d % of its commands are beyond the model's ctrlrange, which clips them"
+    clips = r"read: lift: \d(\.\d+)? % of its commands are beyond the model's ctrlrange, which clips them"
     assert re.search(clips, " ".join(said.out.split())), said.out
+
+
+def test_a_model_that_clips_many_commands_is_refused(tmp_path):
+    data, model = logs(tmp_path, text=servo_arm.MODEL.replace("-1.5 1.5", "-0.1 0.1", 1))
+    said = irtwin_refuses("diagnose", data, "--simulator", model)
+    assert re.search(
+        r"lift: \d\d % of its commands are beyond the model's ctrlrange.*; correct ctrlrange, or", said.err
+    )
 
 
 def with_torque(folder, **numbers):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -16,9 +16,11 @@ from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.evidence import MeasuredRun, UnitEvidence
 from irtwin.bring.rtde_names import POWER_AT, is_rtde
 from irtwin.bring.told import LEFT_OUT, UserSaid
+from irtwin.check.torque import has_no_sign
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS, Channel
+from irtwin.signals.samples import UNSIGNED
 from irtwin.signals.unit import MOTOR, Unit, units
 
 _EPOCH = (946_684_800.0, 4_102_444_800.0)  # s since 1970: of the years 2000 to 2099
@@ -72,6 +74,7 @@ class _Taking:
         self.where = ", ".join(str(log.recording.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
         self.units: Units = {}
         self.motions: list[MeasuredRun] = []
+        self.unsigned = False  # torque, of no use beside commands
 
     def result(self) -> TakenLogs:
         self._resolve("q", self._position)
@@ -84,8 +87,10 @@ class _Taking:
         self._resolve("torque", lambda raw, joints, si: evidence.torque(self.robot, self.motions, raw, joints, si))
         if self._of("torque"):
             torques = self._si("torque")
+            self.unsigned = bool(self._of("command")) and has_no_sign(torques, positions)
             self.motions = [
-                MeasuredRun(motion.time, motion.q, torque) for motion, torque in zip(self.motions, torques, strict=True)
+                replace(motion, torque=None if self.unsigned else torque)
+                for motion, torque in zip(self.motions, torques, strict=True)
             ]
         self._resolve("current", lambda raw, _, si: evidence.by_size(si, raw, _CURRENT))
         self._resolve("temperature", lambda raw, _, si: _warm(evidence.by_size(si, raw, _WARM)))
@@ -253,10 +258,14 @@ class _Taking:
             if field == "time":
                 continue
             for meaning in self._of(field):
-                values = self._values(log, meaning)
-                columns[channel.column(str(meaning.joint))] = self.units[meaning.column][0].to_si(values)
-                _check_size(log, meaning.column, columns[channel.column(str(meaning.joint))], channel)
+                values = self.units[meaning.column][0].to_si(self._values(log, meaning))
+                _check_size(log, meaning.column, values, channel)
+                columns[self._channel(meaning)] = values
         return columns
+
+    def _channel(self, meaning: Meaning) -> str:
+        unsigned = UNSIGNED if self.unsigned and meaning.field == "torque" else ""
+        return CHANNELS[str(meaning.field)].column(f"{unsigned}{meaning.joint}")
 
     def _row(self, meaning: Meaning) -> Taken:
         if meaning.field is None:
@@ -274,8 +283,9 @@ class _Taking:
         if self.logs[0].time.dtype.kind == "M" and meaning.field == "time":
             name = "date and time"
         why = meaning.why if unit_why in ("", meaning.why) else f"{meaning.why}; {unit.name} {unit_why}"
-        channel = CHANNELS[meaning.field].column(str(meaning.joint))
-        return Taken(meaning.column, channel, name, " ".join(steps) or "none", why)
+        if self.unsigned and meaning.field == "torque":
+            why = f"{why}; never below zero: its sign is lacking"
+        return Taken(meaning.column, self._channel(meaning), name, " ".join(steps) or "none", why)
 
 
 def _warm(evidence: UnitEvidence) -> UnitEvidence:

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from irtwin.check.arrangement import arrangement_findings
 from irtwin.check.channels import channel_findings
+from irtwin.check.commands import command_findings
 from irtwin.check.estimates import estimate_findings
 from irtwin.check.gravity import gravity_findings
 from irtwin.check.moving import Moving, moving
@@ -49,6 +50,7 @@ def _findings(data_set: DataSet) -> list[LogFinding]:
     findings = _by_column(data_set)
     if not data_set.robot.joints:  # a meter's log
         return findings
+    findings += command_findings(data_set)
     seen = moving(data_set)
     if seen.runs:
         findings += plausibility_findings(data_set, seen) + unsigned_findings(data_set.robot, seen)

@@ -7,6 +7,7 @@ its gravity is right is no torque of the joint.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from irtwin.check.robust_fit import RobustFit, fit
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
+from irtwin.signals.sampling import LEAST_RANGE
 
 _SEVERAL = 2  # joints, from which torques without sign are no chance of their loads
 _SURE = 4.0  # standard deviations
@@ -51,20 +53,26 @@ def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
 def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return that torque has no sign, where no joint of several has any below zero though all move both ways."""
     torques = [run.signals.torque for run in moving.runs if run.signals.torque is not None]
-    if len(torques) < len(moving.runs) or moving.joints.sum() < _SEVERAL:
-        return []
-    own = [torque[:, moving.joints] for torque in torques]
-    size = all((of_run >= 0).all() and (np.ptp(of_run, axis=0) > 0).all() for of_run in own)
-    q = [np.diff(run.signals.q[:, moving.joints], axis=0) for run in moving.runs]
-    both_ways = np.any([(of_run > 0).any(axis=0) & (of_run < 0).any(axis=0) for of_run in q], axis=0).all()
-    if not size or not both_ways:
+    if len(torques) < len(moving.runs) or not has_no_sign(torques, [run.signals.q for run in moving.runs]):
         return []
     say = (
-        "tau_JOINT has no sign: it is never below zero, though each joint moves both ways; log it with its sign, "
-        "or leave it out: commands (cmd_JOINT) can be held against a simulator's model without it"
+        "tau_JOINT has no sign: it is never below zero, though each joint moves both ways; log it with its sign, or "
+        "name it tau_abs_JOINT: commands (cmd_JOINT) can be held against a simulator's model without torque"
     )
     name = CHANNELS["torque"].column(robot.joints[int(np.flatnonzero(moving.joints)[0])].name)
     return [LogFinding("unsigned", name, moving.names, certain=True, mended=False, evidence={}, say=say)]
+
+
+def has_no_sign(torques: Sequence[np.ndarray], positions: Sequence[np.ndarray]) -> bool:
+    """Return whether torques, as positions (N, n) of each run, are sizes: of several joints that move both ways."""
+    joints = np.any([np.ptp(q, axis=0) > LEAST_RANGE for q in positions], axis=0)
+    if joints.sum() < _SEVERAL:
+        return False
+    own = [torque[:, joints] for torque in torques]
+    size = all((of_run >= 0).all() and (np.ptp(of_run, axis=0) > 0).all() for of_run in own)
+    steps = [np.diff(q[:, joints], axis=0) for q in positions]
+    both_ways = np.any([(of_run > 0).any(axis=0) & (of_run < 0).any(axis=0) for of_run in steps], axis=0).all()
+    return bool(size and both_ways)
 
 
 def scale_findings(robot: Robot, moving: Moving) -> list[LogFinding]:

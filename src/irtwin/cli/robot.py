@@ -121,10 +121,10 @@ def urdf(source: Path, out: Path) -> None:
     Example: irtwin robot urdf my_robot --out my.urdf
     """
     from irtwin.signals.log import read_robot
-    from irtwin.storage.files import check_place, write
+    from irtwin.storage.files import check_new, write
 
     described = read_robot(source)
-    check_place(out)
+    check_new(out)
     write(out, described.urdf.encode())
     click.echo(out)
 

@@ -213,6 +213,12 @@ def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, 
     "looked for there. Repeatable.",
 )
 @click.option(
+    "--held-out",
+    metavar="RUN",
+    multiple=True,
+    help="Fit played logs without this run, and tell the tracking error of such runs alone. Repeatable.",
+)
+@click.option(
     "--cutoff",
     type=Number(min=0.0, min_open=True),
     metavar="HZ",

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from irtwin.check.commands import faults
 from irtwin.document.curves import Curves
 from irtwin.document.document import Document
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell
-from irtwin.robot.description import Joint
 from irtwin.signals.log import DataSet, Run
 from irtwin.simulator import writing
 from irtwin.simulator.alone import alone
@@ -30,9 +30,7 @@ _FALLEN, _BRIEF = 0.3, 2.0  # rad (m), RMS from the model, of a robot that falls
 _LEAST = 3  # stretches of a run that is alone: to fit and to judge by
 _STEP = 0.005  # s, of a joint played by itself
 _AGREES = 0.03  # share of a joint's torque that is no gap
-_FOLLOWS = 0.8  # correlation of positions with commands, from which a joint goes where it is told
-_DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
-_UNMOVED = 0.1  # rad or m: a joint that is told to go farther moves, whatever its friction and play
+_CLIPPED = 0.05  # of a joint's commands: with more, what it does is the clipping's
 
 
 @dataclass(frozen=True)
@@ -65,14 +63,17 @@ class Playing:
         return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
 
 
-def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playing:
+def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out_runs: Collection[str] = ()) -> Playing:
     """Hold a model against the observed runs by playing their commands, and its servos' torque against what was logged.
 
-    What it is to `trust` differs in no number.
+    What it is to `trust` differs in no number. Runs that are held out, by name, judge numbers that all others say;
+    without any, each run judges those of others.
 
-    Raises InputError where `commanded_runs` does, or the model has no position servos.
+    Raises InputError where `commanded_runs` does, or the model has no position servos, or clips commands, or no run has
+    a name that is held out, or all have.
     """
     runs = commanded_runs(data_set)
+    apart = _apart(runs, held_out_runs)
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = replace(servos(model), trusted=trust.numbers)
@@ -80,21 +81,26 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playi
     for line in clipped:
         tell(f"  {line}")
     tell("Fitting numbers of servos")
-    stretches = _stretches(runs, _LASTS)
-    if _falls(own, stretches):
-        stretches = _stretches(runs, _BRIEF)
+    fitted, judged = (
+        [run for run in runs if run.name not in apart],
+        [run for run in runs if run.name in apart or not apart],
+    )
+    lasts = _BRIEF if _falls(own, _stretches(fitted, _LASTS)) else _LASTS
+    stretches = _stretches(fitted, lasts)
     step = max(_STEP, model.compiled.opt.timestep)
     chosen, pushes = _chosen(own, stretches, step, trust.pushes)
     chosen = softened(chosen)
-    tell("Playing all runs")
-    numbers, names = held_out(chosen, runs), [run.name for run in runs]
-    before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
-    after = tracked(data_set.robot, own, runs, numbers, _of(pushes))
+    tell("Playing the runs that are held out" if apart else "Playing all runs")
+    names = [run.name for run in judged]
+    numbers = dict.fromkeys(names, chosen.numbers) if apart else held_out(chosen, runs)
+    before = tracked(data_set.robot, own, judged, dict.fromkeys(names, own.numbers))
+    after = tracked(data_set.robot, own, judged, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
     named = {f"{writing.PUSH} {place}": found_push for place, found_push in enumerate(pushes)}
     families = writing.families([*differing, *named])
-    closed = parts(chosen, numbers, families, {name: found_push.push for name, found_push in named.items()})
-    horizons = restarted(own, runs, numbers, _of(pushes))
+    judging = _stretches(judged, lasts) if apart else chosen.fit.stretches
+    closed = parts(own, judging, numbers, families, {name: found_push.push for name, found_push in named.items()})
+    horizons = restarted(own, judged, numbers, _of(pushes))
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
@@ -103,6 +109,18 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playi
         writing.curves(data_set.robot, names, before, after),
         chosen,
     )
+
+
+def _apart(runs: Sequence[Run], names: Collection[str]) -> set[str]:
+    """Return the names of runs that are held out, with all pieces of those with holes. Raises InputError."""
+    pieces = {name: {run.name for run in runs if name in (run.name, run.file.stem)} for name in names}
+    apart = set[str]().union(*pieces.values())
+    for name, own in pieces.items():
+        if not own:
+            raise InputError(f'no observed run is named "{name}"; there are {", ".join(run.name for run in runs)}')
+    if len(apart) == len(runs):
+        raise InputError("all runs are held out; leave some to fit to")
+    return apart
 
 
 def _chosen(
@@ -142,18 +160,21 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
 
 
 def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
+    """Return of which joints the model clips commands. Raises InputError where it clips more than a few."""
     shares = own.clipped(np.concatenate([run.signals.command for run in runs if run.signals.command is not None]))
-    return [
-        f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
-        for joint, share in shares.items()
-    ]
+    lines = []
+    for joint, share in shares.items():
+        line = f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
+        if share > _CLIPPED:
+            raise InputError(f"{own.model.file.path}: {line}; correct ctrlrange, or zero and unit of the commands")
+        lines.append(line)
+    return lines
 
 
 def commanded_runs(data_set: DataSet) -> list[Run]:
     """Return the observed runs, whose commands can be played.
 
-    Raises InputError where there are none, or one has no commands, or those of a joint are in degrees, are its
-    positions, go against these, or move nothing.
+    Raises InputError where there are none, one has no commands, or these have faults.
     """
     runs = [run for run in data_set.runs if run.role == "observed"]
     if not runs:
@@ -161,34 +182,6 @@ def commanded_runs(data_set: DataSet) -> list[Run]:
     for run in runs:
         if run.signals.command is None:
             raise InputError(f"{run.file}: has no commands to play; log cmd_JOINT, or leave the run out")
-    for k, joint in enumerate(data_set.robot.joints):
-        signals = [
-            (run, run.signals.command[:, k], run.signals.q[:, k]) for run in runs if run.signals.command is not None
-        ]
-        for run, told, q in signals:
-            _check_run(run, joint, told, q)
-        _check_sense(runs[0], joint, [(told, q) for _, told, q in signals])
+    for fault in faults(data_set.robot, runs):
+        raise InputError(fault.say)
     return runs
-
-
-def _check_run(run: Run, joint: Joint, told: np.ndarray, q: np.ndarray) -> None:
-    if np.ptp(q) == 0 and np.ptp(told) > _UNMOVED:
-        raise InputError(
-            f"{run.file}: column q_{joint.name} does not change, though the joint is told to move by "
-            f"{np.ptp(told):.2g} {joint.unit}: a dead channel, or a joint without power; leave the run out"
-        )
-    slope = np.polyfit(q - q.mean(), told - told.mean(), 1)[0] if np.ptp(q) > 0 else 1.0
-    follows = slope * q.std() >= _FOLLOWS * told.std()  # a joint that is stuck may have any slope
-    if joint.unit == "rad" and _DEGREES[0] < slope < _DEGREES[1] and follows:
-        raise InputError(f"{run.file}: column cmd_{joint.name} is in degrees beside positions in rad; give it in rad")
-
-
-def _check_sense(run: Run, joint: Joint, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
-    """Raise where the commands of all runs go against the joint's positions, or are these; `run` is the first."""
-    told, q = (np.concatenate([values - values.mean() for values in some]) for some in zip(*pairs, strict=True))
-    if np.ptp(told) > _UNMOVED and np.array_equal(told, q):
-        raise InputError(f"{run.file}: column cmd_{joint.name} is q_{joint.name}; log what the joint was told")
-    if told @ q < -_FOLLOWS * np.linalg.norm(told) * np.linalg.norm(q):
-        raise InputError(
-            f"{run.file}: column cmd_{joint.name} goes against q_{joint.name}, as in all runs; reverse the sign of one"
-        )

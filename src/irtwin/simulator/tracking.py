@@ -155,9 +155,13 @@ def restarted(
 
 
 def parts(
-    chosen: DifferingNumbers, numbers: OfRun, families: Sequence[Sequence[str]], pushes: Mapping[str, Push]
+    own: Servos,
+    stretches: Sequence[PlayedStretch],
+    numbers: OfRun,
+    families: Sequence[Sequence[str]],
+    pushes: Mapping[str, Push],
 ) -> Parts:
-    """Play the stretches with each name's numbers alone, with all but them, and with those of any families.
+    """Play stretches with each name's numbers alone, with all but them, and with those of any families.
 
     `pushes`: by their names, which are among those of families.
     """
@@ -170,16 +174,14 @@ def parts(
         for some in combinations(families, count)
     }
     wanted, rows = sorted(sets, key=sorted), []
-    stretches = chosen.fit.stretches
     for same in track(_alike(stretches, numbers), "what each number closes in runs"):
         some = [stretches[place] for place in same]
-        own = chosen.fit.servos.numbers
         by_subset = []
         for subset in wanted:
             those = tuple(push for name, push in pushes.items() if name in subset)
             pushed = [replace(stretch, pushes=those) for stretch in some]
-            each_set = np.where(_rows(subset), numbers[some[0].run.name], own)
-            by_subset.append(_squares(chosen.fit.servos, each_set, pushed))
+            each_set = np.where(_rows(subset), numbers[some[0].run.name], own.numbers)
+            by_subset.append(_squares(own, each_set, pushed))
         rows += list(zip(same, np.moveaxis(np.array(by_subset), 1, 0), strict=True))
     squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, c, n)
     runs = [stretch.run.name for stretch in stretches]

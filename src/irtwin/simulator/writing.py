@@ -88,6 +88,7 @@ def document(
     horizons: Horizons,
 ) -> said.Document:
     """Return the document; `before`, `after`: each run played as a whole, by the model and by numbers of other runs."""
+    held_out = len(runs) > 1 or runs[0] not in {stretch.run.name for stretch in chosen.fit.stretches}
     squares = [np.array([run.squares for run in some]) for some in (before, after)]
     names = sorted(parts.names, key=lambda name: -parts.relative(parts.without(name)).sum())
     causes = _causes(robot, chosen, pushes, parts, names)
@@ -110,7 +111,7 @@ def document(
         causes=folded(causes, findings),
         not_testable=(),
         shrink=said.Shrink(
-            held_out_runs=tuple(runs) if len(runs) > 1 else (),
+            held_out_runs=tuple(runs) if held_out else (),
             noise_floor_from=None,
             torque_rmse=together(*(torque[:, 0] for torque in torques)) if torques[0].size else None,
             power_rmse=None,

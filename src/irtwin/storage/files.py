@@ -125,6 +125,13 @@ def check_place(path: Path) -> None:
         raise InputError(f"{path}: cannot be written, because {folder} is not a writable folder")
 
 
+def check_new(path: Path) -> None:
+    """Raise InputError where no model can be written: one that is there may be somebody's work."""
+    check_place(path)
+    if path.exists():
+        raise InputError(f"{path}: is there already, and no model is written over; remove it, or name another")
+
+
 def read_document(folder: Path, path: str, checksum: str) -> bytes:
     """Read a file of a workspace by its path and SHA-256. Raises InputError where it is gone or another."""
     again = "run or diagnose its data set again"
