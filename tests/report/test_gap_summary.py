@@ -157,7 +157,7 @@ def test_that_a_split_between_links_is_the_descriptions_is_said_beside_a_simulat
     alone, beside = (replace(told, causes=causes, simulator=simulator) for simulator in (None, "arm"))
     (said,) = summary.meanings(beside)
     assert said.startswith("Torque shows sums over links") and summary.meanings(alone) == []
-    assert summary.causes(beside).rows[0]["parameter"] == "Fs of joint_a3"
+    assert summary.causes(beside, "simulated").rows[0]["parameter"] == "Fs of joint_a3"
 
 
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
