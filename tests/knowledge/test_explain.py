@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -56,6 +57,19 @@ def test_rule_with_an_aggregate_names_what_it_took(reasoned: KnowledgeGraph) -> 
     found = only(reasoned, "id:run/Arm_A.fit_1 irt:dominant_Joint ?")
     assert found.by == 'the rule "dominant joint", in SHACL'
     assert 'id:joint_energy/Arm_A.fit_1/j1 irt:Energy "300"^^xsd:double' in {each.what for each in found.because}
+
+
+def test_totals_are_the_sums_of_what_explains_them(plant_place: Path) -> None:
+    plant = KnowledgeGraph(plant_place / "graph", read_only=True)
+    totals = plant.query("""SELECT ?total ?name ?value {
+        ?name irt:worked_out_of ?property . ?total ?name ?value
+        FILTER(?name NOT IN (irt:Least_Payload, irt:Greatest_Payload, irt:Total_Idle_Energy, irt:Total_Idle_Time)) }""")
+    for row in totals:
+        found = only(plant, f"<{row['total']}> <{row['name']}> ?")
+        parts = [float(each.what.split('"')[1]) for each in found.because]
+        assert parts and sum(parts) == pytest.approx(row["value"]), found.what
+    kinds = {row["total"].removeprefix(plant.base).partition("/")[0] for row in totals}
+    assert kinds == {"robot_total", "day_total", "fleet_day_total", "ledger_total", "joint_total"}
 
 
 def test_closure_names_rule_and_premises(reasoned: KnowledgeGraph) -> None:

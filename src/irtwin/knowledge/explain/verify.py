@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from irtwin.input_file import checksum
-from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.explanation import LEFT_OUT, Explanation
 from irtwin.storage.files import inside
 
 WHOLE, CHANGED, MISSING, UNKNOWN = "whole", "changed", "missing", "cannot be checked"
@@ -23,19 +23,20 @@ class Verdict:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the file is not what it was."""
-        return self.state in (CHANGED, MISSING)
+        """Whether the file is not what it was, or nobody looked at it."""
+        return self.state in (CHANGED, MISSING, LEFT_OUT)
 
     def __str__(self) -> str:
         return f"{self.state}: {self.file}{f' ({self.why})' if self.why else ''}"
 
 
-def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
+def verify(explanations: Collection[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
     files = dict.fromkeys(
         (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
     )
-    return [_verdict(workspace, folder, file, known) for folder, file, known in files]
+    left_out = [Verdict(each.what, LEFT_OUT) for one in explanations for each in _all(one) if each.by == LEFT_OUT]
+    return [*(_verdict(workspace, folder, file, known) for folder, file, known in files), *left_out]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:
