@@ -208,6 +208,8 @@ def test_the_tariff_of_plant_toml_is_changed_there(workspace: Path) -> None:
         ("INSERT DATA { <RUN> irt:Run_Time 5.0e0 }", "irtwin takes it from logs and files, or works it out"),
         ("DELETE WHERE { <RUN> irt:Run_Time ?s }", "cannot be taken out: it was taken in with a data set"),
         ("DELETE WHERE { <RUN> irt:Energy_Consumption ?s }", "cannot be taken out: a provider worked it out"),
+        ("INSERT DATA { <RUN> irt:Paylod 5 }", r"the ontology has no irt:Paylod: did you mean irt:Payload\?"),
+        ("INSERT DATA { <RUN> a irt:Overloaded_Run }", "irt:Overloaded_Run is concluded; change what it is concluded"),
         ("INSERT DATA { <RUN> a irt:Industrial_Robot }", r"refused, nothing changed: .*\(OWL 2 RL rule cax-adc\)"),
         ("DELETE WHERE { irt:Payload rdfs:label ?l }", "it stands in the ontology"),
         ("INSERT DATA { GRAPH <https://w3id.org/irtwin/graph/source/x> { <RUN> <urn:p> 1 } }", "is irtwin's own"),

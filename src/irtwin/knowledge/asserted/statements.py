@@ -15,6 +15,7 @@ from sqlalchemy import Column, Engine, Float, select
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
+from irtwin.knowledge.asserted import terms
 from irtwin.knowledge.explain.mapping import maps_of, says
 from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap
@@ -301,6 +302,7 @@ def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
         raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+    terms.check(graph.resources, quad, what)
     if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
             f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
