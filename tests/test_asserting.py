@@ -172,6 +172,8 @@ def test_a_limit_that_is_set_is_followed_by_classes_until_it_is_taken_back(works
     assert rows(workspace, heavy) == []
     (why,) = explain("limit:idle_share irt:Limit_Value ?", workspace)
     assert why.by.startswith("asserted by bert, ") and ", in place of 0.85, " in why.by
+    (of_source,) = explain("limit:idle_share <http://purl.org/dc/terms/source> ?", workspace)
+    assert of_source.because == (why,)
     anew = made_anew(workspace)  # as after a repair, or with the ontology of another version
     with Snapshot(workspace / "graph") as snapshot:
         kept = said(snapshot.graph, *BY_LOT)

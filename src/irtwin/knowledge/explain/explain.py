@@ -21,7 +21,7 @@ from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.ontology import ELECTRICITY
+from irtwin.knowledge.store.ontology import ELECTRICITY, LIMIT_VALUE, SOURCE
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import (
@@ -146,6 +146,9 @@ class Explainer:
             module = _module(triple, self._graph.resources.of("ontology"))
             if module is None and triple.subject == ELECTRICITY:
                 return Explanation(what, "the plant's tariff", file=FILE)
+            if module is None and triple.predicate == SOURCE:
+                values = self._graph.store.said(triple.subject, LIMIT_VALUE)
+                return Explanation(what, "who set the limit", tuple(self.triple(quad.triple) for quad in values))
             return Explanation(what, "the ontology", file=module)
         return Explanation(what, f"what was written into {shorten(name)}")
 
