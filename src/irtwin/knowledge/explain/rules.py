@@ -88,7 +88,8 @@ def _subqueries(body: str) -> Iterator[tuple[set[str], str]]:
         clause = body[select.start(1) : select.end(1)]
         while clause != (clause := _IN_BRACKETS.sub(" ", clause)):
             pass
-        yield set(_VARIABLE.findall(clause)), body[select.end() : end - 1]
+        group = body[select.end() : end - 1]
+        yield set(_VARIABLE.findall(group if "*" in clause else clause)), group
 
 
 def _patterns(algebra: Any) -> Iterator[tuple[Any, Any, Any]]:
