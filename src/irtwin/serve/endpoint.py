@@ -28,7 +28,7 @@ _ROOM = 4  # largest answers that may wait for their clients
 _NAMED_GRAPHS = "SELECT ?graph WHERE { GRAPH ?graph { } } ORDER BY ?graph"
 _PREFIXES = {"sd": "http://www.w3.org/ns/sparql-service-description#", "formats": "http://www.w3.org/ns/formats/"}
 _SERVICE = """
-[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature sd:UnionDefaultGraph ;
+[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature %s ;
   sd:resultFormat formats:SPARQL_Results_JSON, formats:SPARQL_Results_XML, formats:SPARQL_Results_CSV,
     formats:SPARQL_Results_TSV, formats:Turtle, formats:N-Triples, formats:RDF_XML, formats:JSON-LD ;
   sd:defaultDataset [ a sd:Dataset ; sd:defaultGraph [ a sd:Graph ] %s ] .
@@ -122,7 +122,7 @@ class Endpoint:
             return page.response()
         _, graphs = await self._asking.written(request, _NAMED_GRAPHS, "text/csv")
         named = graphs.decode().splitlines()[1:]
-        return _description(accept, _address(request), named, self._updates.allowed)
+        return _description(accept, _address(request), named, self._updates.allowed, bool(self._limits.services))
 
     async def _update(self, operation: Operation, request: Request) -> Response:
         headers = request.headers
@@ -164,13 +164,14 @@ class Endpoint:
         return head
 
 
-def _description(accept: str, address: str, graphs: Sequence[str], updates: bool) -> Response:
+def _description(accept: str, address: str, graphs: Sequence[str], updates: bool, services: bool) -> Response:
     """Return the SPARQL 1.1 Service Description of the service at `address`, in the form that the client prefers."""
     media_type = negotiation.chosen(accept, negotiation.TRIPLES, "the description")
     languages = "sd:SPARQL11Query, sd:SPARQL11Update" if updates else "sd:SPARQL11Query"
+    features = "sd:UnionDefaultGraph" + ", sd:BasicFederatedQuery" * services
     named = "".join(f"; sd:namedGraph [ a sd:NamedGraph ; sd:name {NamedNode(graph)} ]" for graph in graphs)
     prefixes = "".join(f"@prefix {name}: <{iri}> . " for name, iri in _PREFIXES.items())
-    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, named), RdfFormat.TURTLE)
+    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, features, named), RdfFormat.TURTLE)
     form = RdfFormat.from_media_type(media_type)
     body = serialize((quad.triple for quad in quads), format=form, prefixes=_PREFIXES)
     return Response(body, media_type=media_type, headers={"Vary": "Accept"})
@@ -188,7 +189,7 @@ async def _send(answer: Reply, head: AnswerHead, request: Request, send: Send) -
     if head.etag is not None:
         headers["ETag"] = head.etag
     encoded = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
-    known = {one.strip() for one in request.headers.get("if-none-match", "").split(",")}
+    known = {tag.strip() for tag in request.headers.get("if-none-match", "").split(",")}
     is_known = head.etag in known and request.method != "POST"
     await send({"type": "http.response.start", "status": 304 if is_known else 200, "headers": encoded})
     async for piece in answer.pieces():

@@ -36,6 +36,7 @@ class Limits:
     answer: int = 256 << 20  # bytes
     request: int = 1 << 20  # bytes
     waiting: int = 64  # queries
+    services: tuple[str, ...] = ()  # IRIs of endpoints that it may ask by SERVICE
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Worker:
     @classmethod
     async def start(cls, location: Location, limits: Limits) -> Worker:
         """Start a process, and wait until it has opened the graph."""
-        arguments = map(str, (limits.memory, limits.seconds, limits.answer))
+        arguments = map(str, (limits.memory, limits.seconds, limits.answer, *limits.services))
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
             stdin=asyncio.subprocess.PIPE,

@@ -76,14 +76,14 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
             continue
         about = str(fact.place), _key(fact)
         now = written(getattr(row, fact.column.name))
-        what = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
+        cell = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
         by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
         in_data_set = told.setdefault(about, now)
         if now == fact.replaced:
             setattr(row, fact.column.name, value_of(fact.column, fact.value))
-            words[about] = f"{what}: {fact.value}, as {by}; the data set says {in_data_set}"
+            words[about] = f"{cell}: {fact.value}, as {by}; the data set says {in_data_set}"
         elif now != fact.value:
-            words[about] = f"{what}: the data set says {in_data_set} now; what {by} no longer holds"
+            words[about] = f"{cell}: the data set says {in_data_set} now; what {by} no longer holds"
     return list(words.values())
 
 
@@ -115,7 +115,7 @@ def keep(session: Session, facts: Sequence[AssertedFact], withdrawn: Iterable[st
 def row_of(session: Session, fact: AssertedFact) -> Base | None:
     """Return the row that a fact is about; None where there is none."""
     key = json.loads(str(fact.row_key))
-    mapper = next(one for one in Base.registry.mappers if one.local_table is fact.table)
+    mapper = next(candidate for candidate in Base.registry.mappers if candidate.local_table is fact.table)
     ident = tuple(value_of(column, key[column.name]) for column in fact.table.primary_key)
     return session.get(mapper.class_, ident)
 

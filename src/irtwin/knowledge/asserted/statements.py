@@ -82,8 +82,8 @@ def read(
     now = datetime.now(UTC)
     for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
         gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
-        said = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
-        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **said)
+        common = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
+        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **common)
         cell = _cell(graph, subject, predicate)
         if cell is not None:
             _fill(assertion, graph, session, cell, (subject, predicate), new, fact)
@@ -135,7 +135,9 @@ def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     if graph.has_ontology:
         limits = _limits(graph, facts)
         of_limits = (Quad(*row) for row in graph.store.said_of({limit for limit, _ in limits}))
-        there |= {one for one in of_limits if (one.subject, one.predicate) in limits and one.graph_name == _ONTOLOGY}
+        there |= {
+            quad for quad in of_limits if (quad.subject, quad.predicate) in limits and quad.graph_name == _ONTOLOGY
+        }
         kept.extend(limits.values())
     graph.change(there - set(kept), set(kept) - there)
 
@@ -183,13 +185,13 @@ def _fill(
     cell: _Cell,
     about: tuple[NamedNode, NamedNode],
     new: set[Quad],
-    said: Callable[..., AssertedFact],
+    make_fact: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
-    what = say(about, graph.base)
-    fact = said(
+    statement = say(about, graph.base)
+    fact = make_fact(
         fact_id=secrets.token_hex(12),
-        value=_text(cell.column, new, what),
+        value=_text(cell.column, new, statement),
         kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
         graph=cell.graph.value,
         place=f"{cell.column.table.name}.{cell.column.name}",
@@ -197,13 +199,13 @@ def _fill(
     )
     row = row_of(session, fact)
     if row is None:
-        raise InputError(f"{what}: the database has no such {cell.column.table.name}; nothing changed")
+        raise InputError(f"{statement}: the database has no such {cell.column.table.name}; nothing changed")
     if fact.value is None and not cell.column.nullable:
-        raise InputError(f"{what}: needs a value; say another one in the same update; nothing changed")
+        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
     try:
         check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
     except ValueError as error:
-        raise InputError(f"{what}: {error}; nothing changed") from None
+        raise InputError(f"{statement}: {error}; nothing changed") from None
     fact.replaced = written(getattr(row, cell.column.name))
     if fact.value == fact.replaced:
         return
@@ -219,17 +221,17 @@ def _set_limit(
     session: Session,
     about: tuple[NamedNode, NamedNode],
     new: set[Quad],
-    said: Callable[..., AssertedFact],
+    make_fact: Callable[..., AssertedFact],
 ) -> None:
     """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said."""
-    what, shipped = say(about, graph.base), ontology.limits(graph.resources)[about]
-    value = _text(_NUMBER, new, what)
+    statement, shipped = say(about, graph.base), ontology.limits(graph.resources)[about]
+    value = _text(_NUMBER, new, statement)
     if value is not None and not math.isfinite(float(value)):
-        raise InputError(f"{what}: cannot be {value}; nothing changed")
+        raise InputError(f"{statement}: cannot be {value}; nothing changed")
     of_limit = select(AssertedFact.fact_id).where(AssertedFact.subject == about[0].value)
     known = session.scalars(of_limit.where(AssertedFact.graph == GRAPH_ONTOLOGY)).all()
     if value is None and not known:
-        raise InputError(f"{what}: needs a value; say another one in the same update; nothing changed")
+        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
     now = next((quad for quad in graph.store.said(*about) if quad.graph_name == _ONTOLOGY), shipped)
     before = _float(now)
     assertion.removed.add(now)
@@ -238,7 +240,7 @@ def _set_limit(
         assertion.added.add(shipped)
         return
     more = {"value": value, "kind": f"{XSD}double", "graph": GRAPH_ONTOLOGY, "replaced": written(before)}
-    fact = said(fact_id=secrets.token_hex(12), **more)
+    fact = make_fact(fact_id=secrets.token_hex(12), **more)
     assertion.added.add(quad_of(fact))
     if float(value) != before:
         assertion.facts.append(fact)
@@ -248,25 +250,25 @@ def _float(quad: Quad) -> float:
     return float(quad.object.value)  # type: ignore[union-attr]
 
 
-def _text(column: Column[Any], new: set[Quad], what: str) -> str | None:
+def _text(column: Column[Any], new: set[Quad], statement: str) -> str | None:
     """Return the one value that is new as facts write it, in the column's own form; None without any.
 
     InputError where there are several, or the column can hold no such.
     """
     values = {quad.object for quad in new}
     if len(values) > 1:
-        raise InputError(f"{what}: has one value, not {len(values)}; nothing changed")
+        raise InputError(f"{statement}: has one value, not {len(values)}; nothing changed")
     if not values:
         return None
     (value,) = values
     is_number = column.type.python_type is not str
     datatype = value.datatype.value if isinstance(value, Literal) else ""
     if not isinstance(value, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
-        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
+        raise InputError(f"{statement}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
     try:
         return written(value_of(column, value.value))
     except ValueError:
-        raise InputError(f"{what}: cannot be {value.value!r}; nothing changed") from None
+        raise InputError(f"{statement}: cannot be {value.value!r}; nothing changed") from None
 
 
 def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
@@ -278,11 +280,11 @@ def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str |
 
 def _check_tariff(graph: KnowledgeGraph, predicate: NamedNode) -> None:
     """Raise InputError where `plant.toml` says a property of the tariff: the ontology's graph does, and no module."""
-    said = {quad for quad in graph.store.said(ontology.ELECTRICITY, predicate) if quad.graph_name == _ONTOLOGY}
+    quads = {quad for quad in graph.store.said(ontology.ELECTRICITY, predicate) if quad.graph_name == _ONTOLOGY}
     modules = ontology.of_modules(graph.resources)
-    if said and not any(quad.subject == ontology.ELECTRICITY and quad.predicate == predicate for quad in modules):
-        what = say((ontology.ELECTRICITY, predicate), graph.base)
-        raise InputError(f"{what}: stands in the workspace's {FILE}; change it there; nothing changed")
+    if quads and not any(quad.subject == ontology.ELECTRICITY and quad.predicate == predicate for quad in modules):
+        statement = say((ontology.ELECTRICITY, predicate), graph.base)
+        raise InputError(f"{statement}: stands in the workspace's {FILE}; change it there; nothing changed")
 
 
 def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
@@ -291,7 +293,7 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
     ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
     name = getattr(quad.graph_name, "value", "")
     if not ids and name.startswith(GRAPH):
-        why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
+        why = next((reason for below, reason in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
         raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
     assertion.withdrawn += ids
     assertion.removed.add(quad)
@@ -299,13 +301,13 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     """Raise InputError where a statement is one that irtwin makes itself."""
-    what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
+    statement, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
-    terms.check(graph.resources, quad, what)
+        raise InputError(f"{statement}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+    terms.check(graph.resources, quad, statement)
     if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
-            f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
+            f"{statement}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )
 
 

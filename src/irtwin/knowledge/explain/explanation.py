@@ -35,7 +35,7 @@ def to_json(explanation: Explanation) -> dict[str, Any]:
     plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "folder", "checksum")}
     known = {name: value for name, value in plain.items() if value is not None}
     if explanation.because:
-        known["because"] = [to_json(each) for each in explanation.because]
+        known["because"] = [to_json(premise) for premise in explanation.because]
     return known
 
 
@@ -50,7 +50,7 @@ def _lines(explanation: Explanation, margin: str) -> Iterator[str]:
         checksum = f", sha256 {explanation.checksum}" if explanation.checksum else ""
         place = f" in {explanation.folder}" if explanation.folder else ""
         yield f"{inner}file {explanation.file}{place}{checksum}"
-    for each in explanation.because:
-        first, *rest = _lines(each, inner + "  ")
+    for premise in explanation.because:
+        first, *rest = _lines(premise, inner + "  ")
         yield f"{inner}- {first.lstrip()}"
         yield from rest

@@ -36,9 +36,11 @@ def premises(graph: KnowledgeGraph, rule: Rule, conclusion: Triple) -> tuple[lis
     for pattern in algebra(rule.construct).template:
         bound = _unified(pattern, conclusion)
         for known in _solutions(graph, prologue, body, bound, 1) if bound is not None else ():
-            found = dict.fromkeys(_taken(graph, prologue, body, [known], known))
-            facts = [one for one in found if one is not None and one != conclusion and graph.holds(one)]
-            return facts, None not in found
+            instances = dict.fromkeys(_taken(graph, prologue, body, [known], known))
+            facts = [
+                triple for triple in instances if triple is not None and triple != conclusion and graph.holds(triple)
+            ]
+            return facts, None not in instances
     return None
 
 
@@ -99,8 +101,8 @@ def _patterns(algebra: Any) -> Iterator[tuple[Any, Any, Any]]:
     yield from algebra.get("triples") or ()
     for name, part in algebra.items():
         if name != "expr":
-            for each in part if isinstance(part, list) else [part]:
-                yield from _patterns(each)
+            for inner in part if isinstance(part, list) else [part]:
+                yield from _patterns(inner)
 
 
 def _unified(pattern: tuple[Any, Any, Any], triple: Triple) -> _Bound | None:

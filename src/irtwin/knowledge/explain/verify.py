@@ -33,16 +33,24 @@ class Verdict:
 def verify(explanations: Collection[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
     files = dict.fromkeys(
-        (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
+        (part.folder, part.file, part.checksum)
+        for explanation in explanations
+        for part in _all(explanation)
+        if part.file
     )
-    left_out = [Verdict(each.what, LEFT_OUT) for one in explanations for each in _all(one) if each.by == LEFT_OUT]
+    left_out = [
+        Verdict(part.what, LEFT_OUT)
+        for explanation in explanations
+        for part in _all(explanation)
+        if part.by == LEFT_OUT
+    ]
     return [*(_verdict(workspace, folder, file, known) for folder, file, known in files), *left_out]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:
     yield explanation
-    for each in explanation.because:
-        yield from _all(each)
+    for premise in explanation.because:
+        yield from _all(premise)
 
 
 def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) -> Verdict:
@@ -51,8 +59,8 @@ def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) 
     base = workspace if folder is None else Path(folder)
     path = inside(workspace, file) if folder is None else base / file
     if not base.is_dir():
-        what = "the workspace" if folder is None else "its data set"
-        return Verdict(str(path), UNKNOWN, f"{what} is not at {base}; take it in again from where it is")
+        holder = "the workspace" if folder is None else "its data set"
+        return Verdict(str(path), UNKNOWN, f"{holder} is not at {base}; take it in again from where it is")
     if not path.exists():
         return Verdict(str(path), MISSING)
     if not (path.is_file() or path.is_dir()):
