@@ -33,7 +33,7 @@ FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
 Family = Annotated[str, Names(f"{ONTOLOGY}/family/{{}}")]
 CauseId = Annotated[str, Names("gap_cause/{diagnosis_id}/{}", "cause_id")]
 
-LIKELY = 0.5  # confidence from which a cause or a finding is likely, more so than not; below it is a guess
+LIKELY = 0.5  # confidence from which a cause or finding is likely, not a guess; as limit:confidence_to_act ships (test)
 FALSE_PLACES = 0.05  # rate of false discoveries up to which a place is sure, as intervals are 95 % ones
 LEAST_SHARE = 0.02  # of its channel's excess that a place has, to be worth a line
 

@@ -83,17 +83,26 @@ class Endpoint:
         """Read what is to be done with a graph; who may not change one is refused before he is listened to."""
         method = request.method
         if method in ("GET", "HEAD"):
-            return graph_store.read(parameters)
+            operation = graph_store.read(parameters)
+            await self._check_there(request, operation.default_graphs)
+            return operation
         if method == "OPTIONS":
             raise Refusal(204, "", {"Allow": _METHODS_OF_GRAPH})
         if method not in ("PUT", "POST", "DELETE"):
             raise Refusal(405, f"{method} is not for a graph", {"Allow": _METHODS_OF_GRAPH})
         self._updates.admit(request.headers.get("authorization", ""))
         if method == "DELETE":
-            return graph_store.dropped(parameters)
+            operation = graph_store.dropped(parameters)
+            await self._check_there(request, parameters["graph"])
+            return operation
         sent = request.headers.get("content-type", ""), await self._body(request), _address(request)
         change = graph_store.replaced if method == "PUT" else graph_store.merged
         return await asyncio.to_thread(change, parameters, *sent)
+
+    async def _check_there(self, request: Request, graphs: Sequence[str]) -> None:
+        for name in graphs:
+            if not await self._asking.holds(request, "GRAPH ?graph { ?s ?p ?o }", {"graph": name}):
+                raise Refusal(404, f"there is no graph {name}")
 
     async def _body(self, request: Request) -> bytes:
         return await read_body(request, self._limits.request, self._limits.seconds)

@@ -43,7 +43,8 @@ class Limits:
 class AnswerHead:
     """What is known of an answer before its bytes: media type, how the graph stands (`irtwin.asking`), and its ETag.
 
-    An answer has an ETag where all of it was there before its first byte left.
+    The ETag is made of the answer, where all was there before its first byte left, else of the query and the state of
+    the graph, where these say what it is.
     """
 
     media_type: str

@@ -51,6 +51,7 @@ class _Sink:
         self._left = most_bytes
         self._held = bytearray()
         self._etag: str | None = None
+        self.asked: str | None = None  # what was asked of which state of the graph, where that names the answer
 
     def write(self, data: bytes) -> int:
         self._left -= len(data)
@@ -68,13 +69,18 @@ class _Sink:
         if not self.begun and len(self._held) <= _MOST_KEPT:
             self.small = bytes(self._held)
         if not self.begun:
-            named = hashlib.sha256(self.media_type.encode() + b"\0" + self._held)
-            self._etag = f'W/"{named.hexdigest()[:32]}"'
+            self._etag = self._named(self._held)
         self._send()
         _frame(self._out, b"E", b"")
 
+    def _named(self, of: bytes | bytearray) -> str:
+        named = hashlib.sha256(self.media_type.encode() + b"\0" + of)
+        return f'W/"{named.hexdigest()[:32]}"'
+
     def _send(self) -> None:
         if not self.begun:
+            if self._etag is None and self.asked is not None:
+                self._etag = self._named(self.asked.encode())
             head = {"media_type": self.media_type, "standing": self.standing, "etag": self._etag}
             _frame(self._out, b"H", json.dumps(head).encode())
             self.begun = True
@@ -113,6 +119,8 @@ def main(memory: int, seconds: float, most_bytes: int, services: Collection[str]
 def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
     """Answer as before where the graph has not changed since; keep an answer that is small."""
     answers, asked = graph.answers, (request["text"], json.dumps({**request, "at_once": None}, sort_keys=True))
+    if graph.seen is not None and answers.can_keep(request["text"]):
+        sink.asked = graph.seen + asked[1]
     kept = answers.get(*asked)
     if kept is None:
         _answer(graph, request, sink)

@@ -68,20 +68,23 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
     it did not know of that.
     """
     by_key = {(row.__tablename__, _key(row)): row for row in rows}
-    values: dict[tuple[str, str], str] = {}
+    words: dict[tuple[str, str], str] = {}
+    told: dict[tuple[str, str], str | None] = {}  # by the data set
     for fact in facts:
         row = by_key.get((fact.table.name, _key(fact)))
         if row is None:
             continue
+        about = str(fact.place), _key(fact)
         now = written(getattr(row, fact.column.name))
         cell = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
         by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
+        in_data_set = told.setdefault(about, now)
         if now == fact.replaced:
             setattr(row, fact.column.name, value_of(fact.column, fact.value))
-            values[str(fact.place), _key(fact)] = f"{cell}: {fact.value}, as {by}; the data set says {fact.replaced}"
+            words[about] = f"{cell}: {fact.value}, as {by}; the data set says {in_data_set}"
         elif now != fact.value:
-            values[str(fact.place), _key(fact)] = f"{cell}: the data set says {now} now; what {by} no longer holds"
-    return list(values.values())
+            words[about] = f"{cell}: the data set says {in_data_set} now; what {by} no longer holds"
+    return list(words.values())
 
 
 def _key(of: Base) -> str:

@@ -12,16 +12,16 @@ from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Tripl
 from irtwin.errors import InputError
 from irtwin.knowledge.engines import HERMIT
 from irtwin.knowledge.explain import provenance
-from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.explanation import LEFT_OUT, Explanation
 from irtwin.knowledge.explain.mapping import says
-from irtwin.knowledge.explain.rules import premises
+from irtwin.knowledge.explain.rules import MOST_TAKEN, premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, say
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.ontology import ELECTRICITY
+from irtwin.knowledge.store.ontology import ELECTRICITY, LIMIT_VALUE, SOURCE
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import (
@@ -94,8 +94,9 @@ class Explainer:
         for rule in all_rules(self._graph.resources):
             grounds = premises(self._graph, rule, triple) if rule.graph in graphs else None
             if grounds is not None:
+                facts, are_all = grounds
                 by = f'the rule "{rule.label}", in {rule.language}'
-                return Explanation(statement, by, tuple(map(self.triple, grounds)), rule.comment or None)
+                return Explanation(statement, by, self._each(facts, are_all), rule.comment or None)
         return self._inferred(tuple(triple))
 
     def individual(self, iri: str) -> Explanation:
@@ -136,6 +137,8 @@ class Explainer:
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
             maker = says(triple, self._graph.resources.of("mappings"), self._graph.base) or "a mapping"
+            if parts := provenance.parts_of_total(self._graph, triple, MOST_TAKEN + 1):
+                return Explanation(statement, maker, self._each(parts[:MOST_TAKEN], len(parts) <= MOST_TAKEN))
             subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
             behind = provenance.behind(self._graph, subject) if not near and subject is not None else []
             return Explanation(statement, maker, tuple(map(self.individual, behind)), **near)
@@ -143,8 +146,15 @@ class Explainer:
             module = _module(triple, self._graph.resources.of("ontology"))
             if module is None and triple.subject == ELECTRICITY:
                 return Explanation(statement, "the plant's tariff", file=FILE)
+            if module is None and triple.predicate == SOURCE:
+                values = self._graph.store.said(triple.subject, LIMIT_VALUE)
+                return Explanation(statement, "who set the limit", tuple(self.triple(quad.triple) for quad in values))
             return Explanation(statement, "the ontology", file=module)
         return Explanation(statement, f"what was written into {shorten(name)}")
+
+    def _each(self, facts: list[Triple], are_all: bool) -> tuple[Explanation, ...]:
+        rest = () if are_all else (Explanation(f"more than {MOST_TAKEN} that were summed or compared", LEFT_OUT),)
+        return (*map(self.triple, facts), *rest)
 
     def _inferred(self, statement: Statement) -> Explanation:
         """Explain what OWL 2 RL inferred; steps that are the rules' own way to walk a list are left out."""

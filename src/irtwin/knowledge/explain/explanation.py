@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+LEFT_OUT = "left out"  # says of what there is too much of
+
 
 @dataclass(frozen=True)
 class Explanation:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from irtwin.input_file import checksum
-from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.explanation import LEFT_OUT, Explanation
 from irtwin.storage.files import inside
 
 WHOLE, CHANGED, MISSING, UNKNOWN = "whole", "changed", "missing", "cannot be checked"
@@ -23,14 +23,14 @@ class Verdict:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the file is not what it was."""
-        return self.state in (CHANGED, MISSING)
+        """Whether the file is not what it was, or nobody looked at it."""
+        return self.state in (CHANGED, MISSING, LEFT_OUT)
 
     def __str__(self) -> str:
         return f"{self.state}: {self.file}{f' ({self.why})' if self.why else ''}"
 
 
-def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
+def verify(explanations: Collection[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
     files = dict.fromkeys(
         (part.folder, part.file, part.checksum)
@@ -38,7 +38,13 @@ def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict
         for part in _all(explanation)
         if part.file
     )
-    return [_verdict(workspace, folder, file, known) for folder, file, known in files]
+    left_out = [
+        Verdict(part.what, LEFT_OUT)
+        for explanation in explanations
+        for part in _all(explanation)
+        if part.by == LEFT_OUT
+    ]
+    return [*(_verdict(workspace, folder, file, known) for folder, file, known in files), *left_out]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:

@@ -67,6 +67,7 @@ class KnowledgeGraph:
         self._base = base
         self._says_first = False  # whether the next change has it say first that it is behind
         self.read: dict[str, Any] = {}
+        self.seen: str | None = None  # what names the state of the files that a view of a folder shows
         self.answers = answers_of(self.store)
 
     @classmethod
