@@ -201,12 +201,31 @@ def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it(
     missed = np.where(np.arange(5)[:, None] == 4, [50.0, -50.0, 50.0, -50.0], 0.0)
     term, every = Term("k", "1"), 60.0 * one[:, 0]
     variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(5))
+    squares = every, 25.0 * np.ones((5, 4)), missed
     seen = HypothesisEvidence(
-        variants, every, 25.0 * np.ones((5, 4)), missed, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, every
+        variants, *squares, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, np.zeros(5), every
     )
     named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
     posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one[:, 0], DEFAULT.criterion)
     assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
+
+
+def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
+    """A loss of the whole robot explains more than a joint's friction, and other squares."""
+    one, term = np.ones((2, 1)), Term("k", "1")
+    variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(2))
+    explained, of_power = np.array([900.0, 60.0]), np.array([890.0, 3.0])
+    squares = explained, 25.0 * np.ones((2, 4)), np.zeros((2, 4))
+    seen = HypothesisEvidence(
+        variants, *squares, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, of_power, np.zeros(2)
+    )
+    loss, friction = (
+        Hypothesis("loss", None, MISSING, variants[:1]),
+        Hypothesis("friction", "j1", MISSING, variants[1:]),
+    )
+    posterior = Posterior((loss, friction), np.arange(2), np.zeros(2), seen, 0.05 * one[:, 0], DEFAULT.criterion)
+    assert (posterior.near(loss), posterior.near(friction)) == ([0], [1])
+    assert posterior.likeliest_at(friction) == 1
 
 
 def test_what_the_reference_runs_show_as_well_is_missing_and_has_not_changed():

@@ -177,12 +177,27 @@ class Posterior:
         own = self._explaining(self._told[shape], len(self.evidence.information[shape]))
         return float(own - self.log_odds[place])
 
+    def index(self, hypothesis: Hypothesis) -> int:
+        """Return the place of a hypothesis."""
+        return next(k for k, candidate in enumerate(self.hypotheses) if candidate.place == hypothesis.place)
+
+    def near(self, hypothesis: Hypothesis) -> list[int]:
+        """Return the places of the hypotheses that could be where one is, itself among them.
+
+        What power shows beside torque says nothing of what torque shows: it is explained otherwise, and less well.
+        """
+        seen, shapes = self.evidence, self.shape
+        of_power = 2 * seen.of_power[shapes] > seen.explained[shapes]
+        own = of_power[self.index(hypothesis)]
+        over = [k for k, other in enumerate(self.hypotheses) if overlap(other, hypothesis)]
+        return [k for k in over if of_power[k] == own]
+
     def likeliest_at(self, hypothesis: Hypothesis) -> int:
         """Return the place of the likeliest hypothesis of those that could be where one is, and have data for them.
 
         Where the data speak against all of them, of all.
         """
-        near = [k for k, other in enumerate(self.hypotheses) if overlap(other, hypothesis)]
+        near = self.near(hypothesis)
         near = [k for k in near if self.log_odds[k] > self.log_prior[k]] or near
         return near[int(np.argmax(self.weights(near)[0]))]
 

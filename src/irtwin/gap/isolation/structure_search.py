@@ -68,9 +68,9 @@ def attribute(
     structure, noise = search.settled(*search.pruned(*search.forward(before, noise)))
     structure, noise = search.likeliest(*search.pruned(*search.paired(structure, noise)))
     after = search.beside(structure, noise)
-    odds = {_place(hypothesis): float(after.log_odds[k]) for k, hypothesis in enumerate(after.hypotheses)}
+    odds = {hypothesis.place: float(after.log_odds[k]) for k, hypothesis in enumerate(after.hypotheses)}
     # what was found is at no place twice
-    beside = np.array([odds.get(_place(candidate), -np.inf) for candidate in candidates])
+    beside = np.array([odds.get(candidate.place, -np.inf) for candidate in candidates])
     named = [k for k, candidate in enumerate(candidates) if not candidate.nuisance]
     hypotheses = tuple(candidates[k] for k in named)
     return Attribution(search.causes(structure, noise), noise, hypotheses, visible[named], beside[named])
@@ -115,7 +115,7 @@ class _Search:
     def instead(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
         """Try what may stand in the place of one hypothesis of a structure, beside the others, once."""
         rest = [other for other in structure if other is not member]
-        asked = np.sort(_columns(rest)).tobytes(), noise.tobytes(), _place(member[0])
+        asked = np.sort(_columns(rest)).tobytes(), noise.tobytes(), member[0].place
         if asked not in self.tried:
             near = [candidate for candidate in self.candidates if overlap(candidate, member[0])]
             self.tried[asked] = self._beside(rest, noise, near)
@@ -205,7 +205,7 @@ class _Search:
     def odds(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> float:
         """Return the log odds of one hypothesis of a structure beside the others."""
         posterior = self.instead(member, structure, noise)
-        return float(posterior.log_odds[_index(posterior, member[0])])
+        return float(posterior.log_odds[posterior.index(member[0])])
 
     def settled(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
         """Take each hypothesis out and look for it anew: what came first may have stood for two still unknown."""
@@ -245,7 +245,7 @@ class _Search:
             for place, member in enumerate(structure):
                 posterior = self.instead(member, structure, noise)
                 rival = posterior.likeliest_at(member[0])
-                if posterior.log_odds[rival] > 0 and _place(posterior.hypotheses[rival]) != _place(member[0]):
+                if posterior.log_odds[rival] > 0 and posterior.hypotheses[rival].place != member[0].place:
                     structure = [*structure]
                     structure[place] = posterior.hypotheses[rival], posterior.variant(rival)
                     noise = self.left(structure, noise)
@@ -306,8 +306,8 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
     What the catalogue lacks could, too, and a nuisance: their part is no effect's.
     """
     hypothesis, variant = member
-    own = _index(posterior, hypothesis)
-    near = [k for k, candidate in enumerate(posterior.hypotheses) if overlap(candidate, hypothesis)]
+    own = posterior.index(hypothesis)
+    near = posterior.near(hypothesis)
     weights, none = posterior.weights(near)
     whole = np.logaddexp.reduce([*weights, none]) - np.log1p(-posterior.limits.unknown)
     sure: dict[tuple[str, str], float] = {}
@@ -344,20 +344,12 @@ def _joined(parts: Sequence[FoundCause]) -> FoundCause:
     )
 
 
-def _index(posterior: Posterior, hypothesis: Hypothesis) -> int:
-    return next(k for k, candidate in enumerate(posterior.hypotheses) if _place(candidate) == _place(hypothesis))
-
-
 def _columns(structure: Sequence[Member]) -> list[int]:
     return [k for _, variant in structure for k in variant.columns]
 
 
-def _place(hypothesis: Hypothesis) -> tuple[str, str, str | None]:
-    return hypothesis.effect, hypothesis.scope, hypothesis.joint
-
-
 def _places(structure: Sequence[Member]) -> set[tuple[str, str, str | None]]:
-    return {_place(member) for member, _ in structure}
+    return {hypothesis.place for hypothesis, _ in structure}
 
 
 def _same_place(first: Hypothesis, second: Hypothesis) -> bool:

@@ -30,8 +30,8 @@ class HypothesisEvidence:
 
     explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; values (V, k each),
     beyond what is expected, in units of the prior; information (V, k, k each); rows (G,); by_kind (V, `System.kinds`):
-    of what is explained; of_prior (V,): of it, what is none of rows: with the variant those of the twin's numbers whose
-    `prior_tells` are nearer to what is known of them.
+    of what is explained; of_power (V,): of it, what power shows beside torque; of_prior (V,): what is none of rows:
+    with the variant those of the twin's numbers whose `prior_tells` are nearer to what is known of them.
     """
 
     variants: tuple[Variant, ...]
@@ -42,6 +42,7 @@ class HypothesisEvidence:
     information: tuple[np.ndarray, ...]
     rows: np.ndarray
     by_kind: np.ndarray
+    of_power: np.ndarray
     of_prior: np.ndarray
 
     @cached_property
@@ -99,8 +100,10 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     halves = product(system.halves, range(system.groups))
     rows = np.array([max(float(system.rows[group, half].max()), 1.0) for half, group in halves])
     shown = np.maximum(explained, 0.0), said, missed
+    of_power = by_kind[:, 1] if system.beside_power else np.zeros(len(variants))
     of_prior = np.clip(nearer, 0.0, shown[0])
-    return HypothesisEvidence(tuple(variants), *shown, tuple(values), tuple(information), rows, by_kind, of_prior)
+    fitted = tuple(values), tuple(information)
+    return HypothesisEvidence(tuple(variants), *shown, *fitted, rows, by_kind, of_power, of_prior)
 
 
 def _in_halves(system: System, squares: np.ndarray) -> np.ndarray:

@@ -33,6 +33,11 @@ class Hypothesis:
     variants: tuple[Variant, ...]
 
     @property
+    def place(self) -> tuple[str, str, str | None]:
+        """Its effect, scope and joint, which no other has."""
+        return self.effect, self.scope, self.joint
+
+    @property
     def nuisance(self) -> bool:
         """Whether it is what nobody states of any robot."""
         return self.variants[0].effect.nuisance
