@@ -37,7 +37,7 @@ _TOLD_IN = """
 SELECT ?file ?checksum ?folder
 WHERE {
   ?property irt:told_in ?kind .
-  ?thing (irt:run_of | irt:joint_of | ^irt:has_Information | irt:note_of) ?robot .
+  ?thing (irt:run_of | irt:joint_of | ^irt:has_Information | irt:note_of)? ?robot .
   ?source irt:source_of ?robot ; irt:Source_Kind ?one ; irt:File ?file ; irt:Checksum ?checksum ;
     irt:Data_Folder ?folder .
   FILTER(?one = ?kind || (?kind = "URDF" && NOT EXISTS { ?other irt:source_of ?robot ; irt:Source_Kind ?kind }))
@@ -52,6 +52,7 @@ _NEXT = """
 SELECT DISTINCT ?next
 WHERE {
   { ?thing ?leads ?next } UNION { ?next irt:source_of ?thing }
+  UNION { ?next irt:source_of / irt:part_of ?thing ; irt:Source_Kind "data set" }
   FILTER(isIRI(?next) && ?next != ?thing)
 }
 ORDER BY ?next"""
