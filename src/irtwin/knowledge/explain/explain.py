@@ -143,7 +143,9 @@ class Explainer:
             module = _module(triple, self._graph.resources.of("ontology"))
             if module is None and triple.subject == ELECTRICITY:
                 return Explanation(what, "the plant's tariff", file=FILE)
-            return Explanation(what, "the ontology", file=module)
+            unnamed = triple.subject if isinstance(triple.subject, BlankNode) else None
+            leading = [it for it in Ontology.of(self._graph).triples if unnamed and it.object == unnamed]
+            return Explanation(what, "the ontology", tuple(map(self.triple, leading)), file=module)
         return Explanation(what, f"what was written into {shorten(name)}")
 
     def _inferred(self, statement: Statement) -> Explanation:
@@ -236,8 +238,11 @@ def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
     terms += [f"?_{place}" for place in range(len(terms), 3)]
     text = " ".join(terms)
     equal = " ".join(f"FILTER(?_{place} = {number})" for place, number in numbers.items())  # whatever its datatype
-    matching = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} LIMIT {MOST_TRIPLES + 1}")
-    return list(cast(QueryTriples, matching))
+    unnamed = {place: term for place, term in enumerate(parts) if term.startswith("_:")}
+    equal += "".join(f" FILTER(isBlank(?_{place}))" for place in unnamed)  # SPARQL has no way to say which
+    limit = "" if unnamed else f"LIMIT {MOST_TRIPLES + 1}"
+    matching = list(cast(QueryTriples, graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} {limit}")))
+    return [it for it in matching if all(str(tuple(it)[place]) == term for place, term in unnamed.items())] or matching
 
 
 def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:
@@ -264,10 +269,14 @@ def _maker(maker: dict[str, object]) -> str:
 
 
 def _module(triple: Triple, files: Files) -> str | None:
-    """Return the module of the ontology that says a triple; None for a part without a name."""
-    if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode):
+    """Return the module of the ontology that says a triple; None of a subject without a name."""
+    if isinstance(triple.subject, BlankNode):
         return None
-    return next((name for name, module in _modules(files) if next(in_graph([triple])) in module), None)
+    object = None if isinstance(triple.object, BlankNode) else triple.object
+    said = (
+        (name, module.quads_for_pattern(triple.subject, triple.predicate, object)) for name, module in _modules(files)
+    )
+    return next((name for name, quads in said if any(quads)), None)
 
 
 @lru_cache(maxsize=16)
