@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL ?= $(BIN)/python -m pip install --no-compile
 
-.PHONY: demo test suite compiled nightly check fast coverage fuzz lint mappings guide wheel ontology lock clean
+.PHONY: demo test suite compiled nightly check fast coverage fuzz lint mappings effects guide wheel ontology lock clean
 
 demo: $(VENV)/demo
 	$(BIN)/irtwin demo
@@ -47,6 +47,10 @@ fuzz: $(VENV)/test
 # What the fields of a diagnosis tell, as R2RML. A test says when to run it.
 mappings: $(VENV)/test
 	$(BIN)/python -m irtwin.document.r2rml > mappings/gap.r2rml.ttl
+
+# What the classes of effects say, as OWL. A test says when to run it.
+effects: $(VENV)/test
+	$(BIN)/python -m irtwin.effects.facts > ontology/effect_facts.ttl
 
 lint: $(VENV)/test
 	$(BIN)/ruff check .

@@ -22,7 +22,7 @@ from commanded import cases as commanded
 from irtwin.document.document import Document
 from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
-from irtwin.report.gap.verdict import misses
+from irtwin.report.gap.verdict import agrees
 from irtwin.signals.log import read_data_set
 from irtwin.simulator import playing
 from irtwin.simulator.model import read_model
@@ -85,11 +85,11 @@ def pair(kind: str, number: int, folder: Path, models: Path, data_sets: list[Pat
 
 
 def told(document: Document) -> str:
-    """Say the largest difference, that which no verdict counts too, and by how much the simulator misses the robot."""
+    """Say the largest difference, that which no verdict counts too, and how far the simulator agrees with the robot."""
     first = max(document.findings, key=lambda one: one.share, default=None)
     shrink = document.shrink
     tracking, torque = (None if one is None else one.before for one in (shrink.position_rmse, shrink.torque_rmse))
-    left = misses("simulated", tracking, torque) or "-"
+    left = agrees("simulated", tracking, torque) or "-"
     if first is None:
         return f"nothing | {left}"
     return f"{first.family} {', '.join(first.joints)}: {100 * first.share:.2g} % of {first.share_of} | {left}"
@@ -116,7 +116,7 @@ def main() -> None:
         right = sum(verdict == "no_gap" for _, verdict, _ in rows)
         lines = ["# Two sides that are equal", "", f"`no_gap` in {right} of {len(rows)}: `python equal_sides.py`.", ""]
         lines += [
-            "| pair | verdict | largest difference | the simulator misses the robot by |",
+            "| pair | verdict | largest difference | the simulator agrees with the robot |",
             "| --- | --- | --- | --- |",
         ]
         lines += [f"| {' | '.join(row)} |" for row in rows]

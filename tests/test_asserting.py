@@ -19,7 +19,16 @@ from irtwin.knowledge.owl_rl.beside import FactsClosure
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.snapshot import Snapshot
-from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, GRAPH_CHANGED, GRAPH_MAPPED, GRAPH_ONTOLOGY, IRT, ONTOLOGY, OWL
+from irtwin.knowledge.vocabulary import (
+    GRAPH_ASSERTED,
+    GRAPH_CHANGED,
+    GRAPH_MAPPED,
+    GRAPH_ONTOLOGY,
+    IRT,
+    LIMIT,
+    ONTOLOGY,
+    OWL,
+)
 from irtwin.rewriting import conclude, fill, map_rows, rewriting
 from irtwin.storage.asserted import AssertedFact
 from irtwin.storage.database import Workspace
@@ -149,9 +158,47 @@ def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Pat
         assert session.scalars(of_no_table).all() == []
 
 
+def test_a_limit_that_is_set_is_followed_by_classes_until_it_is_taken_back(workspace: Path) -> None:
+    value = (
+        "SELECT ?value ?source { limit:idle_share irt:Limit_Value ?value ; <http://purl.org/dc/terms/source> ?source }"
+    )
+    heavy = "SELECT ?run { ?run a irt:Idle_Heavy_Run } ORDER BY ?run"
+    shipped = rows(workspace, value), rows(workspace, heavy)
+    assert shipped[0][0][0] == 0.5 and len(shipped[1]) == 1
+    update(workspace, "INSERT DATA { limit:idle_share irt:Limit_Value 0.85 }")
+    update(workspace, "INSERT DATA { limit:idle_share irt:Limit_Value 0.95 }", "bert")
+    ((now, source),) = rows(workspace, value)
+    assert now == 0.95 and source.startswith("bert, ") and source.endswith(", in place of 0.85")
+    assert rows(workspace, heavy) == []
+    (why,) = explain("limit:idle_share irt:Limit_Value ?", workspace)
+    assert why.by.startswith("asserted by bert, ") and ", in place of 0.85, " in why.by
+    (of_source,) = explain("limit:idle_share <http://purl.org/dc/terms/source> ?", workspace)
+    assert of_source.because == (why,)
+    anew = made_anew(workspace)  # as after a repair, or with the ontology of another version
+    with Snapshot(workspace / "graph") as snapshot:
+        kept = said(snapshot.graph, *BY_LOT)
+        assert {quad for quad in kept if str(quad.subject).startswith(f"<{LIMIT}")} <= anew
+    update(workspace, "DELETE WHERE { limit:idle_share irt:Limit_Value ?value }")
+    assert (rows(workspace, value), rows(workspace, heavy)) == shipped
+    assert "limit value" not in [row[1] for row in rows(workspace, "asserted_facts")]
+
+
+def test_the_tariff_of_plant_toml_is_changed_there(workspace: Path) -> None:
+    (workspace / "plant.toml").write_text('price_per_kwh = 0.2\ncurrency = "EUR"\n', encoding="utf-8")
+    for text in ("DELETE WHERE { TARIFF irt:Energy_Price ?p }", "INSERT DATA { TARIFF irt:Energy_Price 0.3 }"):
+        with pytest.raises(
+            InputError, match=r"irt:Energy_Price: stands in the workspace's plant.toml; change it there"
+        ):
+            update(workspace, text.replace("TARIFF", "tariff:electricity"))
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
+        ("DELETE WHERE { limit:idle_share irt:Limit_Value ?v }", "irt:Limit_Value: needs a value"),
+        ("INSERT DATA { limit:idle_share irt:Limit_Value 0.1, 0.2 }", "has one value, not 2"),
+        ("INSERT DATA { limit:idle_share irt:Limit_Value 'INF'^^xsd:double }", "cannot be inf"),
+        ("INSERT DATA { limit:idle_share irt:Limit_Value 'half' }", "is a number, not"),
         ("DELETE DATA { <RUN> irt:Payload 3.0e0 }", "irt:Payload: needs a value"),
         ("INSERT DATA { <RUN> irt:Payload 1, 2 }", "has one value, not 2"),
         ("INSERT DATA { <RUN> irt:Payload 'much' }", "is a number, not"),
@@ -163,6 +210,8 @@ def test_what_no_table_holds_stays_a_triple_and_can_be_taken_back(workspace: Pat
         ("INSERT DATA { <RUN> irt:Run_Time 5.0e0 }", "irtwin takes it from logs and files, or works it out"),
         ("DELETE WHERE { <RUN> irt:Run_Time ?s }", "cannot be taken out: it was taken in with a data set"),
         ("DELETE WHERE { <RUN> irt:Energy_Consumption ?s }", "cannot be taken out: a provider worked it out"),
+        ("INSERT DATA { <RUN> irt:Paylod 5 }", r"the ontology has no irt:Paylod: did you mean irt:Payload\?"),
+        ("INSERT DATA { <RUN> a irt:Overloaded_Run }", "irt:Overloaded_Run is concluded; change what it is concluded"),
         ("INSERT DATA { <RUN> a irt:Industrial_Robot }", r"refused, nothing changed: .*\(OWL 2 RL rule cax-adc\)"),
         ("DELETE WHERE { irt:Payload rdfs:label ?l }", "it stands in the ontology"),
         ("INSERT DATA { GRAPH <https://w3id.org/irtwin/graph/source/x> { <RUN> <urn:p> 1 } }", "is irtwin's own"),

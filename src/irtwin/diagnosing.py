@@ -76,7 +76,7 @@ def diagnose(
     announce = clocked(announce)
     location = None if workspace is None else Location.of(workspace)
     files = _Files.checked(json_file, report, twin_file, motion_file, sysid_file, simulator_file, draws=draws)
-    files.check_apart(Path(one) for one in (simulator, twin) if isinstance(one, Path | str))
+    files.check_apart(Path(source) for source in (simulator, twin) if isinstance(source, Path | str))
     if location is not None or files.report is not None:
         from irtwin.report.extensions import check
 
@@ -137,14 +137,14 @@ class _Files:
         """Take files as they are asked for. Raises InputError where one cannot be written."""
         places = [None if file is None else Path(file) for file in files]
         last = places[-1]
-        more = () if last is None else tuple(last.with_stem(f"{last.stem}-{one + 1}") for one in range(draws))
+        more = () if last is None else tuple(last.with_stem(f"{last.stem}-{number + 1}") for number in range(draws))
         for file in (*filter(None, places), *more):
             check_place(file)
         return cls(*places, draws=more)
 
     def check_apart(self, read: Iterable[Path]) -> None:
         """Raise InputError where a file to write is one that is read, under whatever name."""
-        own = {one.resolve(): one for one in read}
+        own = {path.resolve(): path for path in read}
         named = (self.json, self.report, self.twin, self.motion, self.sysid, self.simulator, *self.draws)
         for file in filter(None, named):
             if file.resolve() in own:

@@ -23,12 +23,12 @@ class Unpacking:
         self.most = _ALWAYS + _TIMES * packed
         self.left = self.most
 
-    def take(self, size: int, what: str, remedy: str) -> None:
+    def take(self, size: int, part: str, remedy: str) -> None:
         """Count some bytes more. Raises InputError, naming the part that is too much."""
         self.left -= size
         if self.left < 0:
             raise InputError(
-                f"{self.path}: {what}: more than the {self.most // 1_000_000} MB that a file of this size may unpack "
+                f"{self.path}: {part}: more than the {self.most // 1_000_000} MB that a file of this size may unpack "
                 f"to; {remedy}"
             )
 
@@ -78,8 +78,8 @@ def checksum(path: Path) -> str:
     if path.is_file():
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    files = sorted(one for one in path.iterdir() if one.is_file())
-    return hashlib.sha256("\n".join(f"{one.name} {checksum(one)}" for one in files).encode()).hexdigest()
+    files = sorted(entry for entry in path.iterdir() if entry.is_file())
+    return hashlib.sha256("\n".join(f"{entry.name} {checksum(entry)}" for entry in files).encode()).hexdigest()
 
 
 def check_file(path: Path) -> int:

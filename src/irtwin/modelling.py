@@ -206,7 +206,7 @@ def write_faulty_model(twin: Twin, joint: str, out: Path) -> None:
     """Write a twin's robot for MuJoCo, where the rotor of one joint has half its inertia: a fault to be found."""
     check_place(out)
     model = ElementTree.fromstring(text_of(twin, "mjcf"))
-    element = next(one for one in model.iter("joint") if one.get("name") == joint)
+    element = next(candidate for candidate in model.iter("joint") if candidate.get("name") == joint)
     element.set("armature", repr(float(element.attrib["armature"]) / 2))
     write(out, ElementTree.tostring(model))
 

@@ -92,13 +92,13 @@ class TomlTable:
             raise self.fault(key, f"should be a number{bound}, not {shown(value)}")
         return float(value)
 
-    def numbers(self, key: str, count: int, what: str) -> Any:
-        """Return a tuple of so many numbers, None where none are. Raises InputError, saying `what` they should be."""
+    def numbers(self, key: str, count: int, expected: str) -> Any:
+        """Return a tuple of so many numbers, None where none are. Raises InputError, saying what is `expected`."""
         value = self.values.get(key)
         if value is None:
             return None
         if not (isinstance(value, list) and len(value) == count):
-            raise self.fault(key, f"should be {what}, not {shown(value)}")
+            raise self.fault(key, f"should be {expected}, not {shown(value)}")
         parts = (TomlTable(self.file, f"{self.name} {key}", {"part": part}).number("part") for part in value)
         return tuple(0.0 if part is None else part for part in parts)
 
@@ -119,9 +119,9 @@ class TomlTable:
         matches = ((key, difflib.get_close_matches(key, others, 1, share)) for key in self.values if key not in known)
         return [(key, near[0]) for key, near in matches if near]
 
-    def fault(self, key: str, what: str) -> InputError:
+    def fault(self, key: str, problem: str) -> InputError:
         """Return the error that says what is wrong with a key."""
-        return InputError(f"{self.file}: {f'{self.name} {key}'.lstrip()} {what}")
+        return InputError(f"{self.file}: {f'{self.name} {key}'.lstrip()} {problem}")
 
     def _misspelt(self, key: str, known: Sequence[str]) -> InputError:
         hint = f"did you mean {known[0]}?" if len(known) == 1 else f"it may have {', '.join(known)}"

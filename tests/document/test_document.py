@@ -9,16 +9,26 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pyoxigraph import Literal, NamedNode
 from tests import gap_cases
 
 from irtwin.document import form
 from irtwin.document.curves import Curves
-from irtwin.document.document import Cause, Document, Gap, GapLocation, Shrink, cause_ids, schema
+from irtwin.document.document import LIKELY, Cause, Document, Gap, GapLocation, Shrink, cause_ids, schema
 from irtwin.document.experiment import Experiment
 from irtwin.errors import InputError
+from irtwin.knowledge.store.ontology import LIMIT_VALUE, limits
+from irtwin.knowledge.vocabulary import LIMIT
+from irtwin.resources import shipped
 
 CONTRACT = json.loads((resources.files("irtwin.gap") / "diagnosis.schema.json").read_text())
+TO_ACT = NamedNode(f"{LIMIT}confidence_to_act")
 JOINTS = ["joint_1", "joint_2", "joint_3"]
+
+
+def test_a_cause_is_likely_from_the_confidence_from_which_rules_act() -> None:
+    (least,) = (quad.object for about, quad in limits(shipped()).items() if about == (TO_ACT, LIMIT_VALUE))
+    assert isinstance(least, Literal) and float(least.value) == LIKELY
 
 
 def resolved(node: dict[str, Any]) -> dict[str, Any]:

@@ -24,22 +24,21 @@ def test_damping_that_differs_beside_what_warmth_does_is_a_number_of_the_model()
     warm = replace(
         cause, effect="temperature_dependent_friction", scope="changed", confidence=0.9, parameters=(thinning, damping)
     )
-    model = SimpleNamespace(name="m", numbers=lambda joint: {"damping": 19.0})
-    told = beside(model, warm, {})
+    told = beside(lambda joint: {"damping": 19.0}, warm, {})
     assert [(one.simulator, one.robot) for one in told.parameters] == [(None, None), (19.0, 9.5)]
     assert not_held(SimpleNamespace(causes=(told,))) == (told,)
     coupled = replace(warm, effect="joint_coupling", parameters=(damping,))
-    assert beside(model, coupled, {}) == coupled  # a friction of its own
+    assert beside(lambda joint: {"damping": 19.0}, coupled, {}) == coupled  # a friction of its own
 
 
 def test_friction_that_goes_with_what_no_file_holds_is_written_as_it_is_best_there():
-    model = SimpleNamespace(name="m", numbers=lambda joint: {"frictionloss": 8.0})
+    numbers = {"frictionloss": 8.0}
     cause = document("attributed").causes[0]
     dry = replace(cause, effect="coulomb_friction", scope="changed", parameters=(parameter(-1.0, (-1.1, -0.9)),))
     key = ("joint_a2", "Fc")
-    (sure,) = beside(model, dry, {key: parameter(-0.2, (-0.3, -0.1))}).parameters
+    (sure,) = beside(lambda joint: numbers, dry, {key: parameter(-0.2, (-0.3, -0.1))}).parameters
     assert (sure.value, sure.simulator, sure.robot) == (-0.2, 8.0, 7.8)
-    (unsure,) = beside(model, dry, {key: parameter(-0.1, (-0.3, 0.1))}).parameters
+    (unsure,) = beside(lambda joint: numbers, dry, {key: parameter(-0.1, (-0.3, 0.1))}).parameters
     assert (unsure.value, unsure.simulator, unsure.robot) == (-1.0, None, None)  # the file's number stays
 
 

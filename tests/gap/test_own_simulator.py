@@ -69,6 +69,29 @@ def test_equal_logs_of_simulator_and_robot_show_no_gap(tmp_path, noise):
     assert (document["verdict"], document["causes"]) == ("no_gap", [])
 
 
+def test_damping_that_differs_from_the_simulators_logs_has_both_numbers_and_closes_the_gap(tmp_path):
+    """Joint 1 of both has friction that grows with the root of speed, which the twin lacks: no part of the gap."""
+    made, true, rng = [], truth(DRAWN), np.random.default_rng(0)
+    for seed in range(3):
+        motion = swing(DRAWN, seed, seconds=5.0)
+        torque = rigid_torque(DRAWN, motion) + true["Ia"] * motion.ddq + true["Fc"] * np.sign(motion.dq)
+        torque[:, 0] += 10 * np.sign(motion.dq[:, 0]) * np.sqrt(np.abs(motion.dq[:, 0]))
+        for role, damping in {"simulated": 20.0, "observed": 40.0}.items():
+            heard = torque + damping * motion.dq * (np.arange(4) == 2) + 0.1 * rng.standard_normal(torque.shape)
+            made.append(replace(as_run(replace(motion, torque=heard, run=f"{role}_{seed}")), role=role))
+    said = irtwin_does("diagnose", write(tmp_path / "data", DRAWN, made), "--json", tmp_path / "out.json")
+    document = json.loads((tmp_path / "out.json").read_text())
+    (cause,) = document["causes"]
+    (damping,) = cause["parameters"]
+    assert (cause["effect"], cause["joints"]) == ("viscous_friction", ["joint_3"])
+    assert [damping[key] for key in ("simulator", "robot", "value")] == pytest.approx([20.0, 40.0, 20.0], rel=0.05)
+    assert "damping (Fv) of joint_3 40.0 N m s/rad in place of 20.0" in said.out
+    change = document["shrink"]["torque_rmse"]
+    assert change["after"] > 3 * change["noise_floor"]
+    assert document["shrink"]["closed_fraction"]["value"] > 0.95
+    assert "Adding this to the simulator closes" in said.out
+
+
 @pytest.mark.nightly
 def test_a_simulator_without_friction_lacks_all_of_it(tmp_path):
     _, causes = diagnosed(tmp_path, lambda motion: 0.0, friction=0.0)

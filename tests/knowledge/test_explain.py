@@ -2,17 +2,22 @@
 
 import json
 from collections.abc import Iterator
+from decimal import Decimal
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pyoxigraph import Literal, NamedNode, Triple
 
 from irtwin.errors import InputError
 from irtwin.knowledge.explain import explain as explaining
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.explain.explanation import Explanation, to_json
+from irtwin.knowledge.explain.rules import premises
 from irtwin.knowledge.owl_rl.closure import show
 from irtwin.knowledge.reasoning import reason
+from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
 pytestmark = pytest.mark.slow
@@ -55,6 +60,37 @@ def test_rule_with_an_aggregate_names_what_it_took(reasoned: KnowledgeGraph) -> 
     found = only(reasoned, "id:run/Arm_A.fit_1 irt:dominant_Joint ?")
     assert found.by == 'the rule "dominant joint", in SHACL'
     assert 'id:joint_energy/Arm_A.fit_1/j1 irt:Energy "300"^^xsd:double' in {each.what for each in found.because}
+
+
+def test_totals_are_the_sums_of_what_explains_them(plant_place: Path) -> None:
+    plant = KnowledgeGraph(plant_place / "graph", read_only=True)
+    totals = plant.query("""SELECT ?total ?name ?value {
+        ?name irt:worked_out_of ?property . ?total ?name ?value
+        FILTER(?name NOT IN (irt:Least_Payload, irt:Greatest_Payload, irt:Total_Idle_Energy, irt:Total_Idle_Time)) }""")
+    for row in totals:
+        found = only(plant, f"<{row['total']}> <{row['name']}> ?")
+        parts = [float(each.what.split('"')[1]) for each in found.because]
+        assert parts and sum(parts) == pytest.approx(row["value"]), found.what
+    kinds = {row["total"].removeprefix(plant.base).partition("/")[0] for row in totals}
+    assert kinds == {"robot_total", "day_total", "fleet_day_total", "ledger_total", "joint_total"}
+
+
+@pytest.mark.parametrize(
+    ("inner", "taken"),
+    [
+        ("SELECT ?x (SUM(?y) AS ?sum) WHERE { ?x <urn:has> ?y } GROUP BY ?x", {"1", "2"}),
+        ("SELECT ?x { ?x <urn:has> ?y }", {"1", "2"}),
+        ("SELECT * WHERE { ?x <urn:has> ?y FILTER(?y > 1) }", {"2"}),
+    ],
+)
+def test_a_subquery_is_followed_for_the_individual_that_the_conclusion_is_of(inner: str, taken: set[str]) -> None:
+    graph = KnowledgeGraph()
+    graph.update("INSERT DATA { <urn:a> <urn:has> 1, 2 . <urn:b> <urn:has> 3 }")
+    order = Decimal(0), Decimal(0)
+    rule = Rule("urn:r", "r", "", order, f"CONSTRUCT {{ ?x <urn:is> true }} WHERE {{ {{ {inner} }} }}")
+    concluded = Triple(NamedNode("urn:a"), NamedNode("urn:is"), Literal(True))
+    facts, are_all = premises(graph, rule, concluded) or ([], False)
+    assert are_all and {one.object.value for one in facts} == taken
 
 
 def test_closure_names_rule_and_premises(reasoned: KnowledgeGraph) -> None:

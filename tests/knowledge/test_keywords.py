@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
+from random import Random
 from string import ascii_lowercase
 
 import pytest
@@ -16,6 +18,7 @@ from irtwin.errors import InputError
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.keywords import refuse_service, refuse_service_and_load
 from irtwin.knowledge.store.no_network import leave_network
+from irtwin.knowledge.store.table import table_of
 from irtwin.knowledge.vocabulary import PREFIXES
 
 BASE = "http://e/"
@@ -79,6 +82,30 @@ def test_no_query_asks_another_server(elsewhere: Listener, text: str) -> None:
     assert elsewhere.connections() == 0
 
 
+@pytest.mark.parametrize("text", QUERIES)
+def test_beside_a_server_that_may_be_asked_no_query_asks_another(elsewhere: Listener, text: str) -> None:
+    listed = "http://e.org/sparql"
+    for hidden in (
+        text,
+        text.replace("SERVICE", f"SERVICE<{listed}>{{}}SERVICE"),
+        text.replace("URL", f"URL#<{listed}>"),
+    ):
+        with pytest.raises(InputError):
+            KnowledgeGraph().answer(hidden.replace("URL", elsewhere.url), services=[listed])
+    assert elsewhere.connections() == 0
+
+
+@pytest.mark.parametrize(
+    "clause",
+    ["SERVICE <URL>", "service\tSilent\r\n<URL>", "SERVICE<URL>{} # SERVICE <http://e.org/>\n SERVICE SILENT<URL>"],
+)
+def test_a_server_that_may_be_asked_is_asked(elsewhere: Listener, clause: str) -> None:
+    query = f"ASK {{ {clause.replace('URL', elsewhere.url)} {{ ?s ?p 'SERVICE <http://e.org/>' }} }}"
+    with suppress(OSError):
+        KnowledgeGraph().answer(query, services=["http://e.org/sparql", elsewhere.url])
+    assert elsewhere.connections() > 0
+
+
 @pytest.mark.parametrize("text", UPDATES)
 def test_no_update_reads_from_elsewhere(elsewhere: Listener, text: str) -> None:
     with pytest.raises(InputError, match="LOAD and SERVICE read from elsewhere"):
@@ -133,6 +160,29 @@ def test_a_family_of_texts_leaves_no_connection(elsewhere: Listener, count: int)
                 refused += 1
     assert elsewhere.connections() == 0
     assert refused > 0.75 * count  # the others hold no such clause, or one in a comment
+
+
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=[pytest.mark.slow, pytest.mark.nightly])])
+def test_a_family_of_texts_asks_the_server_that_it_may_alone(elsewhere: Listener, count: int) -> None:
+    graph, asked = KnowledgeGraph(), 0
+    with listener() as other:
+        for seed in range(count):
+            text = Family(seed, elsewhere.url).query()
+            changed = _with_listed(text, other.url, Random(seed))
+            for form, services in ((changed, [other.url]), (text, [elsewhere.url])):
+                before = elsewhere.connections()
+                with suppress(InputError, OSError, RuntimeError):
+                    table_of(graph.answer(form, services=services))
+                came = elsewhere.connections() - before
+                assert came == 0 or services == [elsewhere.url]
+                asked += came
+    assert asked > 0.1 * count
+
+
+def _with_listed(text: str, url: str, chance: Random) -> str:
+    first, *others = text.split("SERVICE")
+    forms = ("SERVICE", f"SERVICE <{url}>", f"SERVICE <{url}>{{}}SERVICE", f"<{url}>SERVICE")
+    return first + "".join(chance.choice(forms) + other for other in others)
 
 
 @pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=[pytest.mark.slow, pytest.mark.nightly])])

@@ -99,8 +99,8 @@ def test_a_conclusion_has_its_premises_and_the_rule_its_name() -> None:
     graph = KnowledgeGraph()
     graph.update(f"PREFIX ex: <{EX}> INSERT DATA {{ ex:a ex:n 7.0e0 ; a ex:Marked . ex:b ex:n 3.0e0 ; a ex:Marked }}")
     kind = NamedNode(RDF + "type"), NamedNode(EX + "Marked")
-    known = premises(graph, found, Triple(NamedNode(EX + "a"), *kind))
-    assert known is not None and [one.predicate.value for one in known] == [EX + "n"]
+    facts, are_all = premises(graph, found, Triple(NamedNode(EX + "a"), *kind)) or ([], False)
+    assert [fact.predicate.value for fact in facts] == [EX + "n"] and are_all
     assert premises(graph, found, Triple(NamedNode(EX + "b"), *kind)) is None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,16 @@ from tests import plants
 from tests.knowledge.graphs import turtle
 
 from irtwin.errors import InputError
+from irtwin.knowledge.explain import rules
 from irtwin.knowledge.explain.explain import explain
+from irtwin.knowledge.explain.explanation import LEFT_OUT
+from irtwin.knowledge.explain.verify import WHOLE, verify
+from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.running import conclusions
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import term
+from irtwin.knowledge.store.named_graphs import in_graph
+from irtwin.knowledge.vocabulary import GRAPH_SOURCE, term
 from irtwin.resources import shipped
 
 KWH = 3.6e6
@@ -78,6 +84,39 @@ def test_a_cost_is_explained_down_to_the_tariff(graph: KnowledgeGraph) -> None:
     assert "tariff:electricity irt:Operating_Hours" in str(found)
 
 
+def logged(place: Path, runs: int) -> KnowledgeGraph:
+    """Return a graph of a robot that waited in runs with logs in `place`, and takes 50 W, with what rules conclude."""
+    robot = """<robot> a irt:Industrial_Robot . <standby> irt:parameter_of <twin> ; irt:of_Effect <effect> ;
+        qudt:hasUnit unit:W ; irt:Parameter_Value 50.0e0 .
+        <effect> irt:has_Channel <https://w3id.org/irtwin/channel/power> ; irt:Acts_Per "robot" ; irt:Baseline true ."""
+    for run in range(runs):
+        (place / f"{run}.csv").write_bytes(b"")
+        robot += f"""<run{run}> irt:run_of <robot> ; irt:modelled_by <twin> ; irt:Energy_Consumption {1000 + run}.0e0 ;
+            irt:Run_Time 10.0e0 ; irt:Idle_Share 0.5e0 ; irt:Standby_Energy 500.0e0 ; irt:File "{run}.csv" ;
+            irt:Checksum "{sha256(b"").hexdigest()}" ; irt:Data_Folder "{place}" ."""
+    graph = KnowledgeGraph()
+    graph.replace(in_graph(turtle(f"@base <http://x/> . {robot}"), f"{GRAPH_SOURCE}run"), f"{GRAPH_SOURCE}run")
+    reason(graph)
+    return graph
+
+
+def test_the_energy_of_waiting_is_explained_and_verified_by_each_run_and_the_standby_power(tmp_path: Path) -> None:
+    found = explain(logged(tmp_path, 3), "<http://x/robot> irt:Waiting_Energy ?")
+    said = {each.what.removeprefix("http://x/") for each in found[0].because}
+    assert 'standby irt:Parameter_Value "50"^^xsd:double' in said
+    assert {f'run{run} irt:Energy_Consumption "{1000 + run}"^^xsd:double' for run in range(3)} <= said
+    assert [one.state for one in verify(found, tmp_path)] == [WHOLE] * 3
+    (tmp_path / "1.csv").write_bytes(b"other")
+    assert [Path(one.file).name for one in verify(found, tmp_path) if one.is_wrong] == ["1.csv"]
+
+
+def test_runs_that_an_explanation_leaves_out_are_not_verified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rules, "MOST_TAKEN", 2)
+    found = explain(logged(tmp_path, 3), "<http://x/robot> irt:Waiting_Energy ?")
+    assert [one.state for one in verify(found, tmp_path) if one.is_wrong] == [LEFT_OUT]
+    assert "left out" in str(found[0])
+
+
 def test_a_tariff_at_fault_is_said(tmp_path: Path) -> None:
     (tmp_path / "plant.toml").write_text("price_per_kwh = -1\n", encoding="utf-8")
     with pytest.raises(InputError, match="price_per_kwh should be a number of at least 0, not -1"):
@@ -93,9 +132,9 @@ def test_what_a_robot_takes_while_it_waits_has_one_last_digit_in_whatever_order_
         drawn = " ; ".join(f"irt:{name} {rng.random():.16f}e0" for name in numbers)
         said += f"<run{run}> irt:run_of <robot> ; irt:modelled_by <twin> ; {drawn} .\n"
     triples = sorted(turtle(f"@base <http://x/> . {said}"), key=str)
-    rules = read_rules(shipped().path("rules", "tariff_rules.ttl"))
+    of_tariff = read_rules(shipped().path("rules", "tariff_rules.ttl"))
     found = set()
     for _ in range(5):
         rng.shuffle(triples)
-        found.add(frozenset(one for some in conclusions(triples, rules).values() for one in some))
+        found.add(frozenset(one for some in conclusions(triples, of_tariff).values() for one in some))
     assert len(found) == 1 and len(next(iter(found))) >= 4

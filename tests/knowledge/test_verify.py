@@ -154,6 +154,9 @@ def test_a_total_is_verified_by_the_logs_of_its_runs(
     status, files, _ = asked(filled, "irt:Run_Count", total)
     assert status == 2
     assert [line.partition(" (")[0] for line in files if "whole" not in line] == ["changed: data/runs/again.csv"]
+    status, files, outline = asked(filled, "irt:Total_Modelled_Energy", total)
+    assert status == 0 and f"whole: w/twins/{TWIN}.json" in files
+    assert f'id:run/{RUN} irt:Modelled_Energy "98"' in outline and "provider:energy" in outline
 
 
 def test_what_is_no_plain_file_is_not_read(filled: Path, tampered: Callable[[str, bytes | None], None]) -> None:

@@ -14,6 +14,7 @@ CAUSES = (
     "(96 % sure): viscous friction (70 %) and stribeck friction (96 %). Adding this to the twin closes 93 % of the gap "
     "on held-out runs (95 % interval 88 % to 97 %)."
 )
+BESIDE_SIMULATOR = CAUSES.replace("twin closes 93 % of the gap", "simulator closes 93 % of its gap to the robot")
 
 
 @pytest.mark.parametrize(
@@ -27,7 +28,7 @@ CAUSES = (
             "catalogue closes it.",
         ),
         ("attributed", "reference", f"Friction of joint_a3 changed since the reference runs {CAUSES}"),
-        ("attributed", "simulated", f"Friction of joint_a3 differs from the simulator’s {CAUSES}"),
+        ("attributed", "simulated", f"Friction of joint_a3 differs from the simulator’s {BESIDE_SIMULATOR}"),
         (
             "ambiguous",
             "reference",
@@ -41,12 +42,13 @@ def test_the_verdict_is_one_sentence(verdict, against, said):
     assert summary.line(gap_cases.document(verdict), against) == f"{verdict}: {said}"
 
 
-def test_a_simulator_that_is_right_agrees_to_so_much_torque():
+def test_a_simulator_that_is_right_agrees_beside_what_the_twin_leaves_of_both():
     diagnosis = gap_cases.diagnosis("no_gap")
     torque = {"before": 0.42, "after": 0.42, "noise_floor": 0.4, "interval95_after": None}
     diagnosis["shrink"] |= {"torque_rmse": torque}
     said = summary.line(Document.from_json(diagnosis), "simulated")
-    assert said == "no_gap: There is no gap: the simulator agrees with the robot, to 0.42 N m RMS."
+    agrees = "the simulator agrees with the robot, beside the 0.42 N m RMS that no effect explains."
+    assert said == f"no_gap: There is no gap: {agrees}"
 
 
 def test_a_robots_own_effect_and_what_the_simulator_lacks_are_told_apart():
@@ -118,7 +120,7 @@ def test_what_the_simulators_model_keeps_is_said_in_its_tracking_error():
 
 
 def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
-    rows = summary.causes(gap_cases.document("attributed")).rows
+    rows = summary.causes(gap_cases.document("attributed"), "reference").rows
     assert [(row["cause"], row["joints"], row["sure, %"]) for row in rows if row["cause"]] == [
         ("viscous friction", "joint_a3", 70),
         ("stribeck friction", "joint_a3", 96),
@@ -129,19 +131,24 @@ def test_each_cause_is_said_once_and_each_parameter_has_its_unit():
     assert rows[1] == {**dict.fromkeys(rows[1]), "parameter": "d", "value": 1.0, "unit": ""}
 
 
+def test_a_value_is_a_change_beside_logs_of_a_simulator():
+    row = summary.causes(gap_cases.document("attributed"), "simulated").rows[0]
+    assert (row["simulator"], row["robot"], row["change"]) == (None, None, 1.82)
+
+
 def test_a_guess_is_called_one_and_what_closes_little_is_not_listed():
     said = gap_cases.diagnosis("attributed")
     said["causes"][0]["confidence"] = 0.3
-    rows = summary.causes(Document.from_json(said)).rows
+    rows = summary.causes(Document.from_json(said), "reference").rows
     assert [row["cause"] for row in rows if row["cause"]] == ["perhaps viscous friction", "stribeck friction"]
     for finding in said["findings"]:
         finding["matters"] = False
-    assert not summary.causes(Document.from_json(said))
+    assert not summary.causes(Document.from_json(said), "reference")
 
 
 @pytest.mark.parametrize("verdict", ["no_gap", "unexplained"])
 def test_where_nothing_is_to_blame_nothing_is_tabled_or_explained(verdict):
-    assert not summary.causes(gap_cases.document(verdict))
+    assert not summary.causes(gap_cases.document(verdict), "reference")
     assert summary.meanings(gap_cases.document(verdict)) == []
 
 

@@ -29,8 +29,12 @@ def test_a_graph_is_put_added_to_and_deleted(writable) -> None:
     assert len(lines(writable)) == 4
     assert send(writable, "PUT", more, kind="application/n-triples").status_code == 204
     assert lines(writable) == [more]
+    before = CLIENT.get(writable.sparql, params={"default": ""}).headers["etag"]
+    assert send(writable, "PUT", TURTLE).status_code == 204
+    assert CLIENT.get(writable.sparql, params={"default": ""}).headers["etag"] != before
     assert send(writable, "DELETE").status_code == 204
-    assert lines(writable) == []
+    for method in ("GET", "HEAD", "DELETE"):
+        assert send(writable, method).status_code == 404
 
 
 @pytest.mark.parametrize(

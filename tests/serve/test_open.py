@@ -25,6 +25,18 @@ def test_an_answer_that_is_known_is_not_sent_again(welcoming) -> None:
     assert (other.status_code, other.content) == (200, first.content)
 
 
+def test_a_large_answer_that_is_known_is_not_sent_again(welcoming) -> None:
+    everything, lines = {"default": ""}, {"Accept": "application/n-triples"}
+    first = CLIENT.get(welcoming.sparql, params=everything, headers=lines)
+    known = {"If-None-Match": first.headers["etag"]}
+    again = CLIENT.get(welcoming.sparql, params=everything, headers=lines | known)
+    assert len(first.content) > 1 << 20 and (again.status_code, again.content) == (304, b"")
+    other = CLIENT.get(welcoming.sparql, params={"query": "SELECT * { ?s ?p ?o }"})
+    assert other.headers["etag"] != first.headers["etag"]
+    by_chance = CLIENT.get(welcoming.sparql, params={"query": "SELECT ?s ?p ?o (RAND() AS ?r) { ?s ?p ?o }"})
+    assert len(by_chance.content) > 1 << 20 and "etag" not in by_chance.headers
+
+
 def test_large_answers_are_packed_for_who_takes_them(welcoming) -> None:
     everything = {"query": "SELECT * { ?s ?p ?o }"}
     packed = CLIENT.get(welcoming.sparql, params=everything)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 from tests.endpoint import make_graph
 
+from irtwin.location import Location
+from irtwin.serve import tools
 from irtwin.storage.database import Workspace
 
 pytestmark = [pytest.mark.slow, pytest.mark.anyio]
@@ -41,3 +44,15 @@ async def test_tools_answer_and_refuse_as_commands_do(tmp_path: Path) -> None:
     assert "Error" in updated
     assert "../other: outside" in outside
     assert "twin.json: cannot be read" in missing
+
+
+def test_what_a_prediction_is_by_can_be_said_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def said(command: list[str], **_: object) -> CompletedProcess[str]:
+        out = next(one for one in command if one.startswith("--out="))
+        return CompletedProcess(command, 0, f"{out.removeprefix('--out=')}: 5 J\n", "")
+
+    monkeypatch.setattr(tools.subprocess, "run", said)
+    monkeypatch.chdir(tmp_path)
+    told = tools._Calls(Location(tmp_path), 1.0).predict("twin.json", "motion.csv")
+    again = f"irtwin predict --quiet --out=predicted.parquet -- {tmp_path}/twin.json {tmp_path}/motion.csv"
+    assert (told["answer"], told["by"]) == ("5 J", again)

@@ -221,6 +221,9 @@ def test_torque_says_what_motion_leaves_open(tmp_path):
     assert sorted(one.robot for one in numbers) == pytest.approx([0.04, 12.0], rel=0.01)
     assert found.document.gap.torque["elbow"].rmse > 0.05
     assert found.document.shrink.torque_rmse.after < 6e-3 < found.document.shrink.torque_rmse.before
+    energy = found.document.shrink.energy_error_percent
+    assert energy.before == found.document.gap.energy_error_percent > 1.0 > energy.after
+    assert energy.interval95_after[0] <= energy.after <= energy.interval95_after[1]
     assert not found.is_open
 
 

@@ -7,6 +7,9 @@ import pytest
 from tests import data_sets, mujoco_models, synthetic
 
 from irtwin.errors import InputError
+from irtwin.gap.data.case import case_of
+from irtwin.gap.thresholds import DEFAULT
+from irtwin.identification.progress import telling
 from irtwin.signals.log import read_data_set
 from irtwin.simulator.model import read_model, with_simulated_runs
 
@@ -29,6 +32,18 @@ def test_each_observed_run_has_the_models_torque_beside_it(tmp_path):
     expected = synthetic.rigid_torque(ROBOT, motion) + synthetic.truth(ROBOT)["Fv"] * motion.dq
     middle = slice(100, -100)
     np.testing.assert_allclose(run.signals.torque[middle], expected[middle], atol=0.02 * np.abs(expected).max())
+
+
+def test_reference_runs_are_left_out_beside_a_simulator_and_that_is_said(tmp_path):
+    data_set, model = made(tmp_path)
+    first, second = data_set.runs
+    said: list[str] = []
+    both = with_simulated_runs(replace(data_set, runs=(replace(first, role="reference"), second)), model)
+    with telling(said.append):
+        case = case_of(both, (), DEFAULT)
+    assert [run.role for run in case.runs] == ["observed", "simulated"]
+    assert case.against == "simulated"
+    assert "  beside a simulator reference runs are left out: 1" in said
 
 
 def test_simulated_runs_beside_a_model_are_refused(tmp_path):

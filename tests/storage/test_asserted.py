@@ -14,6 +14,7 @@ from irtwin.storage.database import Workspace
 from irtwin.storage.schema import RunRow
 
 WORK = f"{rows.ROBOT}.work"
+SAID_TWICE = "payload_kg of {}: 6.0, as anna said on 2026-12-26; the data set says 0.0"
 LATER = rows.NOON + timedelta(days=300)
 
 
@@ -30,7 +31,7 @@ def fact(value: str | None, replaced: str | None, time: datetime = LATER, **chan
     ("payload", "facts", "now", "words"),
     [
         (0.0, [("5.5", "0.0")], 5.5, "payload_kg of {}: 5.5, as anna said on 2026-12-26; the data set says 0.0"),
-        (0.0, [("5.5", "0.0"), ("6.0", "5.5")], 6.0, "payload_kg of {}: 6.0, as anna said"),
+        (0.0, [("5.5", "0.0"), ("6.0", "5.5")], 6.0, SAID_TWICE),
         (7.0, [("5.5", "0.0")], 7.0, "payload_kg of {}: the data set says 7.0 now; what anna said"),
         (5.5, [("5.5", "0.0")], 5.5, None),
     ],

@@ -69,7 +69,7 @@ def _contradictions(graph: KnowledgeGraph, robot: str | None) -> Iterator[Alarm]
 def active(alarms: list[Alarm]) -> AnswerTable:
     """Return the alarms that are active, for people."""
     columns = ("since", "robot", "run", "reason", "rule")
-    rows = ({name: one.as_dict()[name] for name in columns} for one in alarms if one.state == ACTIVE)
+    rows = ({name: alarm.as_dict()[name] for name in columns} for alarm in alarms if alarm.state == ACTIVE)
     return AnswerTable(columns, tuple(rows))
 
 
@@ -84,7 +84,7 @@ def message(event: Event, alarm: Alarm, at: datetime, sparql: str | None) -> byt
 
 def sparql_of_rules(resources: Resources) -> dict[str, str]:
     """Return the CONSTRUCT of each rule that holds for a workspace, by the rule's name."""
-    return {one.name.rsplit("/", 1)[-1]: one.construct for one in all_rules(resources)}
+    return {rule.name.rsplit("/", 1)[-1]: rule.construct for rule in all_rules(resources)}
 
 
 def _plain(value: Any) -> str | None:

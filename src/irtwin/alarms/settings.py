@@ -72,7 +72,7 @@ def _tables(file: Path) -> list[tuple[str, TomlTable]]:
     asked = []
     for kind, keys in _KEYS.items():
         tables = document.get(kind, [])
-        if not (isinstance(tables, list) and all(isinstance(one, dict) for one in tables)):
+        if not (isinstance(tables, list) and all(isinstance(entry, dict) for entry in tables)):
             raise InputError(f"{file}: {kind} should be tables; write [[{kind}]] above its keys")
         for number, values in enumerate(tables, start=1):
             table = TomlTable(file, f"{kind} {number}:", values)

@@ -52,7 +52,7 @@ def tell(
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: done.set())
         names = ["standard output", *(broker.name for broker in (*of_alarms, *of_robots))]
-        announce(f"Telling alarms to {', '.join(names)}; {sum(one.state == 'active' for one in alarms)} active now")
+        announce(f"Telling alarms to {', '.join(names)}; {sum(alarm.state == 'active' for alarm in alarms)} active now")
         topics, nodes = _connected(of_alarms, of_robots, announce)
         try:
             follow(partial(_alarms, location, robot, nodes), told, partial(_write, topics), done, announce, sparql)
@@ -71,7 +71,7 @@ def _connected(
     from irtwin.alarms.mqtt import AlarmTopic  # an extra
     from irtwin.alarms.sparkplug import EdgeNode
 
-    return [AlarmTopic(one, announce) for one in of_alarms], [EdgeNode(one, announce) for one in of_robots]
+    return [AlarmTopic(broker, announce) for broker in of_alarms], [EdgeNode(broker, announce) for broker in of_robots]
 
 
 def _of_workspace(workspace: Path, announce: Announce) -> tuple[list[Broker], list[Broker]]:

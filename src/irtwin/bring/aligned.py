@@ -31,26 +31,32 @@ def aligned(recording: Recording, meanings: Sequence[Meaning], *, repair: bool) 
     does not rise; with `repair` samples whose time does not rise are dropped.
     """
     path = recording.path
-    time_name = next(each.column for each in meanings if each.field == "time")
+    time_name = next(meaning.column for meaning in meanings if meaning.field == "time")
     raw = recording.columns[time_name]
-    used = {each.column: _numbers(recording, each.column) for each in meanings if each.field not in (None, "time")}
-    positions = [each.column for each in meanings if each.field == "q"]
+    used = {
+        meaning.column: _numbers(recording, meaning.column)
+        for meaning in meanings
+        if meaning.field not in (None, "time")
+    }
+    positions = [meaning.column for meaning in meanings if meaning.field == "q"]
     keep = ~(np.isnat(raw) if raw.dtype.kind == "M" else np.isnan(raw.astype(float)))
     for column in positions:
         keep &= np.isfinite(used[column])
-    said = []
+    notes = []
     if (count := int((~keep).sum())) and keep.any():
         first = recording.place(int(np.flatnonzero(~keep)[0]))
-        said.append(f"{path}: {count} of {len(keep)} rows left out, the first {first}: a position or the time is blank")
+        notes.append(
+            f"{path}: {count} of {len(keep)} rows left out, the first {first}: a position or the time is blank"
+        )
     again = _written_twice(recording, keep)
     if again.any():
         first = recording.place(int(np.flatnonzero(again)[0]))
-        said.append(
+        notes.append(
             f"{path}: {int(again.sum())} rows left out, the first {first}: they repeat the row before, time and all"
         )
         keep &= ~again
     keep, dropped = _rising(recording, raw, keep, time_name, repair)
-    said += dropped
+    notes += dropped
     for column, values in used.items():
         if column in positions:
             continue
@@ -59,14 +65,14 @@ def aligned(recording: Recording, meanings: Sequence[Meaning], *, repair: bool) 
             continue
         used[column], heard = _joined(raw, values, keep)
         unheard = int((keep & ~heard).sum())
-        said.append(
+        notes.append(
             f"{path}: column {column} is blank at {blank} samples; straight lines join its values"
             + (f", and {unheard} samples before, after or far between them are left out" if unheard else "")
         )
         keep &= heard
     if int(keep.sum()) < FEWEST:
         raise InputError(f"{path}: {int(keep.sum())} samples can be used; a run needs at least {FEWEST}")
-    return Aligned(recording, raw[keep], {name: values[keep] for name, values in used.items()}, tuple(said))
+    return Aligned(recording, raw[keep], {name: values[keep] for name, values in used.items()}, tuple(notes))
 
 
 def _numbers(recording: Recording, column: str) -> np.ndarray:

@@ -57,10 +57,10 @@ class Options:
 
     def with_answer(self, answer: WayOut) -> Options:
         """Return them with an answer, as if it had been typed."""
-        said: dict[str, list[str]] = {"--map": [*self.maps], "--gear-ratio": [*self.gear_ratios], "--power-at": []}
+        given: dict[str, list[str]] = {"--map": [*self.maps], "--gear-ratio": [*self.gear_ratios], "--power-at": []}
         for option, value in answer.options:
-            said[option].append(value)
-        maps, ratios, places = (tuple(values) for values in said.values())
+            given[option].append(value)
+        maps, ratios, places = (tuple(values) for values in given.values())
         return replace(self, maps=maps, gear_ratios=ratios, power_at=places[-1] if places else self.power_at)
 
 
@@ -89,7 +89,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
     logs = [_read(file, described, topics) for file in files]
     logs = [log.named(options.names) for log in logs] if options.names else logs
     logs = [with_power(log) for log in logs] if robot is None else logs
-    said, forms, power_at = _settled(logs, described, options, ask)
+    user_said, forms, power_at = _settled(logs, described, options, ask)
     name = options.name or described.name
     runs: dict[Path, tuple[RunText, TakenRun]] = {}
     for form in forms:
@@ -99,20 +99,22 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
     listed = [runs[file] for file in dict.fromkeys(files)]
     written = data_set_text(
         described, name, [run for run, _ in listed], origin=origin, power_at=power_at[0], power_at_why=power_at[1],
-        gear_ratios=dict(said.gear_ratios),
+        gear_ratios=dict(user_said.gear_ratios),
     )  # fmt: skip
     _write(out, described, written, {text.file: pa.table(dict(run.columns)) for text, run in listed})
     return Brought(forms, tuple(line for form in forms for line in form.said))
 
 
-def import_logs(files: Sequence[Path | str], out: Path | str, robot: Path | str | None = None, **said: Any) -> DataSet:
+def import_logs(
+    files: Sequence[Path | str], out: Path | str, robot: Path | str | None = None, **options: Any
+) -> DataSet:
     """Bring logs in other formats into a new data set, a run a file, and return it.
 
-    robot: a URDF file, a data set, or a robot's name; None: logs of a meter. said: fields of `Options`, such as
+    robot: a URDF file, a data set, or a robot's name; None: logs of a meter. options: fields of `Options`, such as
     `power_at="mains"` or `maps=("pos_*=q:deg",)`. Raises InputError where a log cannot be used or a column's meaning
     cannot be told, with what to say; nothing is written then.
     """
-    bring([Path(file) for file in files], Path(out), None if robot is None else str(robot), Options(**said))
+    bring([Path(file) for file in files], Path(out), None if robot is None else str(robot), Options(**options))
     return read_data_set(out)
 
 
@@ -132,12 +134,12 @@ def _metered(files: Sequence[Path]) -> Robot:
 class LogsAlike:
     """Logs of the same columns, taken together: what one of them tells of a unit holds for all."""
 
-    def __init__(self, logs: Sequence[Recording], robot: Robot, said: UserSaid, repair: bool) -> None:
+    def __init__(self, logs: Sequence[Recording], robot: Robot, user_said: UserSaid, repair: bool) -> None:
         self.logs = logs
-        means: list[Meaning] = meanings(logs[0], robot, said)
+        means: list[Meaning] = meanings(logs[0], robot, user_said)
         usable = [aligned(log, means, repair=repair) for log in logs]
         self.said = [line for log in usable for line in (*log.recording.said, *log.said)]
-        self.taken: TakenLogs = take(usable, means, robot, said)
+        self.taken: TakenLogs = take(usable, means, robot, user_said)
 
 
 _Settled = tuple[UserSaid, list[LogsAlike], tuple[str | None, str]]
@@ -177,10 +179,10 @@ def _questions(logs: Sequence[Recording], robot: Robot, options: Options, which:
 
 
 def _formed(logs: Sequence[Recording], robot: Robot, options: Options) -> _Settled:
-    said = told(options.maps, options.gear_ratios, options.power_at, robot)
-    said.check(name for log in logs for name in log.names)
-    forms = [LogsAlike(group, robot, said, options.repair) for group in _of_one_form(logs)]
-    return said, forms, _one_place(forms)
+    user_said = told(options.maps, options.gear_ratios, options.power_at, robot)
+    user_said.check(name for log in logs for name in log.names)
+    forms = [LogsAlike(group, robot, user_said, options.repair) for group in _of_one_form(logs)]
+    return user_said, forms, _one_place(forms)
 
 
 def _of_one_form(logs: Sequence[Recording]) -> list[list[Recording]]:

@@ -98,7 +98,9 @@ def said_by(name: str, unit_text: str | None = None) -> Meaning:
     weak = field is None and bool(words) and set(kept) <= _WEAK and len(numbers) == 1
     if field is None:
         any_unit = unit_of(unit_text or text or "", QUANTITIES)
-        of_unit = (name for name, each in CHANNELS.items() if any_unit and any_unit.si in (each.unit, each.sliding))
+        of_unit = (
+            name for name, channel in CHANNELS.items() if any_unit and any_unit.si in (channel.unit, channel.sliding)
+        )
         field = next(of_unit, None)
         unit = any_unit if field is not None else None
         weak = weak and field is None
@@ -176,10 +178,10 @@ def first_meaning(name: str, recording: Recording, robot: Robot, target: Target 
 
 def _by_name(name: str, recording: Recording, robot: Robot) -> Meaning:
     if is_rtde(recording.columns):
-        said = variable(name)
-        if said is None:
+        known = variable(name)
+        if known is None:
             return Meaning(name, None, why=_rtde_unused(name))
-        field, unit, index = said
+        field, unit, index = known
         if index is not None and len(robot.joints) != JOINTS:
             raise InputError(f"{recording.path}: RTDE records {JOINTS} joints, {robot.name} has {len(robot.joints)}")
         joint = None if index is None else robot.joint_names[index]
@@ -207,8 +209,8 @@ def _rtde_unused(name: str) -> str:
 
 def _exact(name: str, channel: Channel, recording: Recording, robot: Robot) -> Meaning:
     """Return a column that the log format knows; ROS, and a line of units, say its unit, a name alone does not."""
-    field = next(field for field, each in CHANNELS.items() if each is channel)
-    joint = next((one for one in robot.joints if channel.per_joint and channel.column(one.name) == name), None)
+    field = next(field for field, known in CHANNELS.items() if known is channel)
+    joint = next((axis for axis in robot.joints if channel.per_joint and channel.column(axis.name) == name), None)
     si = channel.unit_of(joint.kind if joint else "")
     named = recording.units.get(name)
     text = si if recording.is_bag else named

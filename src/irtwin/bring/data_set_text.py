@@ -133,15 +133,16 @@ def _run_lines(run: RunText) -> Iterator[str]:
     yield _line("cycles", 40, "how often its programme ran: tells the energy of a cycle", False)
     if run.columns:
         yield "# Its columns were taken so:"
-    for each in run.columns:
-        if each.channel:
+    for column in run.columns:
+        if column.channel:
             yield _comment(
-                f"#   {each.channel} is {each.column}, in {each.unit}, conversion: {each.conversion} ({each.why})"
+                f"#   {column.channel} is {column.column}, in {column.unit}, conversion: {column.conversion} "
+                f"({column.why})"
             )
 
 
-def _line(key: str, value: Any, comment: str, said: bool = True, bare: bool = False) -> str:
-    text = f"{'' if said else '# '}{key} = {value if bare else _value(value)}"
+def _line(key: str, value: Any, comment: str, stated: bool = True, bare: bool = False) -> str:
+    text = f"{'' if stated else '# '}{key} = {value if bare else _value(value)}"
     return _comment(f"{text:<{_WIDE}}  # {comment}" if comment else text)
 
 

@@ -146,9 +146,11 @@ def _decoded(path: Path, content: bytes) -> str:
 def _with_moments(table: pa.Table) -> pa.Table:
     """Return a table in which a date and the time of day beside it are one column, as meters write them in two."""
     for place, pair in enumerate(pairwise(table.columns)):
-        if not all(is_text(one.type) or pa.types.is_date(one.type) or pa.types.is_time(one.type) for one in pair):
+        if not all(
+            is_text(column.type) or pa.types.is_date(column.type) or pa.types.is_time(column.type) for column in pair
+        ):
             continue
-        days, hours = (one.cast(pa.string()) for one in pair)
+        days, hours = (column.cast(pa.string()) for column in pair)
         cells = zip(days.slice(0, LOOKED_AT).to_pylist(), hours.slice(0, LOOKED_AT).to_pylist(), strict=True)
         if all(day and hour and DATE.fullmatch(day) and CLOCK.fullmatch(hour) for day, hour in cells):
             moments = pc.binary_join_element_wise(days, hours, " ")
@@ -161,9 +163,9 @@ def _table(path: Path, body: str, form: TextForm, names: list[str], before: int)
     """Return the samples, and what is to be said of a last line that was cut off."""
     if form.delimiter == " ":
         body = "\n".join(_BLANKS.sub(" ", line.strip()) for line in body.split("\n"))
-    numbers, said = [str(k) for k in range(len(names))], {"decimal_point": form.decimal, "null_values": _NULLS}
+    numbers, options = [str(k) for k in range(len(names))], {"decimal_point": form.decimal, "null_values": _NULLS}
     try:
-        table, wrong = parsed(body.encode(), numbers, form.delimiter, len(names) > 1, **said)
+        table, wrong = parsed(body.encode(), numbers, form.delimiter, len(names) > 1, **options)
     except pa.ArrowException as error:
         raise InputError(f"{path}: not readable as {form} ({csv_fault(error)}); export it again") from error
     if wrong:

@@ -139,7 +139,7 @@ def rate(
         ]
         if not moving:
             continue
-        derived, seen = (np.concatenate(each) for each in zip(*moving, strict=True))
+        derived, seen = (np.concatenate(parts) for parts in zip(*moving, strict=True))
         if np.std(seen) > 0 and abs(np.corrcoef(derived, seen)[0, 1]) > _ALIKE:
             gains.append(abs(float(derived @ seen / (derived @ derived))))
     known = units(si)
@@ -155,7 +155,7 @@ def torque(
     robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndarray], joints: Sequence[int], si: str
 ) -> UnitEvidence:
     """Torques (N, len(joints)) as logged, against those of the description's bodies."""
-    model = np.vstack([_bodies(robot, each)[:, joints] for each in motions])
+    model = np.vstack([_bodies(robot, motion)[:, joints] for motion in motions])
     size, own = float(np.sqrt(np.mean(np.vstack(logged) ** 2))), float(np.sqrt(np.mean(model**2)))
     known = units(si)
     if own < 1e-6 or size == 0:
@@ -172,7 +172,7 @@ def power(robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndar
 
     At rest, against what controllers take.
     """
-    done = float(np.quantile(np.concatenate([_done(robot, each) for each in motions]), 0.99))
+    done = float(np.quantile(np.concatenate([_done(robot, motion) for motion in motions]), 0.99))
     taken = float(np.quantile(np.concatenate(logged), 0.99))
     if done >= _WORKING and taken > 0:
         fits = [unit for unit in units(si) if _POWER[0] <= taken * unit.factor / done <= _POWER[1]]
@@ -183,7 +183,7 @@ def power(robot: Robot, motions: Sequence[MeasuredRun], logged: Sequence[np.ndar
 
 def by_size(si: str, logged: Sequence[np.ndarray], bounds: tuple[float, float]) -> UnitEvidence:
     """Values whose greatest (99 % of them are below) lies between bounds, in SI units, in one unit alone."""
-    return _by_size(si, float(np.quantile(np.abs(np.concatenate([each.ravel() for each in logged])), 0.99)), bounds)
+    return _by_size(si, float(np.quantile(np.abs(np.concatenate([values.ravel() for values in logged])), 0.99)), bounds)
 
 
 def _by_size(si: str, greatest: float, bounds: tuple[float, float]) -> UnitEvidence:

@@ -44,14 +44,18 @@ def with_power(log: Recording) -> Recording:
     with np.errstate(divide="ignore", invalid="ignore"):
         power = spent / np.diff(time)
     power = np.append(power, power[-1:]) if counter else np.insert(power, 0, power[:1])
-    columns = {POWER if one == name else one: power if one == name else of for one, of in log.columns.items()}
-    what = (
+    columns = {
+        POWER if column == name else column: power if column == name else of for column, of in log.columns.items()
+    }
+    explanation = (
         "a counter: power is its step over the time to the next reading"
         if counter
         else ("of each reading: power is it over the time since the reading before")
     )
-    units = {POWER if one == name else one: unit for one, unit in log.units.items()} | {POWER: "W"}
-    return replace(log, columns=columns, units=units, said=(*log.said, f"{log.path}: column {name} is energy, {what}"))
+    units = {POWER if column == name else column: unit for column, unit in log.units.items()} | {POWER: "W"}
+    return replace(
+        log, columns=columns, units=units, said=(*log.said, f"{log.path}: column {name} is energy, {explanation}")
+    )
 
 
 def _joules(name: str, unit: str | None) -> float | None:

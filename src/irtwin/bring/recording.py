@@ -62,13 +62,13 @@ class Recording:
         if len(names) != len(own) or len(set(names)) < len(own):
             raise InputError(f"{self.path}: has {len(own)} columns; --names gives {len(set(names))} different names")
         called = dict(zip(own, names, strict=True))
-        said = f"{self.path}: has no line of names; they are those of --names"
+        note = f"{self.path}: has no line of names; they are those of --names"
         return replace(
             self,
             columns={called[name]: values for name, values in self.columns.items()},
             texts=tuple(called[name] for name in self.texts),
             units={called[name]: unit for name, unit in self.units.items()},
-            said=(said, *self.said[1:]),
+            said=(note, *self.said[1:]),
         )
 
     def place(self, sample: int) -> str:
@@ -160,7 +160,7 @@ def _parsed(path: Path, name: str, column: pa.ChunkedArray, places: tuple[str, i
         return np.full(len(place), np.nan)
     first = place[np.flatnonzero(known)[:_TRIED]]
     for parse, missing in ((_number, float("nan")), (_instant, np.datetime64("NaT"))):
-        if sum(parse(texts[one]) is not None for one in first) * 2 <= len(first):
+        if sum(parse(texts[number]) is not None for number in first) * 2 <= len(first):
             continue
         read = [missing if text is None else parse(text) for text in texts]
         bad = np.array([value is None for value in read])[place]
@@ -205,7 +205,9 @@ def _parquet(path: Path) -> Recording:
         schema = file.schema_arrow
         _check_once(path, schema.names)
         # what is no one value a row is no signal: it is not read, for one row may hold millions
-        names = [each.name for each in schema if not pa.types.is_nested(each.type) and not _is_binary(each.type)]
+        names = [
+            column.name for column in schema if not pa.types.is_nested(column.type) and not _is_binary(column.type)
+        ]
         table = read_columns(path, file, names)
     columns, texts = as_columns(path, table, ("row", 1))
     read = set(names)

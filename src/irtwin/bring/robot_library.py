@@ -22,24 +22,24 @@ from irtwin.signals.log import read_robot
 _PACKAGE = "example-robot-data"
 
 
-def robot_of(said: str) -> tuple[Robot, str]:
+def robot_of(source: str) -> tuple[Robot, str]:
     """Return the robot of a URDF file, a data set, its dataset.toml, or of a name; and where it is from, in words.
 
     Raises InputError, with the names that are known, where there is none.
     """
-    path = Path(said)
+    path = Path(source)
     if path.exists():
         return read_robot(path), str(path)
     known = {_plain(name): (name, file) for name, file in robots().items()}
-    robot = known.get(_plain(said))
+    robot = known.get(_plain(source))
     if robot is not None:
         home = "irtwin" if robot[1].is_relative_to(resources.folder("ontology")) else _PACKAGE
         return read_urdf(robot[1]), f"{robot[0]} of {home}"
-    near = difflib.get_close_matches(_plain(said), known, 5, 0.5)
+    near = difflib.get_close_matches(_plain(source), known, 5, 0.5)
     names = ", ".join(known[name][0] for name in near or sorted(known))
     more = "" if _installed() else '; pip install "irtwin[robots]" brings others, as ur10 and panda'
     raise InputError(
-        f"{said}: there is no such file, and no robot of that name; there {'is' if len(near) == 1 else 'are'} "
+        f"{source}: there is no such file, and no robot of that name; there {'is' if len(near) == 1 else 'are'} "
         f"{names[:500]}{more}"
     )
 
@@ -60,7 +60,7 @@ def with_fixed(robot: Robot, patterns: Sequence[str]) -> Robot:
     """
     joints: set[str] = set()
     for pattern in patterns:
-        named = [one for one in (*robot.joint_names, *robot.held) if one == pattern or fnmatchcase(one, pattern)]
+        named = [name for name in (*robot.joint_names, *robot.held) if name == pattern or fnmatchcase(name, pattern)]
         if not named:
             raise InputError(
                 f'--fixed {pattern}: the robot has no joint "{pattern}" (it has {", ".join(robot.joint_names)})'

@@ -36,8 +36,8 @@ def variable(column: str) -> tuple[str, str, int | None] | None:
     """Return field, unit and joint (None of the whole robot) of a column; None where it is not used."""
     indexed = _INDEXED.fullmatch(column)
     name, joint = (indexed[1], int(indexed[2])) if indexed else (column, None)
-    said = _VARIABLES.get(name)
-    return None if said is None else (*said, joint)
+    known = _VARIABLES.get(name)
+    return None if known is None else (*known, joint)
 
 
 def payload(recording: Recording) -> tuple[float, tuple[float, float, float]] | None:

@@ -93,8 +93,8 @@ def _recording(path: Path, title: str, rows: list[tuple[Any, ...]]) -> Recording
     cells = list(zip(*rows[head.first :], strict=True))
     table = pa.table([_cells(column) for column in cells], names=[str(number) for number in range(len(names))])
     columns, texts = as_columns(path, table.rename_columns(names), ("row", head.first + 1))
-    said = {name: unit for name, unit in zip(names, units, strict=True) if unit}
-    return Recording(path, f"Excel, sheet {title}", columns, texts, said, first=head.first + 1)
+    stated = {name: unit for name, unit in zip(names, units, strict=True) if unit}
+    return Recording(path, f"Excel, sheet {title}", columns, texts, stated, first=head.first + 1)
 
 
 def _cells(column: tuple[Any, ...]) -> pa.Array:

@@ -85,7 +85,7 @@ class _Taking:
         if self._of("torque"):
             torques = self._si("torque")
             self.motions = [
-                MeasuredRun(each.time, each.q, torque) for each, torque in zip(self.motions, torques, strict=True)
+                MeasuredRun(motion.time, motion.q, torque) for motion, torque in zip(self.motions, torques, strict=True)
             ]
         self._resolve("current", lambda raw, _, si: evidence.by_size(si, raw, _CURRENT))
         self._resolve("temperature", lambda raw, _, si: _warm(evidence.by_size(si, raw, _WARM)))
@@ -93,7 +93,7 @@ class _Taking:
         self._resolve("meter_current", self._supply_current)
         self._resolve("power", lambda raw, *_: evidence.power(self.robot, self.motions, raw))
         power_at, why = self._power_at()
-        rows = tuple(self._row(each) for each in self.meanings)
+        rows = tuple(self._row(meaning) for meaning in self.meanings)
         runs = tuple(
             TakenRun(self._columns(log, time), start)
             for log, time, start in zip(self.logs, seconds, started, strict=True)
@@ -102,28 +102,29 @@ class _Taking:
 
     def _of(self, field: str) -> list[Meaning]:
         """Return the columns of a channel, base to flange."""
-        of_field = [each for each in self.meanings if each.field == field]
+        of_field = [meaning for meaning in self.meanings if meaning.field == field]
         names = self.robot.joint_names
-        return sorted(of_field, key=lambda each: names.index(each.joint) if each.joint in names else 0)
+        return sorted(of_field, key=lambda meaning: names.index(meaning.joint) if meaning.joint in names else 0)
 
-    def _values(self, log: Aligned, each: Meaning) -> np.ndarray:
+    def _values(self, log: Aligned, meaning: Meaning) -> np.ndarray:
         """Return a column on the joint's side of the gear, in its own unit."""
-        values = log.columns[each.column]
-        if not each.motor:
+        values = log.columns[meaning.column]
+        if not meaning.motor:
             return values
-        ratio = self._ratio(each)
-        return values * ratio if each.field == "torque" else values / ratio
+        ratio = self._ratio(meaning)
+        return values * ratio if meaning.field == "torque" else values / ratio
 
-    def _ratio(self, each: Meaning) -> float:
-        ratio = self.told.gear_ratios.get(str(each.joint))
+    def _ratio(self, meaning: Meaning) -> float:
+        ratio = self.told.gear_ratios.get(str(meaning.joint))
         if ratio is None:
-            channel = CHANNELS[str(each.field)].column(str(each.joint))
-            unit = each.unit or units(self._si_unit(each))[0]
+            channel = CHANNELS[str(meaning.field)].column(str(meaning.joint))
+            unit = meaning.unit or units(self._si_unit(meaning))[0]
             raise DoubtError(
-                f"{self.where}: column {each.column} is of the motor's side by its name; its gear's ratio is not known",
+                f"{self.where}: column {meaning.column} is of the motor's side by its name; its gear's ratio is not "
+                "known",
                 [
-                    WayOut("of the motor: the gear's ratio", (("--gear-ratio", f"{each.joint}=RATIO"),)),
-                    WayOut("of the joint's side", (("--map", f"{each.column}={channel}:{unit.name}"),)),
+                    WayOut("of the motor: the gear's ratio", (("--gear-ratio", f"{meaning.joint}=RATIO"),)),
+                    WayOut("of the joint's side", (("--map", f"{meaning.column}={channel}:{unit.name}"),)),
                 ],
             )
         return ratio
@@ -141,50 +142,54 @@ class _Taking:
             np.column_stack(
                 [
                     np.empty((len(log.time), 0)),  # of a meter's log there is nothing else
-                    *(self.units[each.column][0].to_si(self._values(log, each)) for each in columns),
+                    *(self.units[meaning.column][0].to_si(self._values(log, meaning)) for meaning in columns),
                 ]
             )
             for log in self.logs
         ]
 
-    def _si_unit(self, each: Meaning) -> str:
-        kind = "" if each.joint is None else self.robot.joints[self.robot.index(each.joint)].kind
-        return CHANNELS[str(each.field)].unit_of(kind)
+    def _si_unit(self, meaning: Meaning) -> str:
+        kind = "" if meaning.joint is None else self.robot.joints[self.robot.index(meaning.joint)].kind
+        return CHANNELS[str(meaning.field)].unit_of(kind)
 
     def _resolve(self, field: str, look: Look) -> None:
         """Find the unit of each column of a channel; those of one quantity share it where they say none."""
         columns = self._of(field)
-        for si in dict.fromkeys(self._si_unit(each) for each in columns):
-            places = [place for place, each in enumerate(columns) if self._si_unit(each) == si]
+        for si in dict.fromkeys(self._si_unit(meaning) for meaning in columns):
+            places = [place for place, meaning in enumerate(columns) if self._si_unit(meaning) == si]
             own = [columns[place] for place in places]
             self._share(own, si, lambda places=places, si=si: look(self._raw(field, places), places, si))  # type: ignore[misc]
 
     def _share(self, columns: Sequence[Meaning], si: str, look: Callable[[], UnitEvidence]) -> None:
-        said = sorted((each for each in columns if each.unit is not None), key=lambda each: not each.given)
-        seen = None if said and said[0].given else look()
-        for each in columns:
-            if each.unit is None and said:
-                assert said[0].unit is not None  # that is what is said
-                self.units[each.column] = said[0].unit, f"as {said[0].column}"
-            elif each.unit is None and seen is not None:
+        stated = sorted(
+            (meaning for meaning in columns if meaning.unit is not None), key=lambda meaning: not meaning.given
+        )
+        seen = None if stated and stated[0].given else look()
+        for meaning in columns:
+            if meaning.unit is None and stated:
+                assert stated[0].unit is not None  # that is what is said
+                self.units[meaning.column] = stated[0].unit, f"as {stated[0].column}"
+            elif meaning.unit is None and seen is not None:
                 if seen.choice is None:
                     could = seen.allowed if seen.allowed[1:] else units(si)  # one that is not sure is no choice
                     named = " or ".join(unit.name for unit in could)
-                    raise self._doubt(each, f"could be in {named}: {seen.why}", could)
-                self.units[each.column] = seen.choice, seen.why
-            elif each.unit is not None:
-                unit = each.unit
+                    raise self._doubt(meaning, f"could be in {named}: {seen.why}", could)
+                self.units[meaning.column] = seen.choice, seen.why
+            elif meaning.unit is not None:
+                unit = meaning.unit
                 if seen is not None and unit not in seen.allowed:
-                    question = f"is in {unit.name} {each.unit_why}, and cannot be: {seen.why}"
-                    raise self._doubt(each, question, [*([seen.choice] if seen.choice else seen.allowed), unit])
-                self.units[each.column] = unit, each.unit_why
+                    question = f"is in {unit.name} {meaning.unit_why}, and cannot be: {seen.why}"
+                    raise self._doubt(meaning, question, [*([seen.choice] if seen.choice else seen.allowed), unit])
+                self.units[meaning.column] = unit, meaning.unit_why
 
-    def _doubt(self, each: Meaning, question: str, choices: Sequence[Unit]) -> DoubtError:
-        channel = CHANNELS[str(each.field)].column(str(each.joint))
-        answers = [WayOut(unit.name, (("--map", f"{each.column}={channel}:{unit.name}"),)) for unit in choices]
-        if each.field not in ("q", "time"):
-            answers.append(WayOut("leave it out", (("--map", f"{each.column}={LEFT_OUT}"),)))
-        return DoubtError(f"{self.where}: column {each.column} ({CHANNELS[str(each.field)].label}) {question}", answers)
+    def _doubt(self, meaning: Meaning, question: str, choices: Sequence[Unit]) -> DoubtError:
+        channel = CHANNELS[str(meaning.field)].column(str(meaning.joint))
+        answers = [WayOut(unit.name, (("--map", f"{meaning.column}={channel}:{unit.name}"),)) for unit in choices]
+        if meaning.field not in ("q", "time"):
+            answers.append(WayOut("leave it out", (("--map", f"{meaning.column}={LEFT_OUT}"),)))
+        return DoubtError(
+            f"{self.where}: column {meaning.column} ({CHANNELS[str(meaning.field)].label}) {question}", answers
+        )
 
     def _position(self, raw: list[np.ndarray], joints: list[int], _: str) -> UnitEvidence:
         return evidence.position([self.robot.joints[joint] for joint in joints], raw)
@@ -223,8 +228,8 @@ class _Taking:
         return [time for time, _ in clocks], [started for _, started in clocks]
 
     def _power_at(self) -> tuple[str | None, str]:
-        columns = [each for field in OF_POWER for each in self._of(field)]
-        if not ({"power"} <= {each.field for each in columns} or len(columns) == 2):
+        columns = [meaning for field in OF_POWER for meaning in self._of(field)]
+        if not ({"power"} <= {meaning.field for meaning in columns} or len(columns) == 2):
             return None, ""
         if self.told.power_at is not None:
             return self.told.power_at, "as --power-at says"
@@ -232,7 +237,7 @@ class _Taking:
             return "mains", "as a plant's meters are; nothing says otherwise"
         if is_rtde(self.logs[0].recording.columns):
             return POWER_AT, "RTDE's voltage and current are those of the arm's 48 V"
-        words = {word for each in columns for word in each.words}
+        words = {word for meaning in columns for word in meaning.words}
         for place, there in (("mains", _MAINS), ("dc_bus", _BUS)):
             if words & there and not words & ((_MAINS | _BUS) - there):
                 return place, f"by the name of {columns[0].column}"
@@ -247,30 +252,30 @@ class _Taking:
         for field, channel in CHANNELS.items():
             if field == "time":
                 continue
-            for each in self._of(field):
-                values = self._values(log, each)
-                columns[channel.column(str(each.joint))] = self.units[each.column][0].to_si(values)
-                _check_size(log, each.column, columns[channel.column(str(each.joint))], channel)
+            for meaning in self._of(field):
+                values = self._values(log, meaning)
+                columns[channel.column(str(meaning.joint))] = self.units[meaning.column][0].to_si(values)
+                _check_size(log, meaning.column, columns[channel.column(str(meaning.joint))], channel)
         return columns
 
-    def _row(self, each: Meaning) -> Taken:
-        if each.field is None:
-            return Taken(each.column, why=each.why)
-        unit, unit_why = self.units[each.column]
+    def _row(self, meaning: Meaning) -> Taken:
+        if meaning.field is None:
+            return Taken(meaning.column, why=meaning.why)
+        unit, unit_why = self.units[meaning.column]
         steps = []
-        if each.motor:
-            sign = "x" if each.field == "torque" else "/"
-            steps.append(f"{sign} {self._ratio(each):g} (gear)")
+        if meaning.motor:
+            sign = "x" if meaning.field == "torque" else "/"
+            steps.append(f"{sign} {self._ratio(meaning):g} (gear)")
         if unit.factor != 1.0:
             steps.append(f"x {unit.factor:.6g}")
         if unit.offset:
             steps.append(f"{'+' if unit.offset > 0 else '-'} {abs(unit.offset):.6g}")
-        name = f"{MOTOR}{unit.name}" if each.motor else unit.name
-        if self.logs[0].time.dtype.kind == "M" and each.field == "time":
+        name = f"{MOTOR}{unit.name}" if meaning.motor else unit.name
+        if self.logs[0].time.dtype.kind == "M" and meaning.field == "time":
             name = "date and time"
-        why = each.why if unit_why in ("", each.why) else f"{each.why}; {unit.name} {unit_why}"
-        channel = CHANNELS[each.field].column(str(each.joint))
-        return Taken(each.column, channel, name, " ".join(steps) or "none", why)
+        why = meaning.why if unit_why in ("", meaning.why) else f"{meaning.why}; {unit.name} {unit_why}"
+        channel = CHANNELS[meaning.field].column(str(meaning.joint))
+        return Taken(meaning.column, channel, name, " ".join(steps) or "none", why)
 
 
 def _warm(evidence: UnitEvidence) -> UnitEvidence:

@@ -45,9 +45,9 @@ class UserSaid:
     def check(self, columns: Iterable[str]) -> None:
         """Raise InputError where something was said of a column that no file has."""
         names = list(columns)
-        for said in self.columns:
-            if said not in names and not any("*" in said and fits(said, name) for name in names):
-                raise InputError(f"--map {said}=...: no file has such a column; there are {', '.join(names[:12])}")
+        for pattern in self.columns:
+            if pattern not in names and not any("*" in pattern and fits(pattern, name) for name in names):
+                raise InputError(f"--map {pattern}=...: no file has such a column; there are {', '.join(names[:12])}")
 
 
 def told(maps: Iterable[str], ratios: Iterable[str], power_at: str | None, robot: Robot) -> UserSaid:
@@ -81,18 +81,22 @@ def _ratios(text: str, robot: Robot) -> dict[str, float]:
 
 
 def _target(text: str, robot: Robot) -> tuple[str, Target]:
-    column, sign, said = text.rpartition("=")
+    column, sign, target = text.rpartition("=")
     if not sign or not column:
         raise InputError(
             f"--map {text}: give COLUMN=CHANNEL or COLUMN=CHANNEL:UNIT, as J1=q_{robot.joint_names[0]}:deg"
         )
-    if said == LEFT_OUT:
+    if target == LEFT_OUT:
         return column, Target(None)
     known = by_column(robot.joint_names)
-    channel, unit_text = said, ""
-    if said not in known and ":" in said:
-        channel, _, unit_text = said.rpartition(":")
-    fields = [name for name, each in CHANNELS.items() if channel in (each.prefix, *each.columns(robot.joint_names))]
+    channel, unit_text = target, ""
+    if target not in known and ":" in target:
+        channel, _, unit_text = target.rpartition(":")
+    fields = [
+        name
+        for name, candidate in CHANNELS.items()
+        if channel in (candidate.prefix, *candidate.columns(robot.joint_names))
+    ]
     if not fields:
         prefixes = ", ".join(each.prefix for each in CHANNELS.values())
         raise InputError(
@@ -100,14 +104,16 @@ def _target(text: str, robot: Robot) -> tuple[str, Target]:
             f"({_names(robot)}), or - to leave the column out"
         )
     field_name = fields[0]
-    each = CHANNELS[field_name]
-    joint = next((name for name in robot.joint_names if each.per_joint and each.column(name) == channel), None)
-    quantities = tuple({each.unit_of(one.kind) for one in robot.joints if joint in (None, one.name)} or {each.unit})
+    chosen = CHANNELS[field_name]
+    joint = next((name for name in robot.joint_names if chosen.per_joint and chosen.column(name) == channel), None)
+    quantities = tuple(
+        {chosen.unit_of(axis.kind) for axis in robot.joints if joint in (None, axis.name)} or {chosen.unit}
+    )
     motor = unit_text.startswith(MOTOR)
     unit = unit_of(unit_text.removeprefix(MOTOR), quantities) if unit_text else None
     if unit_text and unit is None:
         raise InputError(
-            f"--map {text}: {unit_text} is no unit of {each.label}; its SI unit is {' or '.join(quantities)}"
+            f"--map {text}: {unit_text} is no unit of {chosen.label}; its SI unit is {' or '.join(quantities)}"
         )
     return column, Target(field_name, joint, unit, motor)
 
@@ -116,18 +122,18 @@ def _names(robot: Robot) -> str:
     return ", ".join(robot.joint_names)
 
 
-def roles(files: Sequence[Path], said: Iterable[str]) -> Mapping[Path, str]:
+def roles(files: Sequence[Path], texts: Iterable[str]) -> Mapping[Path, str]:
     """Return each file's role, as ROLE and FILE=ROLE say, the last that fits it; else "observed".
 
     FILE is a path as it is given or a name, with * for any letters. Raises InputError where one names no role or file.
     """
-    found = dict.fromkeys(files, ROLES[0])
-    for text in said:
+    by_file = dict.fromkeys(files, ROLES[0])
+    for text in texts:
         pattern, _, role = text.rpartition("=")
         if role not in ROLES:
             raise InputError(f"--role {text}: give ROLE or FILE=ROLE, where ROLE is {', '.join(ROLES)}")
-        named = [file for file in files if not pattern or any(fits(pattern, one) for one in (str(file), file.name))]
+        named = [file for file in files if not pattern or any(fits(pattern, name) for name in (str(file), file.name))]
         if not named:
             raise InputError(f"--role {text}: no such file is brought; there are {', '.join(map(str, files[:12]))}")
-        found |= dict.fromkeys(named, role)
-    return found
+        by_file |= dict.fromkeys(named, role)
+    return by_file

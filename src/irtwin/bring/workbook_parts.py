@@ -82,5 +82,5 @@ class _Count:
     def _doctype(self, *_: object) -> None:
         self._refuse("a document type, which no workbook needs")
 
-    def _refuse(self, what: str) -> NoReturn:
-        raise InputError(f"{self._path}: {self._part} has {what}; save the log as CSV")
+    def _refuse(self, obstacle: str) -> NoReturn:
+        raise InputError(f"{self._path}: {self._part} has {obstacle}; save the log as CSV")

@@ -93,7 +93,7 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
     own = body.held_out(rows.torque)
     faults: list[_Fault | _Axis] = [*_faults(rows, moving.joints), *starmap(_Axis, turned_axes(rows.model))]
     left = {fault: _left(rows, body, fault) for fault in faults}
-    fault = min(left, key=lambda each: left[each])
+    fault = min(left, key=lambda candidate: left[candidate])
     if body.fit(rows.torque).left < left[fault]:
         return []
     held = _held(rows, body, fault)
@@ -103,8 +103,8 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
         return [_of_another_robot(fault, own.gain(held), own.t(held), robot, moving)]
     if fault.field == "torque" and fault.fault == "scale":
         return []  # is found where its size is estimated
-    mirrors = [each for each in left if isinstance(each, _Fault) and each.mirrors(fault)]
-    rivals = [each for each in mirrors if _held(rows, body, each).t(held) < _ALIKE]
+    mirrors = [candidate for candidate in left if isinstance(candidate, _Fault) and candidate.mirrors(fault)]
+    rivals = [mirror for mirror in mirrors if _held(rows, body, mirror).t(held) < _ALIKE]
     return [_finding(fault, rivals, own.gain(held), own.t(held), robot, moving)]
 
 
@@ -162,14 +162,14 @@ def _finding(fault: _Fault, rivals: list[_Fault], gain: float, t: float, robot: 
     ratio, named = float(np.exp(gain)), fault.columns(robot)
     prefix = CHANNELS[fault.field].prefix
     mended = fault.fault == "sign" and fault.field == "torque"
-    what = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
+    problem = _SAID.get(fault.fault) or f"is {1 / fault.factors[fault.joints[0]]:g} times what the joint turns"
     cure = _CURE.get((fault.fault, prefix), "name them by their joints")
-    other = f" (or {rivals[0].columns(robot)}: the torques cannot tell which)" if rivals else ""
+    alternative = f" (or {rivals[0].columns(robot)}: the torques cannot tell which)" if rivals else ""
     return LogFinding(
         fault.fault, named, moving.names, certain=True, mended=mended,
         evidence={"residual_ratio": ratio, "t": round(t, 1)},
-        say=f"{named} {what}{other}: without that, one set of bodies explains all torques {ratio:.3g} times better; "
-        f"{cure}",
+        say=f"{named} {problem}{alternative}: without that, one set of bodies explains all torques {ratio:.3g} times "
+        f"better; {cure}",
     )  # fmt: skip
 
 

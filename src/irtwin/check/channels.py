@@ -59,14 +59,14 @@ def _jitter(moving: Moving) -> LogFinding | None:
 
 def _dead(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     regulated = column == CHANNELS["meter_voltage"].prefix and values[0][0] != 0  # a supply that holds its voltage
-    if regulated or any(np.ptp(each) > 0 for each in values):
+    if regulated or any(np.ptp(of_run) > 0 for of_run in values):
         return None
     say = f"{column} is {values[0][0]:g} throughout, though the robot moves; connect what measures it, or leave it out"
     return LogFinding("dead", column, moving.names, True, False, {"value": float(values[0][0])}, say)
 
 
 def _held(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
-    paces = [_pace(each) for each in values]
+    paces = [_pace(of_run) for of_run in values]
     if not all(pace is not None and pace >= 2 for pace in paces):
         return None
     pace = float(np.median([pace for pace in paces if pace is not None]))
@@ -88,11 +88,11 @@ def _pace(values: np.ndarray) -> float | None:
 def _cut_off(column: str, values: list[np.ndarray], moving: Moving) -> LogFinding | None:
     if column.startswith(CHANNELS["q"].prefix + "_"):
         return None  # a joint may stand at its end
-    for each in values:
-        for end in (each.max(), each.min()):
-            at_end = each == end
+    for of_run in values:
+        for end in (of_run.max(), of_run.min()):
+            at_end = of_run == end
             longest = max((own.stop - own.start for own in stretches(at_end)), default=0)
-            if len(each) >= _FEWEST and at_end.mean() > _FLAT and longest >= _ROW and np.ptp(each) > 0:
+            if len(of_run) >= _FEWEST and at_end.mean() > _FLAT and longest >= _ROW and np.ptp(of_run) > 0:
                 share = float(at_end.mean())
                 say = f"{column} stays at {end:.4g} for {share:.1%} of the time, as if cut off there; widen its range"
                 return LogFinding(

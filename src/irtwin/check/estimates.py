@@ -187,7 +187,7 @@ def _zeros(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) ->
     if not zeros:
         return []
     _, joint, off, deviation = min(zeros)  # of one that is off, others seem to be off as well
-    own, cured = (WholeBody.of(each).held_out(rows.torque) for each in (rows, _turned(rows, joint, -off)))
+    own, cured = (WholeBody.of(body_rows).held_out(rows.torque) for body_rows in (rows, _turned(rows, joint, -off)))
     if own.t(cured) < _SURE:
         return []
     name = CHANNELS["q"].column(robot.joints[joint].name)

@@ -75,13 +75,13 @@ def _loads(robot: Robot, rows: RigidBodyRows, joints: np.ndarray) -> Iterator[_L
 def _load(joint: int, loads: np.ndarray, beside: np.ndarray, torque: np.ndarray) -> _Load | None:
     """Fit a torque (N,) by gravity (N, 2), of the joint and a quarter further; None where it is not seen."""
     both = np.hstack([loads, beside])
-    found = fit(both, torque)
+    fitted = fit(both, torque)
     left, without = (np.var(torque - columns @ fit(columns, torque).coefficients) for columns in (both, beside))
     if without <= np.finfo(float).eps * np.mean(torque**2) or 1 - left / without < _SEEN:
         return None
-    a, b = found.coefficients[:2]
+    a, b = fitted.coefficients[:2]
     slope = np.array([-b, a]) / (a**2 + b**2)
-    deviation = float(np.sqrt(max(slope @ found.covariance[:2, :2] @ slope, 0.0)))
+    deviation = float(np.sqrt(max(slope @ fitted.covariance[:2, :2] @ slope, 0.0)))
     return _Load(joint, float(np.arctan2(b, a)), deviation)
 
 

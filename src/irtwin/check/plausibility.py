@@ -99,7 +99,7 @@ def _power(robot: Robot, moving: Moving) -> LogFinding | None:
     pairs = [(motion.power, _done(robot, motion)) for motion in moving.motions if motion.power is not None]
     if not pairs:
         return None
-    power, done = (float(np.quantile(np.concatenate(each), 0.99)) for each in zip(*pairs, strict=True))
+    power, done = (float(np.quantile(np.concatenate(parts), 0.99)) for parts in zip(*pairs, strict=True))
     if done < _MECHANICAL or not power > 0:
         return None
     in_kilowatts = power < _ELECTRICAL * done and power * _KILO > done

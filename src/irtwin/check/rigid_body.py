@@ -79,7 +79,7 @@ def rows_of(
     if sum(len(motion.time[::step]) for motion in motions) < _FEWEST:
         return None
     q, dq, ddq, torque = (
-        np.vstack([interpolated(one.time, getattr(one, name), one.time[::step] + by) for one in motions])
+        np.vstack([interpolated(motion.time, getattr(motion, name), motion.time[::step] + by) for motion in motions])
         for name, by in (("q", later), ("dq", later), ("ddq", later), ("torque", of_torque))
     )
     return RigidBodyRows(robot.model, q, dq, ddq, torque)

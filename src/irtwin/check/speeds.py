@@ -32,7 +32,7 @@ def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     pairs = [pair for pair in pairs if pair is not None]
     if not pairs:
         return []
-    derived, logged = (np.vstack(each) for each in zip(*pairs, strict=True))
+    derived, logged = (np.vstack(parts) for parts in zip(*pairs, strict=True))
     alike = _correlation(derived, logged)
     names = CHANNELS["dq"].columns(robot.joint_names)
     joints = np.flatnonzero(moving.joints).tolist()
@@ -55,10 +55,10 @@ def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     return findings
 
 
-def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], what: str) -> LogFinding:
+def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float], problem: str) -> LogFinding:
     return LogFinding(
         fault, channel, moving.names, certain=True, mended=True, evidence=evidence,
-        say=f"{channel} {what}; the speeds of the positions are used instead",
+        say=f"{channel} {problem}; the speeds of the positions are used instead",
     )  # fmt: skip
 
 
@@ -98,8 +98,8 @@ def _time_unit(gains: list[float], moving: Moving) -> LogFinding | None:
     for unit, factor in _TIMES.items():
         if gains and all(_is(gain, factor) for gain in gains):
             evidence = {"factor": float(np.median(gains))}
-            what = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
-            return LogFinding("unit", "time", moving.names, True, False, evidence, f"time {what}")
+            problem = f"is in {unit}: logged speeds are {factor:g} times those of the positions; convert it to s"
+            return LogFinding("unit", "time", moving.names, True, False, evidence, f"time {problem}")
     return None
 
 
@@ -123,7 +123,7 @@ def _delayed(name: str, joint: int, moving: Moving) -> list[LogFinding]:
     columns, values = [], []
     for run, motion in zip(moving.runs, moving.motions, strict=True):
         if (pair := _speeds(run, motion)) is not None and motion.cutoff is not None:
-            derived, logged = (low_pass(each[:, joint], motion.rate, _SLOW * motion.cutoff) for each in pair)
+            derived, logged = (low_pass(speed[:, joint], motion.rate, _SLOW * motion.cutoff) for speed in pair)
             columns.append(np.column_stack([derived, differentiate(derived, motion.rate)]))
             values.append(logged)
     delay_fit = fit(np.vstack(columns), np.concatenate(values))
@@ -131,5 +131,5 @@ def _delayed(name: str, joint: int, moving: Moving) -> list[LogFinding]:
     t = abs(delay_fit.t(np.array([0.0, 1.0])))
     if not gain or t < _SURE or abs(delay := float(-change / gain)) * (1 - _BEYOND / t) < _LATE:
         return []
-    what = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
-    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1), "t": round(t, 1)}, what)]
+    problem = f"comes {1000 * abs(delay):.3g} ms {'after' if delay > 0 else 'before'} the speed of its position"
+    return [_finding("delay", name, moving, {"delay_ms": round(1000 * delay, 1), "t": round(t, 1)}, problem)]

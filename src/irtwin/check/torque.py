@@ -35,9 +35,9 @@ def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
         return []
     nominal = rows.nominal()
     joints = np.flatnonzero(moving.joints).tolist()
-    told = {joint: one for joint in joints if (one := _told(rows, nominal, joint)) is not None}
-    findings = [found for joint in told if (found := _direction(robot, moving, joint, told[joint])) is not None]
-    reversed_ = [one for one in findings if one.fault == "sign" and one.mended]
+    told = {joint: answer for joint in joints if (answer := _told(rows, nominal, joint)) is not None}
+    findings = [direction for joint in told if (direction := _direction(robot, moving, joint, told[joint])) is not None]
+    reversed_ = [finding for finding in findings if finding.fault == "sign" and finding.mended]
     right = any(max(each.body, each.lost) > _LIKELY for each in told.values())
     still = [CHANNELS["torque"].column(robot.joints[joint].name) for joint in joints if joint not in told]
     if len(reversed_) < _SEVERAL or right or not still:
@@ -45,7 +45,7 @@ def torque_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     say = (
         f"{reversed_[-1].say}; that of {', '.join(still)} this motion does not tell: change it too if all are reversed"
     )
-    return [replace(one, say=say) if one is reversed_[-1] else one for one in findings]
+    return [replace(finding, say=say) if finding is reversed_[-1] else finding for finding in findings]
 
 
 def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
@@ -54,9 +54,9 @@ def unsigned_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     if len(torques) < len(moving.runs) or moving.joints.sum() < _SEVERAL:
         return []
     own = [torque[:, moving.joints] for torque in torques]
-    size = all((each >= 0).all() and (np.ptp(each, axis=0) > 0).all() for each in own)
+    size = all((of_run >= 0).all() and (np.ptp(of_run, axis=0) > 0).all() for of_run in own)
     q = [np.diff(run.signals.q[:, moving.joints], axis=0) for run in moving.runs]
-    both_ways = np.any([(each > 0).any(axis=0) & (each < 0).any(axis=0) for each in q], axis=0).all()
+    both_ways = np.any([(of_run > 0).any(axis=0) & (of_run < 0).any(axis=0) for of_run in q], axis=0).all()
     if not size or not both_ways:
         return []
     say = (
@@ -147,10 +147,10 @@ def _wrong_sign(robot: Robot, moving: Moving, joint: int, evidence: dict[str, fl
             say=f"{names['q']} has the wrong sign: {why}, and the torques of other joints fit the motion reversed; "
             "change it, and that of the speed",
         )  # fmt: skip
-    other = f" (or {names['q']}: the torques cannot tell which)" if position > -_LIKELY else ""
+    alternative = f" (or {names['q']}: the torques cannot tell which)" if position > -_LIKELY else ""
     return LogFinding(
         "sign", names["torque"], moving.names, certain=True, mended=True, evidence=evidence,
-        say=f"{names['torque']} has the wrong sign{other}: {why}; its sign is changed here, change it in the log",
+        say=f"{names['torque']} has the wrong sign{alternative}: {why}; its sign is changed here, change it in the log",
     )  # fmt: skip
 
 

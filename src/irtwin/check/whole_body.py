@@ -129,7 +129,7 @@ class Fitted:
         """
         root = np.sqrt(self.weights)[:, None]
         columns = np.ascontiguousarray(self.body.columns * root).reshape(-1, self.body.columns.shape[2])
-        others = np.column_stack([np.ravel(one * root.T) for one in beside] or [np.empty((len(columns), 0))])
+        others = np.column_stack([np.ravel(extra * root.T) for extra in beside] or [np.empty((len(columns), 0))])
         wanted, torque = (np.ravel(values * root.T) for values in (column, self.torque))
         size, across = float(wanted @ wanted), columns.T @ others
         products = np.block([[self._products, across], [across.T, others.T @ others]])

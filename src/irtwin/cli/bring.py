@@ -103,12 +103,12 @@ def import_(
         return _write_empty(out, robot, told["name"])
     from irtwin.bring.bring import Options, bring, found_in
 
-    options = Options(names=tuple(one.strip() for one in names.split(",")) if names else (), **told)
+    options = Options(names=tuple(name.strip() for name in names.split(",")) if names else (), **told)
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     brought = bring(files, out, robot, options, ask)
     _show(brought)
-    found, command = found_in(out)
-    for line in (*brought.said, *found):
+    findings, command = found_in(out)
+    for line in (*brought.said, *findings):
         say(f"irtwin: {line}")
     if command is None:
         say(f"Written: {out}, but it cannot be used yet. Cure what is said above, or import again into a new folder.")
@@ -142,10 +142,10 @@ def _take_edited(owl: Path, location: Location, yes: bool, author: str | None) -
             raise InputError(f"{owl}: nothing was taken: say --yes to take these changes")
         return click.confirm(f"Take these {len(edit.words)} changes", err=True)
 
-    said = take_edited(owl, location, author=author or getuser(), agrees=agrees, announce=say)
-    if said is None:
+    assertion = take_edited(owl, location, author=author or getuser(), agrees=agrees, announce=say)
+    if assertion is None:
         say("Nothing was taken.")
-    elif any(fact.place for fact in said.facts):
+    elif any(fact.place for fact in assertion.facts):
         say("Taken. Run the data set again, by `irtwin run`, to have the twin follow.")
     else:
         say("Taken.")
@@ -182,13 +182,13 @@ def _show(brought: Brought) -> None:
             rows.setdefault((each.unit, each.conversion, each.why) if each.channel else ("", "", each.why), []).append(
                 each
             )
-        for said, columns in rows.items():
+        for shared, columns in rows.items():
             if columns[0].channel:
                 names = "\n".join(printable(each.column) for each in columns)
                 channels = "\n".join(printable(each.channel) for each in columns)
-                table.add_row(*map(Text, (names, channels, *map(printable, said))))
+                table.add_row(*map(Text, (names, channels, *map(printable, shared))))
         wide.print(table)
-        for said, columns in rows.items():
+        for shared, columns in rows.items():
             if not columns[0].channel:
                 names = ", ".join(each.column for each in columns)
-                wide.print(Text(printable(f"not used, {said[-1]}: {names}")))
+                wide.print(Text(printable(f"not used, {shared[-1]}: {names}")))

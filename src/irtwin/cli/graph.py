@@ -90,8 +90,8 @@ def explain(triple: tuple[str, ...], location: Location, as_json: bool, verify: 
     explanations = asking.explain(" ".join(triple), location)
     files = verified(explanations, location.folder) if verify else []
     if as_json:
-        said = [to_json(each) for each in explanations]
-        told = {"explanations": said, "files": [asdict(each) for each in files]} if verify else said
+        entries = [to_json(each) for each in explanations]
+        told = {"explanations": entries, "files": [asdict(each) for each in files]} if verify else entries
         click.echo(json.dumps(told, indent=2, ensure_ascii=False))
     else:
         click.echo("\n\n".join(map(str, explanations)))

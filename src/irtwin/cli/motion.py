@@ -115,7 +115,7 @@ def plan(
     task = Task(
         start=read_target(start, joints, "--from"),
         goal=read_target(goal, joints, "--to"),
-        via=[read_target(one, joints, "--via") for one in via],
+        via=[read_target(target, joints, "--via") for target in via],
         obstacles=[Obstacle((x, y, z), (a, b, c)) for x, y, z, a, b, c in boxes],
         least_energy=objective == "energy",
         **asked,
@@ -212,8 +212,8 @@ def optimise(
 
 def _curve_lines(timings: Timings) -> Iterator[str]:
     """Yield the energy of each cycle time, what is new in the one that was chosen, and what its pauses could save."""
-    for one in timings.curve:
-        yield _cycle_text(one)
+    for cycle in timings.curve:
+        yield _cycle_text(cycle)
     programme = timings.programme
     time = programme.motion.time
     for section, factor in zip(programme.sections, timings.best.factors, strict=True):
@@ -229,12 +229,13 @@ def _curve_lines(timings: Timings) -> Iterator[str]:
 
 
 def _placement_text(timings: Timings) -> str:
-    if (found := timings.placement) is None:
+    if (placement := timings.placement) is None:
         return (
             "no place of the base up to 0.3 m beside saves anything, or the arm cannot keep its flange's way from there"
         )
-    shift = ", ".join(f"{value:+.2f}" for value in found.shift)
-    return f"base moved by {shift} m (x, y, z): {found.saved} J less{_year(timings, found.saved)}; it takes no time"
+    shift = ", ".join(f"{value:+.2f}" for value in placement.shift)
+    saved = placement.saved
+    return f"base moved by {shift} m (x, y, z): {saved} J less{_year(timings, saved)}; it takes no time"
 
 
 def _year(timings: Timings, saved: Figure) -> str:

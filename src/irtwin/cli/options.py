@@ -86,10 +86,10 @@ def locating(*options: Callable[[Any], Any]) -> Callable[[Callable[..., Any]], C
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def located(
-            workspace: Path | None, database: str | None = None, graph_url: str | None = None, **said: Any
+            workspace: Path | None, database: str | None = None, graph_url: str | None = None, **values: Any
         ) -> Any:
             location = None if workspace is None else Location(workspace, database, graph_url)
-            return command(location=location, **said)
+            return command(location=location, **values)
 
         for option in reversed(options):
             located = option(located)
@@ -173,8 +173,8 @@ def announce(line: str) -> None:
 def add_speech(command: click.Command) -> None:
     """Give a command, or each command of a group, the options --quiet and --verbose."""
     if isinstance(command, click.Group):
-        for each in command.commands.values():
-            add_speech(each)
+        for subcommand in command.commands.values():
+            add_speech(subcommand)
         return
     command.params += [
         click.Option(

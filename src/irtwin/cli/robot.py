@@ -171,7 +171,7 @@ def equations(source: Path, joint: str | None, latex: bool) -> None:
     described = read_robot(source)
     if joint is not None and joint not in described.joint_names:
         raise InputError(f'{described.name} has no moving joint "{joint}" (it has {", ".join(described.joint_names)})')
-    asked = [place for place, each in enumerate(described.joints) if joint in (None, each.name)]
+    asked = [place for place, axis in enumerate(described.joints) if joint in (None, axis.name)]
     titles = [_title(place + 1, described.joints[place], "%" if latex else "#") for place in asked]
     derived: EquationsOfMotion | RecursiveEquations
     if len(described.joints) > MOST_JOINTS:

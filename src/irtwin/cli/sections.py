@@ -31,14 +31,14 @@ class Sections(click.Group):
     ) -> None:
         super().__init__(*arguments, **named)
         self._sections, self._renamed, self._replaced = sections, renamed, replaced
-        for command in (one for commands in sections.values() for one in commands):
+        for command in (listed for commands in sections.values() for listed in commands):
             self.add_command(command)
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands, a section after the other."""
         for title, commands in self._sections.items():
             with formatter.section(title):
-                formatter.write_dl([(str(one.name), one.get_short_help_str(_WHOLE)) for one in commands])
+                formatter.write_dl([(str(command.name), command.get_short_help_str(_WHOLE)) for command in commands])
 
     def resolve_command(
         self, context: click.Context, args: list[str]
@@ -56,7 +56,7 @@ class Sections(click.Group):
             return super().resolve_command(context, args)
         if (path := Path(args[0])).exists():
             return None, click.Command("file", callback=lambda: _tell(path)), args[1:]
-        near = "".join(f"did you mean `irtwin {one}`? " for one in get_close_matches(args[0], self.commands, 1))
+        near = "".join(f"did you mean `irtwin {name}`? " for name in get_close_matches(args[0], self.commands, 1))
         raise InputError(f"there is no command and no file `{args[0]}`; {near}`irtwin --help` lists the commands")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,15 @@ import click
 
 from irtwin.cli.options import DAY, FILE, PLACE, Number, located, located_graph, say
 from irtwin.location import Location
+
+_ENDPOINT = re.compile(r'https?://[^\s<>"{}|\\^`#@/?]+([/?][^\s<>"{}|\\^`#]*)?')
+
+
+def _checked_services(context: click.Context, option: click.Parameter, urls: tuple[str, ...]) -> tuple[str, ...]:
+    for url in urls:
+        if _ENDPOINT.fullmatch(url) is None:
+            raise click.BadParameter(f"{url}: give the whole http or https address of a SPARQL endpoint, no password.")
+    return urls
 
 
 @click.command()
@@ -22,6 +32,14 @@ from irtwin.location import Location
 @click.option(
     "--allow-origin", "origins", metavar="ORIGIN", multiple=True, help="Site whose pages may ask the endpoint."
 )
+@click.option(
+    "--allow-service",
+    "services",
+    metavar="URL",
+    multiple=True,
+    callback=_checked_services,
+    help="SPARQL endpoint that queries may ask by SERVICE.",
+)
 @click.option("--token-file", type=PLACE, help="File with the token that permits updates.")
 @click.option("--opcua", metavar="PORT", type=click.IntRange(1, 65535), help="Answer OPC UA clients on this port, too.")
 @click.option(
@@ -34,6 +52,7 @@ def serve(
     timeout: float,
     memory: int,
     origins: tuple[str, ...],
+    services: tuple[str, ...],
     token_file: Path | None,
     opcua: int | None,
     mcp: bool,
@@ -47,6 +66,9 @@ def serve(
 
     Where a command was broken off and left the graph behind the database, answers have the header `Irtwin-Graph:
     behind` (`updating` while a command is at work on it) and pages a banner. The server catches up by itself.
+
+    With --allow-service anybody's query may have this machine ask that endpoint, by SERVICE <URL> as written here.
+    No token goes there, no redirect is followed, and the limits of time and memory hold for all of the query.
 
     With --graph the pages and the endpoint ask the server that keeps the graph. Functions of series are not there
     then, and a query that is cancelled may go on at that server, up to its own limit. --database is read at the
@@ -67,11 +89,15 @@ def serve(
 
         server(location, timeout).run()
         return
+    if services and location.graph_url is not None:
+        raise click.UsageError(
+            "--allow-service is for a graph in the workspace: a server that keeps it asks by itself."
+        )
     from irtwin.serve.pool import Limits
     from irtwin.serve.server import read_token
     from irtwin.serve.server import serve as serve_graph
 
-    limits = Limits(seconds=timeout, memory=memory << 20)
+    limits = Limits(seconds=timeout, memory=memory << 20, services=services)
     token = read_token(token_file)
     serve_graph(location, host, port, token=token, limits=limits, announce=_announce, origins=origins, opcua=opcua)
 

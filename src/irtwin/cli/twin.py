@@ -266,20 +266,20 @@ def diagnose(
         **asked,
     )
     click.echo(summary.line(diagnosis.document, diagnosis.against))
-    for said in (*summary.refused(diagnosis.document), *summary.filtered(diagnosis.document)):
-        click.echo(said)
+    for line in (*summary.refused(diagnosis.document), *summary.filtered(diagnosis.document)):
+        click.echo(line)
     for table in (
         summary.gap(diagnosis.document),
         summary.runs(diagnosis.curves),
         summary.horizons(diagnosis.document),
-        summary.causes(diagnosis.document),
+        summary.causes(diagnosis.document, diagnosis.against),
     ):
         if table:
             click.echo()
             show(table, counted=False)
     kept = summary.not_held(not_held(diagnosis.document), diagnosis.document) if simulator else []
-    for said in summary.meanings(diagnosis.document):
-        click.echo(said)
+    for line in summary.meanings(diagnosis.document):
+        click.echo(line)
     for some in filter(None, (kept, summary.next_steps(diagnosis.document))):
         click.echo("\n" + "\n".join(some))
 
@@ -315,8 +315,10 @@ def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) 
     from irtwin import improvement
 
     improved = improvement.improve(robot, new_log, location, announce=announce, **asked)
-    for number, one in enumerate(improved.rounds, start=1):
-        click.echo(f"round {number}, {one.tried}: {one.before:.3g} % before, {one.after:.3g} % after; {one.outcome}")
+    for number, trial in enumerate(improved.rounds, start=1):
+        click.echo(
+            f"round {number}, {trial.tried}: {trial.before:.3g} % before, {trial.after:.3g} % after; {trial.outcome}"
+        )
     if improved.within:
         click.echo(f"The twin is within the limit of {improved.limit:g} % on every run.")
     else:

@@ -33,7 +33,7 @@ FloorSource = Annotated[str, OneOf("repeats", "out_of_band")]
 Family = Annotated[str, Names(f"{ONTOLOGY}/family/{{}}")]
 CauseId = Annotated[str, Names("gap_cause/{diagnosis_id}/{}", "cause_id")]
 
-LIKELY = 0.5  # confidence from which a cause or a finding is likely, more so than not; below it is a guess
+LIKELY = 0.5  # confidence from which a cause or finding is likely, not a guess; as limit:confidence_to_act ships (test)
 FALSE_PLACES = 0.05  # rate of false discoveries up to which a place is sure, as intervals are 95 % ones
 LEAST_SHARE = 0.02  # of its channel's excess that a place has, to be worth a line
 
@@ -74,11 +74,11 @@ class Gap:
     def sizes(self) -> tuple[SizeAt, ...]:
         """The sizes, each with its place."""
         joints = [
-            SizeAt(channel=channel, joint=at, place=at, **vars(one))
+            SizeAt(channel=channel, joint=at, place=at, **vars(size))
             for channel, sizes in (("torque", self.torque), ("position", self.position))
-            for at, one in (sizes or {}).items()
+            for at, size in (sizes or {}).items()
         ]
-        power = [SizeAt(channel="power", joint=None, place="robot", **vars(one)) for one in (self.power,) if one]
+        power = [SizeAt(channel="power", joint=None, place="robot", **vars(size)) for size in (self.power,) if size]
         return (*joints, *power)
 
 
@@ -114,8 +114,7 @@ class GapLocation:
 class CauseParameter:
     """A parameter of a cause, in its `unit`; joint None: of the whole robot.
 
-    Where a simulator's model has the number, `simulator` is its, `robot` the robot's, and `value` how far these are
-    apart.
+    Where a simulator has the number, `simulator` is its, `robot` the robot's, and `value` how far these are apart.
     """
 
     name: str = told("Cause_Parameter_Name")
@@ -170,7 +169,9 @@ class Evidence:
     @tells()
     def competitors(self) -> tuple[Competitor, ...]:
         """The rivals, each with its probability."""
-        return tuple(Competitor(effect=one, probability=chance) for one, chance in self.probability_of_rivals.items())
+        return tuple(
+            Competitor(effect=rival, probability=chance) for rival, chance in self.probability_of_rivals.items()
+        )
 
 
 @part("Gap_Cause", of="cause_of", ranked=True)
@@ -329,7 +330,10 @@ class ChangeBy(Change):
 
 @part("Gap_Shrinkage", of="shrinkage_of")
 class ClosedFraction:
-    """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse."""
+    """The share of the gap above the floor that closes, at most 1; below 0 where the causes make it worse.
+
+    Beside a simulator it is of what the twin leaves beyond what it leaves of the simulator's own runs.
+    """
 
     value: float = told("Closed_Fraction", column="closed_fraction")
     interval95: Interval = told("Closed_Fraction", optional=True)
@@ -358,8 +362,12 @@ class CauseChange:
         """What it changes alone, and all others without it: pooled over joints."""
 
         def change(part: str, after: Sequence[float]) -> ChangeBy:
-            one = Change(before=pooled(self.rmse_before), after=pooled(after), noise_floor=None, interval95_after=None)
-            return ChangeBy(measure=f"{self.channel}_rmse", part=part, cause=self.cause, place=self.cause, **vars(one))
+            measured = Change(
+                before=pooled(self.rmse_before), after=pooled(after), noise_floor=None, interval95_after=None
+            )
+            return ChangeBy(
+                measure=f"{self.channel}_rmse", part=part, cause=self.cause, place=self.cause, **vars(measured)
+            )
 
         return change("alone", self.rmse_alone), change("without", self.rmse_when_left_out)
 
@@ -391,7 +399,7 @@ class Shrink:
             for measure in ("torque_rmse", "power_rmse", "position_rmse", "energy_error_percent")
             if (change := getattr(self, measure)) is not None
         ]
-        return (*of_channels, *(change for one in self.by_cause for change in one.changes))
+        return (*of_channels, *(change for cause in self.by_cause for change in cause.changes))
 
 
 @part("Gap_Horizon", of="change_of", ranked=True, unit_of="measure", constants=(("Change_Part", "horizon"),))
@@ -448,7 +456,7 @@ class Document:
         ids = {cause.id for cause in self.causes}
         if len(ids) < len(self.causes):
             raise InputError("diagnosis.causes: two have one id; give each an id of its own")
-        if unknown := {one.cause for one in self.shrink.by_cause} - ids:
+        if unknown := {cause.cause for cause in self.shrink.by_cause} - ids:
             raise InputError(f"diagnosis.shrink.by_cause: no cause has the id {min(unknown)}; use those of the causes")
         listed = [cause for finding in self.findings for cause in finding.causes]
         if wrong := ids.symmetric_difference(listed):
@@ -491,5 +499,5 @@ def cause_ids(causes: Iterable[tuple[str, Sequence[str]]], joints: Sequence[str]
         place = "all" if everywhere else "+".join(sorted(on, key=joints.index))
         name = f"{effect}@{place}" if on else effect
         numbered = (f"{name}#{number}" for number in count(2))
-        ids.append(next(one for one in chain([name], numbered) if one not in ids))
+        ids.append(next(candidate for candidate in chain([name], numbered) if candidate not in ids))
     return ids

@@ -168,10 +168,10 @@ class Experiment:
         chosen = self.programme and self.programme.kind
         return tuple(
             Weighed(
-                kind=one.kind,
-                chosen=one.kind == chosen,
-                whole_s=60.0 * one.minutes,
-                expected_separation=one.expected_separation,
+                kind=programme.kind,
+                chosen=programme.kind == chosen,
+                whole_s=60.0 * programme.minutes,
+                expected_separation=programme.expected_separation,
             )
-            for one in self.considered
+            for programme in self.considered
         )

@@ -70,12 +70,12 @@ def goes_with(other: str) -> dict[str, str]:
 def to_json(value: Any) -> Any:
     """Return a part, or what it is made of, as JSON, which has no number that is not finite: null."""
     if is_dataclass(value):
-        return {one.name: to_json(getattr(value, one.name)) for one in fields(value) if _written(value, one)}
+        return {field.name: to_json(getattr(value, field.name)) for field in fields(value) if _written(value, field)}
     if isinstance(value, Mapping):
-        return {key: to_json(one) for key, one in value.items()}
+        return {key: to_json(item) for key, item in value.items()}
     if isinstance(value, float):
         return value if isfinite(value) else None
-    return [to_json(one) for one in value] if isinstance(value, tuple | list) else value
+    return [to_json(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def from_json(kind: type[Part], given: object, where: str, mend: str = _MEND) -> Part:
@@ -94,18 +94,18 @@ def from_json(kind: type[Part], given: object, where: str, mend: str = _MEND) ->
 def schema(kind: Any) -> Json:
     """Return the JSON Schema of a part, or of what it is made of."""
     if get_origin(kind) is Annotated:
-        base, *said = get_args(kind)
+        base, *notes = get_args(kind)
         allowed = schema(base)
-        for one in _limits(said):
-            allowed = one.schema(allowed)
+        for limit in _limits(notes):
+            allowed = limit.schema(allowed)
         return allowed
     if get_origin(kind) in (UnionType, Union):
         return _or_null(schema(_known(kind)))
     if is_dataclass(kind):
         return {
             "type": "object",
-            "required": [one.name for one in fields(kind) if _always(one)],
-            "properties": {one.name: schema(_where_written(kind, one)) for one in fields(kind)},
+            "required": [field.name for field in fields(kind) if _always(field)],
+            "properties": {field.name: schema(_where_written(kind, field)) for field in fields(kind)},
         }
     if get_origin(kind) is Mapping:
         return {"type": "object", "additionalProperties": schema(get_args(kind)[1])}
@@ -116,23 +116,23 @@ def schema(kind: Any) -> Json:
     return {"type": _TYPES[kind]}
 
 
-def _limits(said: Iterable[Any]) -> Iterator[Any]:
+def _limits(notes: Iterable[Any]) -> Iterator[Any]:
     """Yield those of a type's annotations that say what a value may be."""
-    return (one for one in said if isinstance(one, Between | OneOf))
+    return (note for note in notes if isinstance(note, Between | OneOf))
 
 
-def _written(part: Any, one: Field[Any]) -> bool:
-    return _always(one) or getattr(part, one.metadata.get(_GOES_WITH, one.name)) is not None
+def _written(part: Any, field: Field[Any]) -> bool:
+    return _always(field) or getattr(part, field.metadata.get(_GOES_WITH, field.name)) is not None
 
 
-def _always(one: Field[Any]) -> bool:
-    return one.default is MISSING
+def _always(field: Field[Any]) -> bool:
+    return field.default is MISSING
 
 
-def _where_written(kind: Any, one: Field[Any]) -> Any:
+def _where_written(kind: Any, field: Field[Any]) -> Any:
     """Return the type of a field where it is written: one that is left out where it is None is never null."""
-    hint = _hints(kind)[one.name]
-    return hint if _always(one) or _GOES_WITH in one.metadata else _known(hint)
+    hint = _hints(kind)[field.name]
+    return hint if _always(field) or _GOES_WITH in field.metadata else _known(hint)
 
 
 def _or_null(of: Json) -> Json:
@@ -143,7 +143,7 @@ def _or_null(of: Json) -> Json:
 
 def _known(kind: Any) -> Any:
     """Return the type that a value has where it is not None."""
-    (inner,) = [one for one in get_args(kind) if one is not NoneType]
+    (inner,) = [argument for argument in get_args(kind) if argument is not NoneType]
     return inner
 
 
@@ -154,10 +154,10 @@ def _hints(kind: type) -> dict[str, Any]:
 
 def _read(kind: Any, given: Any, where: str) -> Any:
     if get_origin(kind) is Annotated:
-        base, *said = get_args(kind)
+        base, *notes = get_args(kind)
         value = _read(base, given, where)
-        for one in _limits(said):
-            one.check(value, where)
+        for limit in _limits(notes):
+            limit.check(value, where)
         return value
     if get_origin(kind) in (UnionType, Union):
         return None if given is None else _read(_known(kind), given, where)
@@ -165,12 +165,12 @@ def _read(kind: Any, given: Any, where: str) -> Any:
         return _read_part(kind, given, where)
     if get_origin(kind) is Mapping:
         _check(isinstance(given, dict), where, "an object")
-        return {key: _read(get_args(kind)[1], one, f"{where}.{key}") for key, one in given.items()}
+        return {key: _read(get_args(kind)[1], item, f"{where}.{key}") for key, item in given.items()}
     if get_origin(kind) is tuple:
         inner, *others = get_args(kind)
         _check(isinstance(given, list), where, "an array")
         _check(others == [...] or len(given) == len(others) + 1, where, f"an array of {len(others) + 1}")
-        return tuple(_read(inner, one, f"{where}[{place}]") for place, one in enumerate(given))
+        return tuple(_read(inner, item, f"{where}[{place}]") for place, item in enumerate(given))
     if kind is float:
         _check(type(given) in (int, float) and abs(given) <= float_info.max, where, "a finite number")
         return float(given)
@@ -181,14 +181,14 @@ def _read(kind: Any, given: Any, where: str) -> Any:
 def _read_part(kind: Any, given: Any, where: str) -> Any:
     _check(isinstance(given, dict), where, "an object")
     hints, values = _hints(kind), {}
-    for one in fields(kind):
-        if one.name in given:
-            values[one.name] = _read(hints[one.name], given[one.name], f"{where}.{one.name}")
+    for field in fields(kind):
+        if field.name in given:
+            values[field.name] = _read(hints[field.name], given[field.name], f"{where}.{field.name}")
         else:
-            _check(not _always(one), f"{where}.{one.name}", "given")
+            _check(not _always(field), f"{where}.{field.name}", "given")
     return kind(**values)
 
 
-def _check(holds: bool, where: str, what: str) -> None:
+def _check(holds: bool, where: str, needed: str) -> None:
     if not holds:
-        raise _Wrong(f"{where} must be {what}")
+        raise _Wrong(f"{where} must be {needed}")

@@ -34,5 +34,5 @@ class OddStretch:
 def odd(stretches: Sequence[OddStretch]) -> str:
     """Return the places of stretches in words; of many, how many more there are; nothing where there are none."""
     more = len(stretches) - _NAMED
-    places = [one.place for one in stretches[:_NAMED]] + ([f"and {more} more"] if more > 0 else [])
+    places = [stretch.place for stretch in stretches[:_NAMED]] + ([f"and {more} more"] if more > 0 else [])
     return "; ".join(places)

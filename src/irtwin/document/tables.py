@@ -97,8 +97,8 @@ class Table:
     def all(self) -> Iterator[Table]:
         """Yield the table and all below it."""
         yield self
-        for one in self.parts:
-            yield from one.all()
+        for table in self.parts:
+            yield from table.all()
 
 
 def reached(part: Any, steps: Steps) -> Any:
@@ -121,7 +121,7 @@ class _Type:
 
     @classmethod
     def of(cls, hint: Any) -> _Type:
-        inner = [one for one in get_args(hint) if one is not NoneType]
+        inner = [argument for argument in get_args(hint) if argument is not NoneType]
         if get_origin(hint) is Mapping:
             return cls(inner[1], many=True, keys=inner[0])
         if get_origin(hint) is tuple and inner[-1] is Ellipsis:
@@ -163,7 +163,7 @@ class _Member:
                 yield Column(name, str, (*self.steps, end), missing, term=term, names=_names(self.type.kind))
         else:
             named = _names(self.type.kind)
-            name = next((one for one in (*told.columns, named.column if named else "") if one), self.name)
+            name = next((given for given in (*told.columns, named.column if named else "") if given), self.name)
             term = next(iter(told.terms), "")
             yield Column(name, _plain(self.type.kind), self.steps, nullable, told.key, term, named)
 
@@ -185,18 +185,18 @@ def _parts(kind: Any, whole: Table) -> tuple[Table, ...]:
 
 def _members(kind: Any, steps: Steps = (), *, missing: bool = False) -> Iterator[_Member]:
     """Yield what is told of a kind of part, and of the parts in it that are no individuals."""
-    for name, hint, said in all_told(kind):
+    for name, hint, notes in all_told(kind):
         held, here = _Type.of(hint), (*steps, name)
         own = missing or held.missing
         if is_dataclass(held.kind) and individual_of(held.kind) is None:
             yield from _members(held.kind, here, missing=own)
         else:
-            yield _Member(name, held, own, said, here)
+            yield _Member(name, held, own, notes, here)
 
 
 def _names(kind: Any) -> Names | None:
     """Return what texts of an annotated type name."""
-    return next((one for one in getattr(kind, "__metadata__", ()) if isinstance(one, Names)), None)
+    return next((annotation for annotation in getattr(kind, "__metadata__", ()) if isinstance(annotation, Names)), None)
 
 
 def _plain(kind: Any) -> type:

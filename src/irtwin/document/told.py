@@ -71,8 +71,8 @@ def told(
     names with columns stands in these. The term of a mapping is that of its keys. With the default None a field goes
     without saying in JSON, or goes `with_field`.
     """
-    said = Told(terms, tuple(column.split()), table, key, optional)
-    return field(default=default, metadata={_TOLD: said} | (goes_with(with_field) if with_field else {}))
+    notes = Told(terms, tuple(column.split()), table, key, optional)
+    return field(default=default, metadata={_TOLD: notes} | (goes_with(with_field) if with_field else {}))
 
 
 def tells(*terms: str, key: bool = False) -> Callable[[Getter], Getter]:
@@ -114,11 +114,11 @@ def individual_of(kind: Any) -> Individual | None:
 def all_told(kind: Any) -> Iterator[tuple[str, Any, Told]]:
     """Yield what is told of a kind of part: names, types, and what is said of each."""
     hints = get_type_hints(kind, include_extras=True)
-    for one in fields(kind):
-        if _TOLD in one.metadata:
-            yield one.name, hints[one.name], one.metadata[_TOLD]
+    for part_field in fields(kind):
+        if _TOLD in part_field.metadata:
+            yield part_field.name, hints[part_field.name], part_field.metadata[_TOLD]
     for above in reversed(kind.__mro__):
         for name, member in vars(above).items():
-            said = getattr(getattr(member, "fget", None), _TOLD, None)
-            if said is not None:
-                yield name, get_type_hints(member.fget, include_extras=True)["return"], said
+            notes = getattr(getattr(member, "fget", None), _TOLD, None)
+            if notes is not None:
+                yield name, get_type_hints(member.fget, include_extras=True)["return"], notes

@@ -30,7 +30,7 @@ _BASELINE: tuple[type[Effect], ...] = (  # the seed paper's model, with rotor in
     supply.MechanicalPower,
     supply.StandbyPower,
 )
-_OWN: tuple[type[Effect], ...] = (
+OWN: tuple[type[Effect], ...] = (
     *_BASELINE,
     friction.StribeckFriction,
     friction.NonlinearViscousFriction,
@@ -79,7 +79,7 @@ def catalogue() -> dict[str, Effect]:
     two have one id.
     """
     effects: dict[str, Effect] = {}
-    for kind in (*_OWN, *_registered()):
+    for kind in (*OWN, *_registered()):
         effect = kind()
         if effect.id in effects:
             raise ValueError(f"two effects are called {effect.id}: {type(effects[effect.id])} and {kind}")

@@ -63,7 +63,7 @@ def load_inertia(robot: Robot, motion: Motion, predicted: Predicted | None) -> n
     for row, q in enumerate(motion.q[rows]):
         known[row] = pin.crba(model, data, q).diagonal()
     known = np.maximum(known, _LIGHTEST)
-    return np.column_stack([np.interp(np.arange(len(motion.time)), rows, each) for each in known.T])
+    return np.column_stack([np.interp(np.arange(len(motion.time)), rows, of_joint) for of_joint in known.T])
 
 
 def transmitted(
@@ -96,7 +96,7 @@ def transmitted(
         some = slice(first, first + side_by_side)
         rows = np.clip(starts[some] + np.arange(-ahead, length + 1)[:, None], 0, len(load) - 1)
         push, pull, rub = (
-            each[rows].reshape(len(rows), -1) if np.ndim(each) else each for each in (pushed, pulls, rubs)
+            values[rows].reshape(len(rows), -1) if np.ndim(values) else values for values in (pushed, pulls, rubs)
         )
         moved = _moved(push, pull, rub, np.asarray(plays)[:, None], ahead, substeps)
         passed[:, some] = moved.reshape(length, len(plays), -1, joints).transpose(1, 2, 0, 3)
@@ -112,7 +112,7 @@ def _moved(
     pushes: (ahead + L + 1, K); pulls, rubs: of each, or one for all; plays: (G, 1).
     """
     rises = np.diff(pushes, axis=0) / substeps
-    pulls, rubs = (np.broadcast_to(each, (len(pushes), *np.shape(each)[1:])) for each in (pulls, rubs))
+    pulls, rubs = (np.broadcast_to(values, (len(pushes), *np.shape(values)[1:])) for values in (pulls, rubs))
     swing = _Swing(pushes[0] / pulls[0] + np.sign(pushes[0]) * plays / 2, plays)
     forces = np.empty((len(rises) - ahead, *swing.shape))
     for row, (push, rise, pull, rub) in enumerate(zip(pushes[:-1].copy(), rises, pulls, rubs, strict=False)):
@@ -181,8 +181,9 @@ def _passed_at(
     """Return (N, n) what passes a spring for each of some antiresonances, Hz; `unit` (N, n): by pose, about one."""
     count = len(swings)
     speeds = np.concatenate([2 * np.pi * swing * unit for swing in swings], axis=1)
-    each = np.tile(load, count), np.tile(inertia, count)  # side by side: a step of many takes as long as a step of one
-    (passed,) = transmitted(*each, motion.rate, speeds, _DAMPING, start=motion.start)
+    # side by side: a step of many takes as long as a step of one
+    repeated = np.tile(load, count), np.tile(inertia, count)
+    (passed,) = transmitted(*repeated, motion.rate, speeds, _DAMPING, start=motion.start)
     return dict(zip(swings, np.split(passed, count, axis=1), strict=True))
 
 

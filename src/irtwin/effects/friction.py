@@ -104,8 +104,8 @@ class FrictionTurn(JointEffect):
     def samples(self, robot: Robot, motion: Motion, predicted: Predicted | None) -> tuple[np.ndarray, ...]:
         """Return s_w - s of each w, or of the mixture."""
         own = direction(robot, motion.dq)
-        each = tuple(turn(motion.dq, width, exponent) - own for width, exponent in _TURNS)
-        return (np.tensordot(self.mixture, each, 1),) if self.mixture else each
+        turns = tuple(turn(motion.dq, width, exponent) - own for width, exponent in _TURNS)
+        return (np.tensordot(self.mixture, turns, 1),) if self.mixture else turns
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class CableDrag(JointEffect):
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return k, the stiffness at rest."""
-        return tuple(one for one in super().parameters(robot, given) if one.name == "k")
+        return tuple(parameter for parameter in super().parameters(robot, given) if parameter.name == "k")
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return that a hose pulls back."""
@@ -121,7 +121,7 @@ class GravityCompensation(JointEffect):
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return one order to three, at the joint that makers balance: the first that gravity loads."""
         shapes = self.variants(orders=(1, 2, 3))
-        return shapes if robot is None else tuple(one.on(balanced_joint(robot)) for one in shapes)
+        return shapes if robot is None else tuple(shape.on(balanced_joint(robot)) for shape in shapes)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return the torques that go with cosine and sine of each order of the angle."""

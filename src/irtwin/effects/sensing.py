@@ -26,7 +26,7 @@ from irtwin.signals.filter import lagged
 from irtwin.signals.motion import Motion
 
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
-_GAINS = (0.7, 1.4)  # of a meter, the range of the ontology, `effects.ttl`
+_GAINS = (0.7, 1.4)  # of a meter
 _FARTHEST = 0.35  # rad or m, of a zero
 LONGEST_LAG = 5e-3  # s, of all joints' torque: filters of drives pass 100 Hz and more
 _APART = 2.5e-4  # s, of channels: clocks, filters and samples put them so far apart, one standard deviation

@@ -237,8 +237,8 @@ class Stack:
         It is the power that the column carries, if along is a speed; `values` as in `torque_columns`.
         """
         below = self._below(motion, values)
-        found = [self._carried(effect, motion, along, below.get(effect.stage)) for effect in self._real]
-        return side_by_side([np.zeros((len(along), 0)), *found])
+        parts = [self._carried(effect, motion, along, below.get(effect.stage)) for effect in self._real]
+        return side_by_side([np.zeros((len(along), 0)), *parts])
 
     def sparse_carried(
         self, motion: Motion, along: np.ndarray, values: np.ndarray | None = None
@@ -384,13 +384,15 @@ class Stack:
             return np.asarray(self._of_whole("columns", effect, motion, below))
         return self._while_on(effect, motion, effect.columns(self.robot, motion, _part(below, motion)))
 
-    def _of_whole(self, what: str, effect: Effect, motion: Motion, below: Predicted | None = None) -> np.ndarray | None:
+    def _of_whole(
+        self, asked: str, effect: Effect, motion: Motion, below: Predicted | None = None
+    ) -> np.ndarray | None:
         """Return "columns" of an effect with memory, or where it is "undecided": of a run at once for all its parts."""
-        whole, key = motion.whole or motion, (what, id(effect))
+        whole, key = motion.whole or motion, (asked, id(effect))
         last = self._last_of_whole.get(key)
         if last is None or last[0] is not whole or last[1] is not below:
-            found = effect.columns(self.robot, whole, below) if what == "columns" else effect.undecided(whole)
-            last = self._last_of_whole[key] = whole, below, found
+            result = effect.columns(self.robot, whole, below) if asked == "columns" else effect.undecided(whole)
+            last = self._last_of_whole[key] = whole, below, result
         return None if last[2] is None else _cut(last[2], motion)
 
     def drives_on(self, motion: Motion) -> np.ndarray | None:

@@ -94,7 +94,7 @@ class JointCoupling(Effect):
 
     def touched(self, robot: Robot, joint: str) -> tuple[str, ...]:
         """Return the joints of the pair that feel it."""
-        return tuple(one.name for one in self.pair(robot)[0 if self.mutual else 1 :])
+        return tuple(axis.name for axis in self.pair(robot)[0 if self.mutual else 1 :])
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return Ia, Fv and Fc of the pair, named by its second joint."""

@@ -54,11 +54,11 @@ def work(
     """
     base = None if base is None else base_iri.checked(base, "--base")
     _plan(find_data_sets(source), folder, kind, batch, workers, base)
-    batches = [one for one in batches_of(folder) if one.sets.kind == kind]
+    batches = [planned for planned in batches_of(folder) if planned.sets.kind == kind]
     ended = count(1)
 
-    def tell(one: Batch) -> None:
-        announce(f"{one.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([one]).counts)}")
+    def tell(done: Batch) -> None:
+        announce(f"{done.folder.name}, {next(ended)} of {len(batches)}: {_line(status_of([done]).counts)}")
 
     with told_meanwhile(lambda: announce(f"  {_line(status_of(batches).counts)}")):
         work_through(batches, workers, tell)

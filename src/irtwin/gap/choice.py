@@ -41,7 +41,11 @@ def begin(runs: Sequence[Run]) -> tuple[str, ...]:
     warmth = [run.signals.temperature for run in runs if run.signals.temperature is not None]
     if warmth and np.nanmax(np.ptp(np.concatenate(warmth), axis=0)) > _WARMED:
         signals.add("temperature")
-    own = (one.id for one in catalogue().values() if one.of_every_drive and {one.signal, *one.requires} <= signals)
+    own = (
+        effect.id
+        for effect in catalogue().values()
+        if effect.of_every_drive and {effect.signal, *effect.requires} <= signals
+    )
     return (*BASELINE, *own)
 
 
@@ -72,7 +76,7 @@ def _chosen(data_set: DataSet) -> tuple[Sequence[str | Effect], tuple[Choice, ..
     findings = list(_findings(case))
     shown = added(case, [cause for finding in findings for cause in finding.causes])
     left_open = {effect: places for finding in findings for effect, places in _open(case, finding).items()}
-    choices = tuple(one for finding in findings for one in _choices(case, finding))
+    choices = tuple(choice for finding in findings for choice in _choices(case, finding))
     return (*case.effects, *map(_of_open_shape, shown), *elsewhere(shown, left_open)), choices
 
 
@@ -83,8 +87,10 @@ def _of_open_shape(effect: Effect) -> Effect | str:
 
 def elsewhere(shown: Sequence[Effect], left_open: Mapping[str, Places]) -> Iterator[Effect]:
     """Yield effects that some joints show, for the joints that leave them open."""
-    for effect in {one.id: one for one in shown if isinstance(one, JointEffect)}.values():
-        has = {joint for one in shown if one.id == effect.id for joint in one.joints or ()}
+    for effect in {
+        joint_effect.id: joint_effect for joint_effect in shown if isinstance(joint_effect, JointEffect)
+    }.values():
+        has = {joint for shown_effect in shown if shown_effect.id == effect.id for joint in shown_effect.joints or ()}
         lacking = [joint for joint, _ in left_open.get(effect.id, ()) if joint is not None and joint not in has]
         if has and lacking:
             yield effect.on(*lacking)
@@ -124,10 +130,10 @@ def _choices(case: Case, finding: ChannelFinding) -> Iterator[Choice]:
 def _open(case: Case, finding: ChannelFinding) -> dict[str, Places]:
     """Return the joints, None for the whole robot, where a channel leaves effects open, and how likely each is."""
     left_open: dict[str, Places] = {}
-    for one, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
+    for hypothesis, odds in zip(finding.attribution.hypotheses, finding.attribution.log_odds, strict=True):
         chance = float(scipy.special.expit(odds))
-        if one.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
-            left_open.setdefault(one.effect, []).append((one.joint, chance))
+        if hypothesis.variants[0].effect.signal == finding.name and chance >= case.thresholds.criterion.unknown:
+            left_open.setdefault(hypothesis.effect, []).append((hypothesis.joint, chance))
     return left_open
 
 

@@ -37,7 +37,7 @@ def added(case: Case, causes: Sequence[FoundCause]) -> list[Effect]:
             named = [joint for joint in lacking if joint is not None]
             whole = not cause.joints and len(lacking) == len(joints)
             effect = variant.effect.standing() if whole else variant.effect.standing().on(*named)
-            if lacking and not any(one.id == effect.id and one.joints == effect.joints for one in effects):
+            if lacking and not any(earlier.id == effect.id and earlier.joints == effect.joints for earlier in effects):
                 effects.append(effect)
     return effects
 
@@ -58,4 +58,4 @@ def friction(case: Case, causes: Sequence[FoundCause], closed: Twin) -> tuple[Fr
     others = {run: motion for run, motion in motions.items() if run not in case.observed}
     former = identify(robot, list(others.values()), case.effects, case.prior)
     before = friction_curves(former, [others[run] for run in former.fitted], case.against)
-    return (*(one for one in before if one.joint in changed), *curves)
+    return (*(curve for curve in before if curve.joint in changed), *curves)

@@ -13,7 +13,7 @@ from irtwin.document.experiment import Experiment
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.local import LocalEffect
 from irtwin.gap import writing
-from irtwin.gap.beside_file import Simulator, alone_in_file, beside
+from irtwin.gap.beside_file import Simulator, alone_in_file, beside, of_simulated_runs
 from irtwin.gap.closed_twin import closed_twin, friction
 from irtwin.gap.data.baseline import said_of_twin
 from irtwin.gap.data.case import case_of
@@ -108,19 +108,23 @@ class Diagnosis:
         unknown_is_there = self.left_open in (MUCH_IS_LEFT, IMPOSSIBLE_NUMBER)
         doubted = set(ids) if unknown_is_there else writing.closing_nothing(findings)
         written = tuple(
-            writing.doubted(one, self.thresholds.criterion) if one.id in doubted else one for one in written
+            writing.doubted(cause, self.thresholds.criterion) if cause.id in doubted else cause for cause in written
         )
         apart = DifferingRepeats(self.removed, self.not_repeating, self.floor, self.channels, robot.joint_names)
-        if self.simulator is not None:
-            alone = alone_in_file(self.causes, self.scale)
-            written = tuple(beside(self.simulator, one, alone) for one in written)
+        if self.against == "simulated":
+            numbers = of_simulated_runs(self.channels) if self.simulator is None else self.simulator.numbers
+            alone = {} if self.simulator is None else alone_in_file(self.causes, self.scale)
+            written = tuple(beside(numbers, cause, alone) for cause in written)
         causes = apart.causes(written)
         findings = writing.findings(robot, self.channels, ids_of, written, self.thresholds.matters)
+        between = self.against == "simulated" and any(finding.matters for finding in findings)
+        if between:
+            findings = writing.between_sides(findings, self.channels, ids_of)
         findings = apart.findings(findings, causes, self.thresholds.matters)
         causes = writing.folded(causes, findings)
         judged = verdict_of(findings)
         verdict, why = (UNEXPLAINED, self.left_open) if self.left_open else (judged, None)
-        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of)
+        shrink = writing.shrink(robot, self.runs, self.channels, self.floor, self.energies, ids_of, between=between)
         return Document(
             verdict=verdict,
             unexplained_because=why or (UNSURE if verdict == UNEXPLAINED else None),
@@ -130,7 +134,7 @@ class Diagnosis:
             findings=findings,
             causes=causes,
             not_testable=self.untestable,
-            shrink=apart.shrink(shrink),
+            shrink=apart.shrink(shrink, between=between),
             next_experiment=self.experiment,
             not_repeating=apart.listed(),
             refused=self.refusals.refused or None,
@@ -202,7 +206,7 @@ def diagnose(
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)
     energies: EnergyErrors | None = None
-    causes = [cause for one in explained for cause in one.finding.causes]
+    causes = [cause for channel in explained for cause in channel.finding.causes]
     twin_with_causes = begun(partial(closed_twin, case, causes), worth=case.long)
     if case.shows("power"):
         tell("Trying every effect on power")
@@ -210,7 +214,7 @@ def diagnose(
         explained.append(of_power)
         refusals += wrong
         energies = energy_errors(explained[-1].finding, case.with_power)
-    findings = [one.finding for one in explained]
+    findings = [channel.finding for channel in explained]
     tell("Identifying the twin with its causes")
     if len(every := [cause for finding in findings for cause in finding.causes]) > len(causes):
         twin_with_causes.drop()
@@ -219,21 +223,24 @@ def diagnose(
     blamed = {cause.effect for cause in causes}
     screened = (LocalEffect,) if case.shows("torque") else ()
     silent = [
-        one
-        for one in catalogue().values()
-        if one.id not in blamed and not one.disturbance and not isinstance(one, screened)
+        effect
+        for effect in catalogue().values()
+        if effect.id not in blamed and not effect.disturbance and not isinstance(effect, screened)
     ]
     lacking = untestable(
         silent, case.stack.ids, [(f.name, f.attribution) for f in findings], case.seen, thresholds.criterion
     )
-    left = [channel_residual(case, one, twin_torque if one is torque else torque or twin_torque) for one in explained]
+    left = [
+        channel_residual(case, channel, twin_torque if channel is torque else torque or twin_torque)
+        for channel in explained
+    ]
     open_because = left_open(
         findings,
         thresholds,
         unmatched=refusals.unmatched,
         alike=case.alike,
         differing=differ,
-        explained=[one.disturbance for one in taken],
+        explained=[removal.disturbance for removal in taken],
     )
     located = places(
         left, seed, most_left(findings, thresholds, alike=case.alike) if open_because == MUCH_IS_LEFT else None
@@ -244,7 +251,7 @@ def diagnose(
     proposal = next_experiment(
         case.robot,
         [(finding, equations[finding.name]) for finding in findings],
-        [one.effect for one in lacking],
+        [untestable.effect for untestable in lacking],
         case.seen,
         thresholds,
     )

@@ -16,7 +16,7 @@ from irtwin.signals.motion import Motion
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Energy error of each observed group when it was left out of the fit, %: (G,) before and after."""
+    """Energy error of each observed group or run that was left out of the fit, %: (G,) before and after."""
 
     before: np.ndarray
     after: np.ndarray
@@ -28,11 +28,11 @@ class EnergyErrors:
 
     @property
     def change(self) -> Change:
-        """The change, with its 95 % interval over groups."""
+        """The change, with its 95 % interval over groups, None of one."""
         before, after = self.mean
         ones = np.ones(len(self.after))
         half = half_width(after, self.after, ones, ones)
-        ends = max(after - half, 0.0), after + half
+        ends = (max(after - half, 0.0), after + half) if len(ones) > 1 else None
         return Change(before=before, after=after, noise_floor=None, interval95_after=ends)
 
 

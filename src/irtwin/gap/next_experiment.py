@@ -71,7 +71,7 @@ class _Asked:
 
 
 def _of(causes: Sequence[FoundCause], effect: str, scope: str) -> FoundCause:
-    return next(one for one in causes if (one.effect, one.scope) == (effect, scope))
+    return next(cause for cause in causes if (cause.effect, cause.scope) == (effect, scope))
 
 
 def separation(cause: FoundCause, rival: str | None) -> float:
@@ -100,64 +100,72 @@ def next_experiment(
     most. None where there is nothing to ask.
     """
     enough = sqrt(-2 * log(limits.criterion.unknown))
-    asked = [question for one in channels for question in _rivals(robot, *one, limits)] or [
+    asked = [question for channel in channels for question in _rivals(robot, *channel, limits)] or [
         question
-        for one in channels
-        for question in _unseen(robot, *one, lacking, limits.criterion)
+        for channel in channels
+        for question in _unseen(robot, *channel, lacking, limits.criterion)
         if question.now[None] < enough
     ]
     if not asked:
         return None
-    names = tuple(dict.fromkeys(name for one in asked for name in (one.effect, *one.rivals)))
-    joints = tuple(joint for joint in robot.joint_names if any(joint in one.joints for one in asked))
+    names = tuple(dict.fromkeys(name for question in asked for name in (question.effect, *question.rivals)))
+    joints = tuple(joint for joint in robot.joint_names if any(joint in question.joints for question in asked))
     effects = [catalogue()[name] for name in names]
-    every = track(programmes(robot, joints, seen, effects), lambda one: f"weighing {one.kind.replace('_', ' ')}")
-    weighed = [(one, [question for each in asked for question in each.answered(one)]) for one in every]
+    every = track(
+        programmes(robot, joints, seen, effects), lambda programme: f"weighing {programme.kind.replace('_', ' ')}"
+    )
+    weighed = [
+        (programme, [question for each in asked for question in each.answered(programme)]) for programme in every
+    ]
     note = _note([told for _, told in weighed], enough)
     weighed = _answerable(weighed, enough)
     chosen, questions = _best(weighed, enough)
     by_hand = tuple(effect.manual_test for effect in effects if effect.manual_test)
     motions = (chosen.text,) if chosen else by_hand
-    if not motions and not any(one.rivals for one in asked):
+    if not motions and not any(question.rivals for question in asked):
         return None  # what nothing would show is among what is not testable; that rivals cannot be told apart is news
-    said = Experiment(
-        purpose="; ".join(f"tell {one.effect} from {', '.join(one.rivals)}" for one in asked if one.rivals)
+    experiment = Experiment(
+        purpose="; ".join(
+            f"tell {question.effect} from {', '.join(question.rivals)}" for question in asked if question.rivals
+        )
         or f"show {', '.join(names)}",
         effects=names,
         joints=joints,
         motions=motions,
-        expected_separation=min(one.expected_separation for one in questions) if chosen else None,
-        separation_now=_rounded(min(now for one in asked for now in one.now.values())),
+        expected_separation=min(question.expected_separation for question in questions) if chosen else None,
+        separation_now=_rounded(min(now for question in asked for now in question.now.values())),
         separation_that_is_enough=_rounded(enough),
         questions=tuple(questions),
         programme=chosen.said if chosen else None,
         considered=tuple(
             Considered(
-                kind=one.kind,
-                minutes=round(one.cost / 60, 1),
-                expected_separation=min(each.expected_separation for each in told),
+                kind=programme.kind,
+                minutes=round(programme.cost / 60, 1),
+                expected_separation=min(question.expected_separation for question in told),
             )
-            for one, told in weighed
+            for programme, told in weighed
         ),
         note=note,
     )
-    return ProposedExperiment(said, chosen, None if chosen is None else curve(robot, chosen))
+    return ProposedExperiment(experiment, chosen, None if chosen is None else curve(robot, chosen))
 
 
 def _rivals(robot: Robot, finding: ChannelFinding, equations: Equations, limits: Thresholds) -> Iterator[_Asked]:
     """Yield a question for each cause that a person is told of and that has rivals."""
-    told = [cause for one in branches(finding) if one.closing.matters(limits.matters) for cause in one.causes]
+    told = [cause for branch in branches(finding) if branch.closing.matters(limits.matters) for cause in branch.causes]
     true, sizes = _known(finding)
     for cause in told:
         near = cause.not_told_from(limits.criterion.unknown)
-        own = [one for one in true if (one.effect, one.scope) == (cause.effect, cause.scope)]
+        own = [
+            hypothesis for hypothesis in true if (hypothesis.effect, hypothesis.scope) == (cause.effect, cause.scope)
+        ]
         rivals = tuple(
-            one
-            for one in finding.attribution.hypotheses
-            if one.effect in near and any(overlap(one, each) for each in own)
+            rival
+            for rival in finding.attribution.hypotheses
+            if rival.effect in near and any(overlap(rival, hypothesis) for hypothesis in own)
         )
         now: dict[str | None, float] = {
-            name: separation(cause, name) for name in near if any(one.effect == name for one in rivals)
+            name: separation(cause, name) for name in near if any(rival.effect == name for rival in rivals)
         }
         if now:
             rehearsal = Rehearsal(finding, equations, true, rivals, sizes, False, limits.criterion)
@@ -174,7 +182,7 @@ def _unseen(
     true, sizes = _known(finding)
     before = finding.attribution
     for effect in lacking:
-        places = [k for k, one in enumerate(before.hypotheses) if one.effect == effect]
+        places = [k for k, hypothesis in enumerate(before.hypotheses) if hypothesis.effect == effect]
         if places:
             best = before.hypotheses[max(places, key=lambda k: before.visible[k, 0])]
             shape = best.variants[len(best.variants) // 2]
@@ -201,7 +209,7 @@ def _answerable(weighed: list[Weighed], enough: float) -> list[Weighed]:
     kept = [
         k for k, chances in enumerate(zip(*(told for _, told in weighed), strict=True)) if _reached(chances, enough)
     ]
-    return [(one, [told[k] for k in kept]) for one, told in weighed] if kept else weighed
+    return [(programme, [told[k] for k in kept]) for programme, told in weighed] if kept else weighed
 
 
 def _best(weighed: Sequence[Weighed], enough: float) -> tuple[ExperimentProgramme | None, list[Question]]:
@@ -211,12 +219,12 @@ def _best(weighed: Sequence[Weighed], enough: float) -> tuple[ExperimentProgramm
     """
 
     def order(pair: Weighed) -> tuple[int, int, float]:
-        expected = [one.expected_separation for one in pair[1]]
-        left = sum(one < enough for one in expected)
+        expected = [question.expected_separation for question in pair[1]]
+        left = sum(value < enough for value in expected)
         return -left, 0 if left else -round(pair[0].cost / 60), min(expected)
 
     best, questions = max(weighed, key=order, default=(None, []))
-    helps = any(one.expected_separation >= min(enough, one.separation_now + _LEAST) for one in questions)
+    helps = any(question.expected_separation >= min(enough, question.separation_now + _LEAST) for question in questions)
     return best if helps else None, questions
 
 
@@ -225,12 +233,12 @@ def _note(weighed: Sequence[list[Question]], enough: float) -> str | None:
     if not weighed:
         return f"no programme of at most {LONGEST / 60:g} minutes keeps to the limits of this robot"
     names = [chances[0].effects for chances in zip(*weighed, strict=True) if not _reached(chances, enough)]
-    said = [f"{' and '.join(some)} cannot be {'told apart' if len(some) > 1 else 'shown'}" for some in names]
-    return "; ".join(f"{one} by any motion that was weighed" for one in said) or None
+    notes = [f"{' and '.join(some)} cannot be {'told apart' if len(some) > 1 else 'shown'}" for some in names]
+    return "; ".join(f"{note} by any motion that was weighed" for note in notes) or None
 
 
 def _reached(chances: Sequence[Question], enough: float) -> bool:
-    return any(one.expected_separation >= enough for one in chances)
+    return any(question.expected_separation >= enough for question in chances)
 
 
 def curve(robot: Robot, programme: ExperimentProgramme) -> PlannedMotion:

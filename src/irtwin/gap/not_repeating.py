@@ -29,14 +29,14 @@ _One = TypeVar("_One")
 
 def with_removed(finding: ChannelFinding, taken: Sequence[Removed]) -> ChannelFinding:
     """Return a finding whose residual before anything is added holds what was taken out, on groups left out."""
-    judged, own = finding.held_out, [one for one in taken if one.disturbance.channel == finding.name]
+    judged, own = finding.held_out, [removal for removal in taken if removal.disturbance.channel == finding.name]
     if not own:
         return finding
-    squares = sum(_squares(finding, one) for one in own)
+    squares = sum(_squares(finding, removal) for removal in own)
     closed = float(np.sum((judged.before - judged.after) / _level(finding)))
     more = float(np.sum(squares / _level(finding)))
     part = max(closed, 0.0) / max(max(closed, 0.0) + more, 1e-300)
-    held_out, counted = (replace(each, before=each.before + squares) for each in (judged, finding.counted))
+    held_out, counted = (replace(groups, before=groups.before + squares) for groups in (judged, finding.counted))
     return replace(finding, held_out=held_out, counted=counted, part=part)
 
 
@@ -45,11 +45,11 @@ def _level(finding: ChannelFinding) -> np.ndarray:
     return np.ones(len(finding.places)) if finding.floor is None else finding.floor**2
 
 
-def _squares(finding: ChannelFinding, one: Removed) -> np.ndarray:
+def _squares(finding: ChannelFinding, removal: Removed) -> np.ndarray:
     """Return (G, g) the squares of what was taken out in each group left out and equation of its channel."""
-    rows, place = finding.held_out.rows, finding.places.index(one.disturbance.joint)
+    rows, place = finding.held_out.rows, finding.places.index(removal.disturbance.joint)
     squares = np.zeros(rows.shape)
-    squares[:, place] = rows[:, place] * np.array([one.mean_square(runs) for runs in finding.groups])
+    squares[:, place] = rows[:, place] * np.array([removal.mean_square(runs) for runs in finding.groups])
     return squares
 
 
@@ -69,26 +69,26 @@ class DifferingRepeats:
     @property
     def _named(self) -> list[tuple[Removed, str]]:
         """What was taken out, each with the id of its cause."""
-        ids = cause_ids([(one.effect.id, one.joints) for one in self.taken], self.joints)
+        ids = cause_ids([(removal.effect.id, removal.joints) for removal in self.taken], self.joints)
         return list(zip(self.taken, ids, strict=True))
 
     def listed(self) -> tuple[document.NotRepeating, ...] | None:
         """Return all that differs, the largest share first."""
-        explained = {id(one.disturbance): (one, name) for one, name in self._named}
-        places = [f"{one.kind}@{one.joint or one.channel}" for one in self.found]
+        explained = {id(removal.disturbance): (removal, name) for removal, name in self._named}
+        places = [f"{disturbance.kind}@{disturbance.joint or disturbance.channel}" for disturbance in self.found]
         listed = []
-        for k, one in enumerate(self.found):
-            by, name = explained.get(id(one), (None, None))
+        for k, disturbance in enumerate(self.found):
+            by, name = explained.get(id(disturbance), (None, None))
             before = places[:k].count(places[k])
             listed.append(
                 document.NotRepeating(
                     id=places[k] + (f"#{before + 1}" if before else ""),
-                    channel=one.channel,
-                    joint=one.joint,
-                    kind=one.kind,
-                    rms=float(np.sqrt(one.size)),
-                    share=one.share,
-                    quantities=tuple(map(_quantity, one.quantities if by is None else by.quantities)),
+                    channel=disturbance.channel,
+                    joint=disturbance.joint,
+                    kind=disturbance.kind,
+                    rms=float(np.sqrt(disturbance.size)),
+                    share=disturbance.share,
+                    quantities=tuple(map(_quantity, disturbance.quantities if by is None else by.quantities)),
                     explained_by=name,
                 )
             )
@@ -106,28 +106,28 @@ class DifferingRepeats:
     def causes(self, others: Sequence[document.Cause]) -> tuple[document.Cause, ...]:
         """Return all causes: what takes most of what is closed in its channel goes before the others."""
         own = []
-        for one, name in self._named:
+        for removal, name in self._named:
             evidence = document.Evidence(
-                channel=one.disturbance.channel,
-                share_of_what_is_closed=self._share(one),
-                closed_where_it_acts=one.gain,
-                gain=one.gain,
-                log_odds=_log_odds(one.disturbance.p),
+                channel=removal.disturbance.channel,
+                share_of_what_is_closed=self._share(removal),
+                closed_where_it_acts=removal.gain,
+                gain=removal.gain,
+                log_odds=_log_odds(removal.disturbance.p),
                 probability_of_rivals={},
             )
             own.append(
                 document.Cause(
                     id=name,
-                    effect=one.effect.id,
-                    joints=one.joints,
+                    effect=removal.effect.id,
+                    joints=removal.joints,
                     scope=MISSING,
                     confidence=float(scipy.special.expit(evidence.log_odds)),
-                    parameters=tuple(map(parameter, one.quantities)),
+                    parameters=tuple(map(parameter, removal.quantities)),
                     indistinguishable_from=(),
                     evidence=evidence,
                 )
             )
-        return _around(others, own, [one.evidence.share_of_what_is_closed or 0.0 for one in own])
+        return _around(others, own, [cause.evidence.share_of_what_is_closed or 0.0 for cause in own])
 
     def findings(
         self, others: Sequence[document.Finding], causes: Sequence[document.Cause], limits: Matters
@@ -136,80 +136,80 @@ class DifferingRepeats:
 
         The largest of all that differs matters where nothing else does: it is a gap, however little it is.
         """
-        alone = not any(one.matters for one in others)
+        alone = not any(finding.matters for finding in others)
         sure = {cause.id: cause.confidence for cause in causes}
         own = []
-        for one, name in self._named:
-            won = self._closing(one)
+        for removal, name in self._named:
+            won = self._closing(removal)
             own.append(
                 document.Finding(
                     id=name,
-                    family=one.effect.family,
-                    joints=one.joints,
+                    family=removal.effect.family,
+                    joints=removal.joints,
                     scope=MISSING,
-                    channel=one.disturbance.channel,
+                    channel=removal.disturbance.channel,
                     confidence=sure[name],
                     share=won.share,
                     share_interval95=won.interval,
                     share_of=won.share_of,
-                    matters=won.matters(limits) or (alone and one.disturbance is self.found[0]),
+                    matters=won.matters(limits) or (alone and removal.disturbance is self.found[0]),
                     members=(
                         document.Member(
-                            cause=name, effect=one.effect.id, family=one.effect.family, confidence=sure[name]
+                            cause=name, effect=removal.effect.id, family=removal.effect.family, confidence=sure[name]
                         ),
                     ),
                 )
             )
-        return _around(others, own, [one.share for one in own])
+        return _around(others, own, [finding.share for finding in own])
 
-    def _closing(self, one: Removed) -> Closing:
-        finding = self._finding(one)
-        squares = _squares(finding, one)
+    def _closing(self, removal: Removed) -> Closing:
+        finding = self._finding(removal)
+        squares = _squares(finding, removal)
         return closing(
             squares, squares.sum(axis=1) > 0, finding.counted, finding.floor_within, finding.attribution.noise
         )
 
-    def shrink(self, shrink: document.Shrink) -> document.Shrink:
-        """Return how far the gap shrinks, with what was taken out."""
+    def shrink(self, shrink: document.Shrink, *, between: bool) -> document.Shrink:
+        """Return how far the gap shrinks, with what was taken out; `between` sides, as `writing.shrink` has it."""
         if not self.taken:
             return shrink
-        changed = [one.name for one in self.channels if one.causes or self._of(one.name)]
-        fraction = fraction_closed(self.channels, changed)
+        changed = [channel.name for channel in self.channels if channel.causes or self._of(channel.name)]
+        fraction = fraction_closed(self.channels, changed, between=between)
         return replace(shrink, closed_fraction=fraction, by_cause=(*shrink.by_cause, *self._by_cause()))
 
     def _of(self, channel: str) -> list[Removed]:
-        return [one for one in self.taken if one.disturbance.channel == channel]
+        return [removal for removal in self.taken if removal.disturbance.channel == channel]
 
-    def _finding(self, one: Removed) -> ChannelFinding:
-        return next(each for each in self.channels if each.name == one.disturbance.channel)
+    def _finding(self, removal: Removed) -> ChannelFinding:
+        return next(channel for channel in self.channels if channel.name == removal.disturbance.channel)
 
-    def _mean_squares(self, one: Removed) -> np.ndarray:
+    def _mean_squares(self, removal: Removed) -> np.ndarray:
         """Return (g,) its mean square in each equation of its channel, over the groups judged."""
-        finding = self._finding(one)
-        return finding.held_out.rmse(_squares(finding, one)) ** 2
+        finding = self._finding(removal)
+        return finding.held_out.rmse(_squares(finding, removal)) ** 2
 
-    def _share(self, one: Removed) -> float | None:
+    def _share(self, removal: Removed) -> float | None:
         """Return its part of what the causes of its channel close together."""
-        finding = self._finding(one)
+        finding = self._finding(removal)
         level = _level(finding)
         own = {id(each): float(np.sum(self._mean_squares(each) / level)) for each in self._of(finding.name)}
         left = 1 - sum(finding.shares) if finding.shares else 1.0
-        return left * own[id(one)] / sum(own.values()) if sum(own.values()) > 0 else None
+        return left * own[id(removal)] / sum(own.values()) if sum(own.values()) > 0 else None
 
     def _by_cause(self) -> list[document.CauseChange]:
         changes = []
-        for one, name in self._named:
-            finding, squares = self._finding(one), self._mean_squares(one)
+        for removal, name in self._named:
+            finding, squares = self._finding(removal), self._mean_squares(removal)
             judged = finding.held_out
             before, after = judged.rmse(judged.before), judged.rmse(judged.after)
             changes.append(
                 document.CauseChange(
                     cause=name,
-                    effect=one.effect.id,
-                    joints=one.joints,
+                    effect=removal.effect.id,
+                    joints=removal.joints,
                     scope=MISSING,
                     channel=finding.name,
-                    share=self._share(one),
+                    share=self._share(removal),
                     rmse_before=numbers(before),
                     rmse_alone=numbers(np.sqrt(np.maximum(before**2 - squares, 0.0))),
                     rmse_when_left_out=numbers(np.sqrt(after**2 + squares)),
@@ -221,12 +221,12 @@ class DifferingRepeats:
 
 def _around(others: Sequence[_One], own: Sequence[_One], shares: Sequence[float]) -> tuple[_One, ...]:
     """Return all, those of our own that have most of what is closed before the others."""
-    first = [one for one, share in zip(own, shares, strict=True) if share >= _MOST]
-    return (*first, *others, *(one for one in own if one not in first))
+    first = [item for item, share in zip(own, shares, strict=True) if share >= _MOST]
+    return (*first, *others, *(item for item in own if item not in first))
 
 
-def _quantity(one: Quantity) -> document.DisturbanceQuantity:
-    own = parameter(one)
+def _quantity(quantity: Quantity) -> document.DisturbanceQuantity:
+    own = parameter(quantity)
     return document.DisturbanceQuantity(
         name=own.name, joint=own.joint, value=own.value, unit=own.unit, interval95=own.interval95
     )

@@ -62,7 +62,9 @@ class Rehearsal:
     @cached_property
     def _reduced(self) -> tuple[System, dict[int, int]]:
         """The equations of the data with the columns in question alone, and the place of each of these."""
-        asked = sorted({k for one in (*self.true, *self.rivals) for shape in one.variants for k in shape.columns})
+        asked = sorted(
+            {k for hypothesis in (*self.true, *self.rivals) for shape in hypothesis.variants for k in shape.columns}
+        )
         system, places = self.finding.steadied.system.with_columns(asked)
         return system, dict(zip(asked, places, strict=True))
 
@@ -71,7 +73,7 @@ class Rehearsal:
         """The equations of the data, and what the true structure leaves of each."""
         system = self._reduced[0]
         apart = system.by_speed
-        chosen = [k for one in self._placed(self.true) for k in one.variants[0].columns]
+        chosen = [k for hypothesis in self._placed(self.true) for k in hypothesis.variants[0].columns]
         noise = apart.residual_rms(chosen, apart.noise_before)
         return system.measuring(self._values) if self.unseen else system, noise
 
@@ -87,27 +89,30 @@ class Rehearsal:
     def _placed(self, some: Sequence[Hypothesis]) -> list[Hypothesis]:
         at = self._reduced[1]
         return [
-            replace(one, variants=tuple(replace(v, columns=tuple(at[k] for k in v.columns)) for v in one.variants))
-            for one in some
+            replace(
+                hypothesis,
+                variants=tuple(replace(v, columns=tuple(at[k] for k in v.columns)) for v in hypothesis.variants),
+            )
+            for hypothesis in some
         ]
 
     def _played(self, programme: ExperimentProgramme) -> System | None:
         """Return the equations of a programme; None where it is too short to say anything."""
         system = self._reduced[0]
-        effects = list({id(one.effect): one.effect for one in system.columns}.values())
-        acting = [replace(one, runs=()) if one.id in programme.without else one for one in effects]
-        place = {id(one): k for k, one in enumerate(effects)}
+        effects = list({id(column.effect): column.effect for column in system.columns}.values())
+        acting = [replace(effect, runs=()) if effect.id in programme.without else effect for effect in effects]
+        place = {id(effect): k for k, effect in enumerate(effects)}
         named = f"{programme.kind} {{}} {' '.join(programme.joints)}"
         motions = [
-            replace(one, run=named.format(k), torque=np.zeros(one.dq.shape), power=np.zeros(len(one.time)))
-            for k, one in enumerate(programme.motions)
+            replace(motion, run=named.format(k), torque=np.zeros(motion.dq.shape), power=np.zeros(len(motion.time)))
+            for k, motion in enumerate(programme.motions)
         ]
         try:
             whole = self.equations(motions, acting)
         except InputError:
             return None
-        index = {(id(one.effect), one.index): k for k, one in enumerate(whole.columns, start=whole.base)}
-        columns = [index[id(acting[place[id(one.effect)]]), one.index] for one in system.columns]
+        index = {(id(column.effect), column.index): k for k, column in enumerate(whole.columns, start=whole.base)}
+        columns = [index[id(acting[place[id(column.effect)]]), column.index] for column in system.columns]
         own, changes = np.split(self._values, [system.changed])
         own = own + np.pad(changes, (len(own) - len(changes), 0))
         return whole.with_columns(columns)[0].measuring(own)

@@ -154,19 +154,19 @@ class Search:
         lags = [cause for cause in finding.causes if cause.nuisance and not cause.joints]
         if not (turning or lags):
             return None
-        case, unknown, said = self.case, self.unknown, []
+        case, unknown, reasons = self.case, self.unknown, []
         if turning:
-            said.append(f"dry friction near zero speed of {', '.join(sorted(turning))} has a form of its own")
+            reasons.append(f"dry friction near zero speed of {', '.join(sorted(turning))} has a form of its own")
             case = replace(case, turning=case.turning | turning)
         for cause in lags:
             lag = float(finding.estimate.values[finding.used.index(cause.columns[0])])
             if lag <= case.longest_lag:
-                said.append(f"it lags by {1e3 * lag:.2g} ms")
+                reasons.append(f"it lags by {1e3 * lag:.2g} ms")
                 case = case.without_lag(lag)
             else:
-                said.append(f"it lags by {1e3 * lag:.2g} ms, more than filters make")
+                reasons.append(f"it lags by {1e3 * lag:.2g} ms, more than filters make")
                 unknown = unknown | {cause.effect}
-        tell(f"Trying every effect on torque again, as {' and '.join(said)}")
+        tell(f"Trying every effect on torque again, as {' and '.join(reasons)}")
         return replace(self, case=case.with_friction_near_zero(added(self.case, causes)), unknown=unknown)
 
     def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:

@@ -130,9 +130,9 @@ class Thresholds:
     def listed(self) -> Iterator[Threshold]:
         """Return each with its name, "group.threshold", and what is known of it."""
         for group in fields(self):
-            one = getattr(self, group.name)
-            for each in fields(one):
-                yield Threshold(f"{group.name}.{each.name}", getattr(one, each.name), **each.metadata)
+            values = getattr(self, group.name)
+            for threshold in fields(values):
+                yield Threshold(f"{group.name}.{threshold.name}", getattr(values, threshold.name), **threshold.metadata)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from irtwin.robot.description import Robot
 from irtwin.twin.torque_scale import FittedTorqueScale
 
 _TOLD = 0.01  # probability of a rival that is listed
+_APART = "the gap above what the twin leaves of the simulator's own runs"
 
 
 def gap(joints: Sequence[str], findings: Sequence[ChannelFinding], energies: EnergyErrors | None) -> document.Gap:
@@ -56,7 +57,7 @@ def _sizes(finding: ChannelFinding) -> list[document.Size]:
 def cause(
     robot: Robot,
     finding: ChannelFinding,
-    one: FoundCause,
+    found_cause: FoundCause,
     name: str,
     scale: FittedTorqueScale | None,
     limits: Criterion,
@@ -64,13 +65,13 @@ def cause(
     """Return a cause, `name` its id, with its parameters and evidence."""
     return document.Cause(
         id=name,
-        effect=one.effect,
-        joints=one.touched(robot),
-        scope=one.scope,
-        confidence=one.probability,
-        parameters=parameters(robot, finding, one, scale),
-        indistinguishable_from=one.not_told_from(limits.unknown),
-        evidence=_evidence(finding, one),
+        effect=found_cause.effect,
+        joints=found_cause.touched(robot),
+        scope=found_cause.scope,
+        confidence=found_cause.probability,
+        parameters=parameters(robot, finding, found_cause, scale),
+        indistinguishable_from=found_cause.not_told_from(limits.unknown),
+        evidence=_evidence(finding, found_cause),
     )
 
 
@@ -109,8 +110,8 @@ def findings(
     findings = []
     for (channel, branch), of_branch, on, name in zip(of_all, own_of_all, joints, ids, strict=True):
         members = [_members(cause) for cause in of_branch]
-        classes = [sum(one.confidence for one in some) for some in members]
-        of_family = [sum(one.confidence for one in some if one.family == branch.family) for some in members]
+        classes = [sum(member.confidence for member in some) for some in members]
+        of_family = [sum(member.confidence for member in some if member.family == branch.family) for some in members]
         findings.append(
             document.Finding(
                 id=name,
@@ -123,11 +124,28 @@ def findings(
                 share_interval95=branch.closing.interval,
                 share_of=branch.closing.share_of,
                 matters=branch.closing.matters(limits, likely=max(classes) >= document.LIKELY)
-                or (branch.closing.interval[0] > 0 and any(number_is_off(one, limits) for one in of_branch)),
-                members=tuple(one for some in members for one in some),
+                or (branch.closing.interval[0] > 0 and any(number_is_off(cause, limits) for cause in of_branch)),
+                members=tuple(member for some in members for member in some),
             )
         )
     return tuple(findings)
+
+
+def between_sides(
+    findings: Sequence[document.Finding], channels: Sequence[ChannelFinding], ids_of: Mapping[int, str]
+) -> tuple[document.Finding, ...]:
+    """Return findings with their shares of what sets a simulator apart; `ids_of` as in `findings`.
+
+    What the twin leaves of the simulator's own runs, too, is between no sides.
+    """
+    found = {ids_of[id(each)]: (channel, each) for channel in channels for each in channel.causes}
+    told = []
+    for finding in findings:
+        own = [found[name] for name in finding.causes]
+        if closed := own[0][0].closed_between([each for _, each in own]):
+            finding = replace(finding, share=closed[0], share_interval95=closed[1], share_of=_APART)
+        told.append(finding)
+    return tuple(told)
 
 
 def number_is_off(cause: document.Cause, limits: Matters) -> bool:
@@ -136,20 +154,21 @@ def number_is_off(cause: document.Cause, limits: Matters) -> bool:
     One joint's rotor can be a hundredth of the gap, and half of what it should be: who mends the model would miss it.
     """
     return cause.likely and any(
-        one.simulator is not None and least_change(one) > limits.number * abs(one.simulator) for one in cause.parameters
+        number.simulator is not None and least_change(number) > limits.number * abs(number.simulator)
+        for number in cause.parameters
     )
 
 
-def least_change(one: document.CauseParameter) -> float:
+def least_change(number: document.CauseParameter) -> float:
     """Return the least magnitude of a change within its 95 % interval."""
-    low, high = one.interval95 or (one.value, one.value)
+    low, high = number.interval95 or (number.value, number.value)
     return max(low, -high, 0.0)
 
 
 def folded(causes: Sequence[document.Cause], findings: Sequence[document.Finding]) -> tuple[document.Cause, ...]:
     """Return the causes, those marked that no finding that matters has: sure as they may be, no verdict counts them."""
     told = {cause for finding in findings if finding.matters for cause in finding.causes}
-    return tuple(one if one.id in told else replace(one, folded_away=True) for one in causes)
+    return tuple(cause if cause.id in told else replace(cause, folded_away=True) for cause in causes)
 
 
 def _joints(robot: Robot, causes: Sequence[document.Cause]) -> tuple[str, ...]:
@@ -168,34 +187,37 @@ def _members(cause: document.Cause) -> list[document.Member]:
     ]
 
 
-def _evidence(finding: ChannelFinding, one: FoundCause) -> document.Evidence:
-    runs, window = acting(one.variants) or (None, None)
+def _evidence(finding: ChannelFinding, found_cause: FoundCause) -> document.Evidence:
+    runs, window = acting(found_cause.variants) or (None, None)
     return document.Evidence(
         channel=finding.name,
-        share_of_what_is_closed=finding.share(one),
-        closed_where_it_acts=finding.closed(one),
-        gain=one.gain,
-        log_odds=one.log_odds,
-        probability_of_rivals={rival: chance for rival, chance in one.rivals.items() if chance >= _TOLD},
+        share_of_what_is_closed=finding.share(found_cause),
+        closed_where_it_acts=finding.closed(found_cause),
+        gain=found_cause.gain,
+        log_odds=found_cause.log_odds,
+        probability_of_rivals={rival: chance for rival, chance in found_cause.rivals.items() if chance >= _TOLD},
         runs=runs,
         window=window,
     )
 
 
 def parameters(
-    robot: Robot, finding: ChannelFinding, one: FoundCause, scale: FittedTorqueScale | None
+    robot: Robot, finding: ChannelFinding, found_cause: FoundCause, scale: FittedTorqueScale | None
 ) -> tuple[document.CauseParameter, ...]:
     """Return a cause's parameters as the catalogue states them, with 95 % intervals that hold the torque's scale."""
-    stated = [parameter(each if scale is None else scale.widened(each)) for each in quantities(robot, finding, one)]
-    if one.of_bodies:  # most of a body's numbers do not show: those that do
-        stated = [each for each in stated if each.interval95 and each.interval95[0] * each.interval95[1] > 0]
+    stated = [
+        parameter(quantity if scale is None else scale.widened(quantity))
+        for quantity in quantities(robot, finding, found_cause)
+    ]
+    if found_cause.of_bodies:  # most of a body's numbers do not show: those that do
+        stated = [number for number in stated if number.interval95 and number.interval95[0] * number.interval95[1] > 0]
     return tuple(stated)
 
 
-def torque_scale(one: FittedTorqueScale) -> document.TorqueScale:
+def torque_scale(scale: FittedTorqueScale) -> document.TorqueScale:
     """Return how sure the scale of torque is, and why."""
     return document.TorqueScale(
-        uncertainty95=one.uncertainty, source=one.source, low=one.low, high=one.high, why=one.why
+        uncertainty95=scale.uncertainty, source=scale.source, low=scale.low, high=scale.high, why=scale.why
     )
 
 
@@ -206,31 +228,41 @@ def shrink(
     floor: Floor,
     energies: EnergyErrors | None,
     ids_of: Mapping[int, str],
+    *,
+    between: bool,
 ) -> document.Shrink:
     """Return how far the gap shrinks on runs that took no part in the fit; `ids_of` as in `findings`.
 
-    What is closed of it together is left out where causes act in a channel whose floor nobody knows.
+    What is closed of it together is left out where causes act in a channel whose floor nobody knows; it is of what lies
+    `between` sides, or of what the twin leaves.
     """
     changes = {finding.name: _change(finding) for finding in findings}
     torque_too = any(finding.causes for finding in findings if finding.name == "torque")
-    changed = [one.name for one in findings if one.causes or (torque_too and one.plain is not None)]
+    changed = [finding.name for finding in findings if finding.causes or (torque_too and finding.plain is not None)]
     return document.Shrink(
         held_out_runs=tuple(runs),
         noise_floor_from=floor.source,
         torque_rmse=changes.get("torque"),
         power_rmse=changes.get("power"),
         energy_error_percent=energies.change if energies else None,
-        closed_fraction=fraction_closed(findings, changed),
+        closed_fraction=fraction_closed(findings, changed, between=between),
         by_cause=tuple(
             _by_cause(robot, finding, each, ids_of[id(each)]) for finding in findings for each in finding.causes
         ),
     )
 
 
-def fraction_closed(findings: Sequence[ChannelFinding], changed: Container[str]) -> document.ClosedFraction | None:
+def fraction_closed(
+    findings: Sequence[ChannelFinding], changed: Container[str], *, between: bool
+) -> document.ClosedFraction | None:
     """Return what closes in the channels that are `changed`, whose floor is known; None as `shrink` leaves it out."""
-    with_floor = [(one.held_out, one.floor) for one in findings if one.floor is not None and one.name in changed]
-    if not with_floor or any(one.floor is None for one in findings if one.causes):
+    floors = [finding.floor_between if between else finding.floor for finding in findings]
+    with_floor = [
+        (finding.held_out, floor)
+        for finding, floor in zip(findings, floors, strict=True)
+        if floor is not None and finding.name in changed
+    ]
+    if not with_floor or any(finding.floor is None for finding in findings if finding.causes):
         return None
     closed = closed_fraction(with_floor)
     return closed and document.ClosedFraction(value=closed[0], interval95=closed[1])
@@ -249,19 +281,19 @@ def _change(finding: ChannelFinding) -> document.Change:
     )
 
 
-def _by_cause(robot: Robot, finding: ChannelFinding, one: FoundCause, name: str) -> document.CauseChange:
+def _by_cause(robot: Robot, finding: ChannelFinding, found_cause: FoundCause, name: str) -> document.CauseChange:
     """Return what a cause closes alone, and what is lost without it."""
     system, noise = finding.system, finding.system.noise_before
-    alone = held_out(system, noise, noise, one.columns)
-    others = [k for other in finding.causes if other is not one for k in other.columns]
+    alone = held_out(system, noise, noise, found_cause.columns)
+    others = [k for other in finding.causes if other is not found_cause for k in other.columns]
     without = held_out(system, noise, finding.attribution.noise, others)
     return document.CauseChange(
         cause=name,
-        effect=one.effect,
-        joints=one.touched(robot),
-        scope=one.scope,
+        effect=found_cause.effect,
+        joints=found_cause.touched(robot),
+        scope=found_cause.scope,
         channel=finding.name,
-        share=finding.share(one),
+        share=finding.share(found_cause),
         rmse_before=numbers(alone.rmse(alone.before)),
         rmse_alone=numbers(alone.rmse(alone.after)),
         rmse_when_left_out=numbers(without.rmse(without.after)),
@@ -274,7 +306,9 @@ def numbers(values: np.ndarray) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def parameter(one: Quantity) -> document.CauseParameter:
+def parameter(quantity: Quantity) -> document.CauseParameter:
     """Return a quantity as the document has it."""
-    ends = None if one.lower is None or one.upper is None else (one.lower, one.upper)
-    return document.CauseParameter(name=one.name, joint=one.joint, value=one.value, unit=one.unit, interval95=ends)
+    ends = None if quantity.lower is None or quantity.upper is None else (quantity.lower, quantity.upper)
+    return document.CauseParameter(
+        name=quantity.name, joint=quantity.joint, value=quantity.value, unit=quantity.unit, interval95=ends
+    )

@@ -126,10 +126,10 @@ def accumulate(
     of the time where these are many; they are no triangles, and what is below 1e-8 of a column is lost in rounding.
     Raises InputError where nothing is left.
     """
-    found = accumulate_any(motions, equations, pattern, by_products=by_products, every=every)
-    if not found:
+    blocks = accumulate_any(motions, equations, pattern, by_products=by_products, every=every)
+    if not blocks:
         raise _nothing_left(motions)
-    return found
+    return blocks
 
 
 def accumulate_any(
@@ -138,8 +138,8 @@ def accumulate_any(
     """Do as `accumulate` does, and return no block where nothing is left."""
     total = sum(_seconds(motion) for motion in motions)
     kind = _Products if by_products else _Triangle
-    found = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total, every)][::every]
-    samples = sum(stop - start for _, start, stop in found)
+    stretches = [(motion, *stretch) for motion in motions for stretch in _stretches(motion, total, every)][::every]
+    samples = sum(stop - start for _, start, stop in stretches)
     place = {motion.run: number for number, motion in enumerate(motions, start=1)}
 
     def asked(motion: Motion) -> Rows:
@@ -151,7 +151,7 @@ def accumulate_any(
         return _grown(some, asked, lambda motion, start, stop: _Growing(motion, start, stop, pattern, kind))
 
     long = samples * (_BESIDE + int(pattern.sum())) >= _SHARED
-    blocks = shared(grown, found) if long and can_copy() else grown(found)
+    blocks = shared(grown, stretches) if long and can_copy() else grown(stretches)
     return [block for block in blocks if block.rows.any()]
 
 
@@ -159,18 +159,18 @@ def _grown(
     stretches: Sequence[tuple[Motion, int, int]], equations: Equations, begun: Callable[[Motion, int, int], _Growing]
 ) -> list[Block]:
     made: list[Future[list[Block]]] = []
-    with ThreadPoolExecutor(1) as other:  # filters and reduces while the next part's columns are computed
+    with ThreadPoolExecutor(1) as worker:  # filters and reduces while the next part's columns are computed
         adding: Future[None] | None = None
         for together in _joined(stretches):
             blocks = tuple(begun(*stretch) for stretch in together)
             for first, last, sample in _parts(blocks, equations):
                 if adding:
                     adding.result()
-                adding = other.submit(_add, blocks, first, last, sample)
-            made.append(other.submit(_made, blocks))  # what grew can go then
+                adding = worker.submit(_add, blocks, first, last, sample)
+            made.append(worker.submit(_made, blocks))  # what grew can go then
         if adding:
             adding.result()
-    return [block for one in made for block in one.result()]
+    return [block for future in made for block in future.result()]
 
 
 def _joined(stretches: Sequence[tuple[Motion, int, int]]) -> Iterator[Sequence[tuple[Motion, int, int]]]:
@@ -184,7 +184,7 @@ def _joined(stretches: Sequence[tuple[Motion, int, int]]) -> Iterator[Sequence[t
 
 
 def _made(growing: Sequence[_Growing]) -> list[Block]:
-    return [one.block() for one in growing]
+    return [part.block() for part in growing]
 
 
 def _parts(growing: Sequence[_Growing], equations: Equations) -> Iterator[tuple[int, int, Rows]]:
@@ -204,10 +204,10 @@ def _add(growing: Sequence[_Growing], first: int, last: int, sample: Rows) -> No
     motion = growing[0].motion
     thin = _Thin.of(sample, motion, growing[0].pattern)
     at = np.arange(first, last, thinning(motion)[1])
-    for one in growing:
-        begin, end = np.searchsorted(at, (one.start, one.stop))
+    for block in growing:
+        begin, end = np.searchsorted(at, (block.start, block.stop))
         if begin < end:
-            one.add(thin, slice(begin, end))
+            block.add(thin, slice(begin, end))
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ def _decimated(parts: Columns, motion: Motion, count: int) -> list[np.ndarray]:
     for place, part in enumerate(parts):
         wide = not isinstance(part, Sparse) and part.shape[1] > _NARROW
         bunches.setdefault((isinstance(part, Sparse), place if wide else -1), []).append(place)
-    found = [np.zeros((count, 0))] * len(parts)
+    thinned = [np.zeros((count, 0))] * len(parts)
     for (sparse, _), places in bunches.items():
         own = [part.values if isinstance(part, Sparse) else part for part in map(parts.__getitem__, places)]
         together = np.concatenate([some.T for some in own]).T if len(own) > 1 else own[0]
@@ -254,8 +254,8 @@ def _decimated(parts: Columns, motion: Motion, count: int) -> list[np.ndarray]:
         for place, some in zip(
             places, np.split(thin, np.cumsum([some.shape[1] for some in own])[:-1], axis=1), strict=True
         ):
-            found[place] = some
-    return found
+            thinned[place] = some
+    return thinned
 
 
 def _mixed(part: np.ndarray | Sparse) -> np.ndarray:
@@ -338,9 +338,9 @@ def root(products: np.ndarray) -> np.ndarray:
     size[size == 0] = 1.0
     scaled = products / size / size[:, None]
     factored, order, rank, _ = scipy.linalg.lapack.dpstrf(scaled, tol=_ROUNDING)
-    found = np.empty((rank, len(size)))
-    found[:, order - 1] = np.triu(factored)[:rank] * size[order - 1]
-    return found
+    factor = np.empty((rank, len(size)))
+    factor[:, order - 1] = np.triu(factored)[:rank] * size[order - 1]
+    return factor
 
 
 def part_read(motions: Sequence[Motion]) -> int:

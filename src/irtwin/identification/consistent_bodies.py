@@ -71,34 +71,34 @@ class _Problem:
         return step, float(np.linalg.norm(factor[:-1, -1]))
 
 
-def with_consistent_bodies(stack: Stack, terms: Terms, found: Estimate) -> Estimate:
+def with_consistent_bodies(stack: Stack, terms: Terms, fit: Estimate) -> Estimate:
     """Return the estimate of terms (K) that is best with consistent bodies; as it is where there are none."""
     places = _places(terms)
     if not len(places):
-        return found
+        return fit
     described = described_bodies(stack)
-    problem = _Problem(found.equations[:, :-1], found.equations[:, -1], places, np.linalg.inv(described))
+    problem = _Problem(fit.equations[:, :-1], fit.equations[:, -1], places, np.linalg.inv(described))
     lowest = np.array([term.lowest for _, term in terms])
-    x = found.values.copy()
+    x = fit.values.copy()
     x[places] = inertial_parameters(described)
     free = x > lowest
     while True:
         solved = _solved(problem, x, free)
         below = free & (solved < lowest)
         if not below.any():
-            return replace(found, values=solved)
+            return replace(fit, values=solved)
         x, free = np.where(below, lowest, solved), free & ~below
 
 
 def spreads(stack: Stack, terms: Terms) -> np.ndarray:
     """Return (K,) the standard deviation of each term that is known before any data: of bodies by the pull, too."""
-    found, places = np.array([term.spread for _, term in terms]), _places(terms)
+    deviations, places = np.array([term.spread for _, term in terms]), _places(terms)
     if len(places):
         inverse = np.linalg.inv(described_bodies(stack))
         known = PULL * np.einsum("nij,ajk,nkl,bli->nab", inverse, BASIS, inverse, BASIS)
         widths = np.sqrt(np.diagonal(np.linalg.inv(known), axis1=1, axis2=2))
-        found[places] = np.minimum(found[places], widths)
-    return found
+        deviations[places] = np.minimum(deviations[places], widths)
+    return deviations
 
 
 def _places(terms: Terms) -> np.ndarray:

@@ -58,8 +58,10 @@ def _resolved(robot: Robot, runs: Sequence[Run]) -> float:
     seen = [run.signals.rows(slice(_MOST_SAMPLES)) for run in runs if run.signals.torque is not None]
     if not seen:
         return np.inf
-    of_positions = np.median([white_noise(one.time, one.q) for one in seen], axis=0)
-    of_torques = np.median([white_noise(one.time, one.torque) for one in seen if one.torque is not None], axis=0)
+    of_positions = np.median([white_noise(signals.time, signals.q) for signals in seen], axis=0)
+    of_torques = np.median(
+        [white_noise(signals.time, signals.torque) for signals in seen if signals.torque is not None], axis=0
+    )
     makes = robot.mean_inertia * of_positions
     told = (makes > 0) & (of_torques > 0)
     return float(np.sqrt(np.sqrt(5) * np.min(of_torques[told] / makes[told], initial=np.inf)) / (2 * np.pi))
@@ -67,10 +69,10 @@ def _resolved(robot: Robot, runs: Sequence[Run]) -> float:
 
 def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, resolved: float) -> int:
     """Return how often a cutoff, Hz, is halved; what is `resolved` is no noise to be taken away."""
-    found = 0
+    halvings = 0
     measured = [run for run in runs if run.signals.torque is not None]
     if not measured:
-        return found
+        return halvings
     share = max(_MOST_SAMPLES // len(measured), 1)
     looked_at = [replace(run, signals=run.signals.rows(slice(share))) for run in measured]
     parts = 1 if len(looked_at) > 1 else 2
@@ -81,10 +83,10 @@ def _halved(robot: Robot, runs: Sequence[Run], cutoff: float, resolved: float) -
             lower = _held_out(robot, looked_at, cutoff / 2)
             if lower > error + np.log(1 - _BETTER):
                 break
-            cutoff, error, found = cutoff / 2, lower, found + 1
+            cutoff, error, halvings = cutoff / 2, lower, halvings + 1
     except InputError:  # too short or too still to be cut in two: the fit of all of it says what is wrong, if anything
         pass
-    return found
+    return halvings
 
 
 def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
@@ -109,8 +111,8 @@ def _held_out(robot: Robot, runs: Sequence[Run], cutoff: float) -> float:
 def _halves(motions: Sequence[Motion]) -> list[tuple[list[Motion], list[Motion]]]:
     """Return what is fitted and what is judged, both ways: every second run, or the halves of the only one."""
     if len(motions) > 1:
-        one, other = list(motions[::2]), list(motions[1::2])
+        first, second = list(motions[::2]), list(motions[1::2])
     else:
         half = len(motions[0].time) // 2
-        one, other = [motions[0].part(0, half)], [motions[0].part(half, len(motions[0].time))]
-    return [(one, other), (other, one)]
+        first, second = [motions[0].part(0, half)], [motions[0].part(half, len(motions[0].time))]
+    return [(first, second), (second, first)]

@@ -45,13 +45,13 @@ def fit_torque(
         blocks = reduced or accumulate(motions, equations, stack.pattern)
         return blocks, estimate(blocks, stack.pattern, terms, prior)
 
-    blocks, found = fit(_alone(stack, motions, known) if stack.coupled else None)
+    blocks, fitted = fit(_alone(stack, motions, known) if stack.coupled else None)
     for _ in range(_REPEATS if stack.coupled else 0):
-        before = found.values
-        blocks, found = fit(before)
-        if _converged(found.values, before, terms):
+        before = fitted.values
+        blocks, fitted = fit(before)
+        if _converged(fitted.values, before, terms):
             break
-    return blocks, found
+    return blocks, fitted
 
 
 def fit_power(
@@ -70,15 +70,15 @@ def fit_power(
         return estimate_one(motions, equations, _of(free), stack.prior_rows(free), every)
 
     values = expected(stack.power_terms)
-    blocks, found = fit(values)
+    blocks, fitted = fit(values)
     for _ in range(_REPEATS if stack.power_coupled else 0):
-        step = np.abs(found.values - values[~stack.fixed]) / np.sqrt(np.diag(found.covariance))
+        step = np.abs(fitted.values - values[~stack.fixed]) / np.sqrt(np.diag(fitted.covariance))
         if step.max(initial=0.0) < _SETTLED:
             break
         values = values.copy()
-        values[~stack.fixed] = found.values
-        blocks, found = fit(values)
-    return blocks, found
+        values[~stack.fixed] = fitted.values
+        blocks, fitted = fit(values)
+    return blocks, fitted
 
 
 def predicted_losses(
@@ -163,14 +163,14 @@ def fit_both(
         else:  # that of power alone follows the values
             line = _both_equations(stack, values, power_alone=True)
             blocks = _beside(of_torque, accumulate_any(motions, line, pattern[joints:], every=every), pattern)
-        found = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
-        before, values, last = values, found.values, step
-        step = float(np.max((np.abs(values - before) / np.sqrt(np.diag(found.covariance)))[:count], initial=0.0))
+        fitted = estimate(blocks, pattern, terms, known, signals=[0] * joints + [1])
+        before, values, last = values, fitted.values, step
+        step = float(np.max((np.abs(values - before) / np.sqrt(np.diag(fitted.covariance)))[:count], initial=0.0))
         if every == 1 and shrinks * step < _SETTLED:
             break
         if every > 1 and step < min(last, _SETTLED):
             every, shrinks = 1, step / last if np.isfinite(last) else 1.0
-    return found.of(range(count), found.noise[:joints])
+    return fitted.of(range(count), fitted.noise[:joints])
 
 
 def _both_equations(stack: Stack, values: np.ndarray, *, power_alone: bool = False) -> Equations:
@@ -216,14 +216,14 @@ def _beside(of_torque: Sequence[Block], of_power: Sequence[Block], pattern: np.n
     nothing = [np.zeros((0, int(row.sum()) + 1)) for row in pattern]
     torque = {(block.run, block.start): block for block in of_torque}
     power = {(block.run, block.start): block for block in of_power}
-    found = []
+    blocks = []
     for place, block in sorted({**power, **torque}.items()):
         mine, own = torque.get(place), power.get(place)
         rows = [*(mine.rows[:joints] if mine else [0] * joints), own.rows[0] if own else 0]
         factors = (*(mine.factors if mine else nothing)[:joints], *(own.factors if own else nothing[joints:]))
         if any(rows):
-            found.append(replace(block, rows=np.array(rows), factors=factors))
-    return found
+            blocks.append(replace(block, rows=np.array(rows), factors=factors))
+    return blocks
 
 
 def free_terms(stack: Stack) -> Terms:
@@ -252,12 +252,12 @@ def fit_through_power(stack: Stack, motions: Sequence[Motion]) -> tuple[np.ndarr
         return power_rows(motion, [*line.carried, line.free], line.known)
 
     for _ in range(_STEPS):
-        blocks, found = estimate_one(motions, equations, terms, stack.prior_rows([*real, *free]))
-        torque_values[stack.real], power_values[~stack.fixed] = np.split(found.values, [len(real)])
-        if _converged(found.values, before, terms):
+        blocks, fitted = estimate_one(motions, equations, terms, stack.prior_rows([*real, *free]))
+        torque_values[stack.real], power_values[~stack.fixed] = np.split(fitted.values, [len(real)])
+        if _converged(fitted.values, before, terms):
             break
-        before = found.values
-    return torque_values, power_values, blocks, found
+        before = fitted.values
+    return torque_values, power_values, blocks, fitted
 
 
 def _alone(stack: Stack, motions: Sequence[Motion], known: ReducedTorque | None) -> np.ndarray:

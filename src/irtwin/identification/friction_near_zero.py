@@ -65,21 +65,21 @@ def with_friction_near_zero(
     tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
     every = part_read(measured)
     known = [joint.name in turning for joint in robot.joints]
-    found, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
-    if any(turn for both in found for turn, _ in both):
-        tried = [_around([turn for turn, _ in both if turn]) for both in found]
-        found, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
+    dry, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
+    if any(turn for both in dry for turn, _ in both):
+        tried = [_around([turn for turn, _ in both if turn]) for both in dry]
+        dry, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
     if every > 1:  # a part of the log chose, all of it says whether that is so
-        tried = [[turn] if turn else [] for (turn, _), *_ in found]
-        found, blocks = _found(stack, open_shapes, (), measured, tried, known)
+        tried = [[turn] if turn else [] for (turn, _), *_ in dry]
+        dry, blocks = _found(stack, open_shapes, (), measured, tried, known)
     turned = replace(
-        plain, joints=tuple(_with(joint, likelier) for joint, (likelier, *_) in zip(plain.joints, found, strict=True))
+        plain, joints=tuple(_with(joint, likelier) for joint, (likelier, *_) in zip(plain.joints, dry, strict=True))
     )
     return turned, ReducedTorque(blocks, _places(stack, open_shapes, tried, turned))
 
 
-def _with(joint: Joint, found: Dry) -> Joint:
-    turn, friction = found
+def _with(joint: Joint, dry: Dry) -> Joint:
+    turn, friction = dry
     width, exponent = turn or (None, None)
     return replace(joint, friction_width=width, friction_exponent=exponent, dry_friction=friction)
 
@@ -109,9 +109,9 @@ def _found(
     return best, blocks
 
 
-def _around(found: Sequence[Turn]) -> list[Turn]:
+def _around(turns: Sequence[Turn]) -> list[Turn]:
     near = [
-        (min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for width, exponent in found for a, b in _FINER
+        (min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for width, exponent in turns for a, b in _FINER
     ]
     return list(dict.fromkeys(near))
 
@@ -145,7 +145,7 @@ def _reduced(
         assert motion.torque is not None
         own = stack.sparse_by_joint(motion)
         shapes, bent = (
-            [sample for one in some for sample in one.samples(robot, motion, None)] for some in (open_shapes, laws)
+            [sample for shape in some for sample in shape.samples(robot, motion, None)] for some in (open_shapes, laws)
         )
         columns = [  # single columns take ten times as long to filter
             [*some, side_by_side([*of_joint(shapes, k), *_friction(motion.dq[:, k], tried[k]), *of_joint(bent, k)])]
@@ -161,7 +161,7 @@ def _places(
     stack: Stack, open_shapes: Sequence[JointEffect], tried: Sequence[Sequence[Turn]], turned: Robot
 ) -> list[dict[Column, int]]:
     """Return where in each joint's equations columns stand that the `turned` robot has, too."""
-    found = []
+    by_joint = []
     same = {effect: _alike(effect, stack.robot, turned) for effect in (*stack.effects, *open_shapes)}
     for joint, used, turns in zip(turned.joints, stack.pattern, tried, strict=True):
         own = [stack.torque_terms[k] for k in np.flatnonzero(used)]
@@ -170,16 +170,16 @@ def _places(
         width, exponent = joint.friction_width, joint.friction_exponent
         (dry,) = CoulombFriction().joint_terms(joint)
         turn = 0 if width is None or exponent is None else 1 + list(turns).index((width, exponent))
-        found.append({**places, column(CoulombFriction(), dry): len(own) + turn})
-    return found
+        by_joint.append({**places, column(CoulombFriction(), dry): len(own) + turn})
+    return by_joint
 
 
-def _alike(effect: Effect, one: Robot, other: Robot) -> bool:
+def _alike(effect: Effect, first: Robot, second: Robot) -> bool:
     """Return whether an effect's columns are the same of two robots, whose friction turns otherwise."""
-    shape = (16, len(one.joints))
+    shape = (16, len(first.joints))
     q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, *shape))
     slow = Motion(np.arange(16.0), q, SLOW * dq, ddq, run="slow", temperature=np.full(shape, 50.0))
-    return np.array_equal(effect.columns(one, slow), effect.columns(other, slow))
+    return np.array_equal(effect.columns(first, slow), effect.columns(second, slow))
 
 
 def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
@@ -214,7 +214,7 @@ def _best(
 
     def beside(columns: Sequence[int], blocks: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         every = [*columns, *range(own, end), -1]
-        return _left(triangle(whole[:, every]), [one[:, every] for one in blocks], len(columns))
+        return _left(triangle(whole[:, every]), [block[:, every] for block in blocks], len(columns))
 
     _, friction = beside(list(sure), [])
     alone = beside(range(own), factors)[0]
@@ -232,7 +232,7 @@ def _best(
 def _weighted(factors: Sequence[np.ndarray], rows: np.ndarray, own: int) -> list[np.ndarray]:
     """Return blocks' factors, weighted by how little the first `own` columns and sharp friction leave of each."""
     known = [factor[:, [*range(own + 1), -1]] for factor in factors]
-    weights, size = np.ones(len(rows)), np.linalg.norm([np.linalg.norm(one[:, -1]) for one in known])
+    weights, size = np.ones(len(rows)), np.linalg.norm([np.linalg.norm(factor[:, -1]) for factor in known])
     for _ in range(_REWEIGHTINGS):
         counting = [np.sqrt(weight) * factor for weight, factor in zip(weights, known, strict=True)]
         left = _left(triangle(np.concatenate(counting)), known, own)[0][0]
@@ -268,6 +268,6 @@ def _fitted(columns: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the least coefficients (K, S) by which columns (r, K) explain others (r, S)."""
     size = np.linalg.norm(columns, axis=0)
     shown = size > _NOTHING * size.max(initial=0.0)
-    found = np.zeros((columns.shape[1], others.shape[1]))
-    found[shown] = np.linalg.lstsq(columns[:, shown] / size[shown], others, rcond=_NOTHING)[0] / size[shown, None]
-    return found
+    solution = np.zeros((columns.shape[1], others.shape[1]))
+    solution[shown] = np.linalg.lstsq(columns[:, shown] / size[shown], others, rcond=_NOTHING)[0] / size[shown, None]
+    return solution

@@ -81,10 +81,10 @@ def _limits(robot: str, joint: Joint) -> tuple[float, float, float, float]:
     acceleration = joint.velocity / FULL_SPEED_AFTER if joint.acceleration is None else joint.acceleration
     if not (np.isfinite(acceleration) and acceleration > 0):
         raise InputError(f"{where} has the acceleration limit {acceleration:g}; it must be positive")
-    for what, size in (("range", upper - lower), ("speed limit", joint.velocity), ("acceleration limit", acceleration)):
+    for kind, size in (("range", upper - lower), ("speed limit", joint.velocity), ("acceleration limit", acceleration)):
         if not _SMALLEST <= size <= _LARGEST / FULL_SPEED_AFTER:
             raise InputError(
-                f"{where} has a {what} of {size:g}, which is not plausible; correct its <limit> in the URDF"
+                f"{where} has a {kind} of {size:g}, which is not plausible; correct its <limit> in the URDF"
             )
     return lower, upper, joint.velocity, acceleration
 

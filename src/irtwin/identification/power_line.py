@@ -61,12 +61,12 @@ def carried(rows: Sequence[np.ndarray], slope: np.ndarray, pattern: np.ndarray, 
     `slope` (N, n) of power over each joint's torque; `pattern` (n, K) which columns the rows have; `real` (K,).
     """
     place = np.cumsum(real) - 1
-    found = np.zeros((int(real.sum()), len(slope)))
+    power = np.zeros((int(real.sum()), len(slope)))
     for own, rise, used in zip(rows, np.ascontiguousarray(slope.T), pattern, strict=True):
         for column, k in zip(own.T, np.flatnonzero(used), strict=True):
             if real[k]:
-                found[place[k]] += rise * column
-    return found.T
+                power[place[k]] += rise * column
+    return power.T
 
 
 def power_slope(stack: Stack, motion: Motion, torque: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -165,7 +165,7 @@ class _Yard:
     def _torque(self, motions: Sequence[Motion]) -> np.ndarray:
         """Return the greatest torque of each joint, (n,), that the described bodies need at some samples."""
         some = [motion.rows(slice(None, None, max(1, len(motion.time) // _CHECKED))) for motion in motions]
-        torque = [inverse_dynamics(self.robot.model, one.q, one.dq, one.ddq) for one in some]
+        torque = [inverse_dynamics(self.robot.model, motion.q, motion.dq, motion.ddq) for motion in some]
         return np.asarray(np.abs(np.concatenate(torque)).max(axis=0))
 
     def within(self, seconds: float) -> bool:

@@ -42,21 +42,21 @@ def telling(hear: Callable[[str], None] | None) -> Iterator[None]:
 
 def tell(line: str) -> None:
     """Tell a line."""
-    if (one := _listener.get()) is not None:
-        one.last = time.monotonic()
-        one.hear(line)
+    if (listener := _listener.get()) is not None:
+        listener.last = time.monotonic()
+        listener.hear(line)
 
 
 def tell_step(line: str) -> None:
     """Tell a line where the last was some seconds ago: it may be called at each step."""
-    one = _listener.get()
-    if one is not None and time.monotonic() - one.last >= _EVERY and not in_copy():
+    listener = _listener.get()
+    if listener is not None and time.monotonic() - listener.last >= _EVERY and not in_copy():
         tell(line)
 
 
 def track(items: Iterable[Item], line: str | Callable[[Item], str]) -> Iterator[Item]:
     """Yield items; tell of each, as `tell_step` does, the line, which it is, and of how many."""
     every = list(items)
-    for number, one in enumerate(every, start=1):
-        tell_step(f"  {line if isinstance(line, str) else line(one)}, {number} of {len(every)}")
-        yield one
+    for number, item in enumerate(every, start=1):
+        tell_step(f"  {line if isinstance(line, str) else line(item)}, {number} of {len(every)}")
+        yield item

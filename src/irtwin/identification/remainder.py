@@ -73,8 +73,8 @@ def of_pauses(left: Sequence[np.ndarray]) -> float:
     """
     if len(left) < _FEWEST:
         return 0.0
-    rows = np.array([len(one) for one in left])
-    return _grown([one.mean() ** 2 - one.var() / len(one) for one in left], rows**2)
+    rows = np.array([len(samples) for samples in left])
+    return _grown([samples.mean() ** 2 - samples.var() / len(samples) for samples in left], rows**2)
 
 
 def of_rest(left: Sequence[np.ndarray]) -> float:
@@ -82,7 +82,7 @@ def of_rest(left: Sequence[np.ndarray]) -> float:
 
     That is what is left of their mean: each pose stands for itself, and is off by what dry friction holds there.
     """
-    rows = np.array([len(one) for one in left], dtype=float)
+    rows = np.array([len(samples) for samples in left], dtype=float)
     return of_pauses(left) * math.sqrt((rows**2).sum()) / max(float(rows.sum()), 1.0)
 
 
@@ -97,8 +97,8 @@ def _groups(blocks: Sequence[Block]) -> list[list[Block]]:
     runs = list(dict.fromkeys(block.run for block in blocks))
     parts = [[block for block in blocks if block.run == run] for run in runs]
     if len(parts) < _FEWEST:
-        each = -(-_FEWEST // max(len(parts), 1))
-        parts = [list(own) for part in parts for own in _cut(part, each)]
+        pieces = -(-_FEWEST // max(len(parts), 1))
+        parts = [list(own) for part in parts for own in _cut(part, pieces)]
     return [[block for part in some for block in part] for some in _cut(parts, _MOST)]
 
 

@@ -39,12 +39,12 @@ def robust_weights(
 
 def odd_stretches(blocks: Sequence[Block], weights: np.ndarray, joints: Sequence[str]) -> tuple[OddStretch, ...]:
     """Return the stretches of blocks (B,) that count for little, `weights` (B, n), at one of n joints: least first."""
-    found = []
+    spans = []
     marked = zip(blocks, weights, strict=True)
     for (run, odd), group in groupby(marked, key=lambda pair: (pair[0].run, bool((pair[1] < _ODD).any()))):
         if odd:
             own = list(group)
             least = np.min([weight for _, weight in own], axis=0)
             named = tuple(name for name, weight in zip(joints, least, strict=True) if weight < _ODD)
-            found.append((least.min(), OddStretch(run=run, start=own[0][0].start, stop=own[-1][0].stop, joints=named)))
-    return tuple(stretch for _, stretch in sorted(found, key=lambda pair: pair[0]))
+            spans.append((least.min(), OddStretch(run=run, start=own[0][0].start, stop=own[-1][0].stop, joints=named)))
+    return tuple(stretch for _, stretch in sorted(spans, key=lambda pair: pair[0]))

@@ -16,7 +16,7 @@ from irtwin.identification.uncertainty import covariance
 _FEWEST = 4  # runs: fewer tell no scatter
 
 
-def with_run_scatter(stack: Stack, blocks: Sequence[Block], found: Estimate) -> Estimate:
+def with_run_scatter(stack: Stack, blocks: Sequence[Block], fit: Estimate) -> Estimate:
     """Return the estimate of coefficients of torque (K,), with friction as unsure as that of any one run.
 
     `blocks`: of torque. Scores that scatter more between runs than between stretches of time, in the mean over joints
@@ -25,17 +25,17 @@ def with_run_scatter(stack: Stack, blocks: Sequence[Block], found: Estimate) -> 
     """
     names = [(effect.id, term.name) if effect.family == "friction" else None for effect, term in stack.torque_terms]
     where = np.array([name is not None for name in names])
-    alone = [_alone(block, stack.pattern, found.values, where) for block in blocks]
+    alone = [_alone(block, stack.pattern, fit.values, where) for block in blocks]
     by_run = [_joined(list(own)) for _, own in groupby(alone, key=lambda block: block.run)]
     if len(by_run) < _FEWEST or not where.any():
-        return found
+        return fit
     pattern, spread = stack.pattern[:, where], np.array([term.spread for _, term in stack.torque_terms])
     factors = [combine([block.factors[e] for block in alone], used) for e, used in enumerate(pattern)]
     prior = stack.prior_rows(stack.torque_terms)
     known = (np.eye(len(names)) if prior is None else prior)[:, where]
 
     def variances(parts: Sequence[Block]) -> np.ndarray:
-        return np.diag(covariance(parts, pattern, factors, found.values[where], found.noise, spread[where], known)[0])
+        return np.diag(covariance(parts, pattern, factors, fit.values[where], fit.noise, spread[where], known)[0])
 
     between, within = variances(by_run), variances(alone)
     scatter, own_names = np.zeros(int(where.sum())), [name for name in names if name is not None]
@@ -43,9 +43,9 @@ def with_run_scatter(stack: Stack, blocks: Sequence[Block], found: Estimate) -> 
         own = [place for place, other in enumerate(own_names) if other == name]
         more = max(float(np.mean(between[own] / within[own])) - 1.0, 0.0)
         scatter[own] = len(by_run) * more * within[own]
-    grown = found.covariance.copy()
+    grown = fit.covariance.copy()
     grown[where, where] += scatter
-    return replace(found, covariance=grown)
+    return replace(fit, covariance=grown)
 
 
 def _alone(block: Block, pattern: np.ndarray, values: np.ndarray, where: np.ndarray) -> Block:

@@ -49,9 +49,9 @@ def torque_constants(robot: Robot, motions: Sequence[Motion]) -> TorqueConstants
     ]
     wide = resistance or common[2].spread
     heat = [Term("R", "ohm", joint=joint.name, expected=resistance, spread=wide, lowest=0.0) for joint in joints]
-    found = _balance(motions, [standby, *own, *heat], pooled=False)
+    fit = _balance(motions, [standby, *own, *heat], pooled=False)
     mechanical = next(effect for effect in catalogue().values() if effect.carries_torque)
-    kept = found.of(range(1, 1 + len(joints)))
+    kept = fit.of(range(1, 1 + len(joints)))
     return TorqueConstants(kept.values, tuple((mechanical, term) for term in own), kept)
 
 
@@ -63,13 +63,13 @@ def torque_from_current(robot: Robot, motions: Sequence[Motion]) -> tuple[Robot,
     telling = [motion for motion in motions if motion.current is not None and motion.power is not None]
     if not telling or any(motion.torque is not None for motion in motions):
         return robot, list(motions), None
-    found = torque_constants(robot, telling)
-    both = zip(robot.joints, found.constants.tolist(), strict=True)
+    balance = torque_constants(robot, telling)
+    both = zip(robot.joints, balance.constants.tolist(), strict=True)
     known = [
-        motion if motion.current is None else replace(motion, torque=motion.current * found.constants)
+        motion if motion.current is None else replace(motion, torque=motion.current * balance.constants)
         for motion in motions
     ]
-    return replace(robot, joints=tuple(replace(joint, torque_constant=value) for joint, value in both)), known, found
+    return replace(robot, joints=tuple(replace(joint, torque_constant=value) for joint, value in both)), known, balance
 
 
 def _balance(motions: Sequence[Motion], terms: Sequence[Term], *, pooled: bool) -> Estimate:

@@ -118,8 +118,8 @@ def _send(to: Connection, work: Callable[[], Sequence[Made]]) -> None:
         to.send(error)
         return
     to.send(len(made))
-    for one in made:  # one by one: together they would take their memory twice
-        to.send(one)
+    for result in made:  # one by one: together they would take their memory twice
+        to.send(result)
 
 
 @contextmanager

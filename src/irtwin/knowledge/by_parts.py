@@ -106,16 +106,18 @@ def _conclude(ontology: Ontology, regions: list[Region]) -> Iterator[tuple[Regio
 def _refuse_crossing(ontology: Ontology, statements: Iterable[Triple]) -> None:
     """Raise Joined for a statement that concerns all parts."""
     properties, classes = ontology.models
-    for it in statements:
-        is_of_models = it.predicate in properties or (it.predicate == TYPE and it.object in classes)
-        if is_of_models or it.subject in ontology.terms:
-            raise Joined(say(it))
+    for statement in statements:
+        is_of_models = statement.predicate in properties or (
+            statement.predicate == TYPE and statement.object in classes
+        )
+        if is_of_models or statement.subject in ontology.terms:
+            raise Joined(say(statement))
 
 
 @lru_cache(maxsize=1)  # what was tried on a copy of the graph is done to the graph
 def _beside(ontology: Ontology, asserted: frozenset[Triple]) -> Conclusions:
     """Conclude by what the ontology has told once. Raises Equality where names are equal or are said to differ."""
-    if any(it.predicate in EQUALITIES for it in asserted):
+    if any(triple.predicate in EQUALITIES for triple in asserted):
         raise Equality
     closure = FactsClosure(ontology.schema, set(asserted))
     return by_rules(ontology, chain(ontology.triples, ontology.schema.kept, asserted), closure)

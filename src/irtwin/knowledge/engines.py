@@ -39,8 +39,8 @@ def inferred(engine: str, triples: Collection[Triple]) -> set[Triple]:
         from irtwin.knowledge.owl_rl import by_owlrl
 
         return by_owlrl.inferred(triples)
-    found, closure = _closed(engine, triples)
-    return found.union(closure.inferred()).difference(triples)
+    classified, closure = _closed(engine, triples)
+    return classified.union(closure.inferred()).difference(triples)
 
 
 def worth_keeping(engine: str, triples: Collection[Triple]) -> set[Triple]:
@@ -49,8 +49,8 @@ def worth_keeping(engine: str, triples: Collection[Triple]) -> set[Triple]:
         from irtwin.knowledge.owl_rl import by_owlrl
 
         return by_owlrl.worth_keeping(triples)
-    found, closure = _closed(engine, triples)
-    return closure.worth_keeping().union(filter(says_something, found)).difference(triples)
+    classified, closure = _closed(engine, triples)
+    return closure.worth_keeping().union(filter(says_something, classified)).difference(triples)
 
 
 def close_file(source: Path, out: Path, engine: str = NATIVE) -> int:
@@ -64,19 +64,19 @@ def close_file(source: Path, out: Path, engine: str = NATIVE) -> int:
     check_place(out)
     given = dict.fromkeys(read_triples(source))
     check(engine, len(given))
-    found = sorted(inferred(engine, given), key=str)
+    conclusions = sorted(inferred(engine, given), key=str)
     prefixes = PREFIXES if form in (RdfFormat.TURTLE, RdfFormat.TRIG, RdfFormat.RDF_XML) else None
     content = io.BytesIO()
-    serialize([*given, *found], content, form, prefixes=prefixes)
+    serialize([*given, *conclusions], content, form, prefixes=prefixes)
     write(out, content.getvalue())
-    return len(found)
+    return len(conclusions)
 
 
 def _closed(engine: str, triples: Collection[Triple]) -> tuple[set[Triple], Closure]:
     """Return what HermiT finds, if it is asked, and the closure, which adds what lies above its results."""
-    found = set[Triple]()
+    classified = set[Triple]()
     if engine == HERMIT:
         from irtwin.knowledge import owl_dl  # owlready2 takes a while to import
 
-        found = owl_dl.classify(triples)
-    return found, Closure({*triples, *found})
+        classified = owl_dl.classify(triples)
+    return classified, Closure({*triples, *classified})

@@ -62,17 +62,17 @@ def sparql_fault(text: str) -> tuple[int, str] | None:
     try:
         Store().query(text, base_iri=ID, prefixes=PREFIXES)
     except SyntaxError as error:
-        said = _AT.fullmatch(in_words(error, text))
-        return (int(said[1]), f"column {said[2]}: {said[3]}") if said else (1, str(error))
+        match = _AT.fullmatch(in_words(error, text))
+        return (int(match[1]), f"column {match[2]}: {match[3]}") if match else (1, str(error))
     except RuntimeError:
         pass  # a function that only the workspace's store has
     try:
         refuse_service(text, ID)
     except InputError:
         lines = enumerate(text.splitlines(), 1)
-        found = ((line, said) for line, one in lines if (said := re.search("service", one, re.IGNORECASE)))
-        line, said = next(found)
-        return line, f"column {said.start() + 1}: SERVICE asks another server, which is not allowed here"
+        matches = ((line, match) for line, content in lines if (match := re.search("service", content, re.IGNORECASE)))
+        line, match = next(matches)
+        return line, f"column {match.start() + 1}: SERVICE asks another server, which is not allowed here"
     return None
 
 
@@ -88,8 +88,8 @@ def _check_rules(file: Resource) -> None:
         raise InputError(_with_line(file, str(error))) from error
     if not rules:
         is_swrl = file.name.endswith(".swrl.ttl")
-        what = "swrl:Imp; a rule is one" if is_swrl else "sh:rule; constraints belong into shapes/"
-        raise InputError(f"{file.path}: has no {what}")
+        lacking = "swrl:Imp; a rule is one" if is_swrl else "sh:rule; constraints belong into shapes/"
+        raise InputError(f"{file.path}: has no {lacking}")
     for rule in rules:
         _check_rule(file, rule)
 
@@ -99,12 +99,12 @@ def _check_rule(file: Resource, rule: Rule) -> None:
         raise InputError(f"{file.path}: a rule has no IRI; give its shape one, for conclusions to name it")
     line = _line_of(file, _end(rule.name))
 
-    def fault(what: str) -> InputError:
-        return InputError(f"{file.path}, line {line}: the rule {rule.label!r} {what}")
+    def fault(problem: str) -> InputError:
+        return InputError(f"{file.path}, line {line}: the rule {rule.label!r} {problem}")
 
-    said = sparql_fault(rule.construct)
-    if said is not None:
-        raise fault(f"is no SPARQL: {said[1].partition(': ')[2]}")
+    wrong = sparql_fault(rule.construct)
+    if wrong is not None:
+        raise fault(f"is no SPARQL: {wrong[1].partition(': ')[2]}")
     query = algebra(rule.construct)
     made = {term for pattern in query.template for term in pattern}
     if any(isinstance(term, rdflib.BNode) for term in made):
@@ -133,7 +133,7 @@ def _check_terms(resources: Resources) -> None:
     declared: set[Any] = set()
     kinds = {NamedNode(OWL + kind) for kind in ("Class", "ObjectProperty", "DatatypeProperty")}
     for module in resources.of("ontology"):
-        declared |= {it.subject for it in read_turtle(module.path) if it.object in kinds}
+        declared |= {triple.subject for triple in read_turtle(module.path) if triple.object in kinds}
     for file in resources.of("rules", ".swrl.ttl"):
         for triple in read_turtle(file.path) if file.is_extension else ():
             names = triple.predicate.value in _NAMES_A_TERM
@@ -169,7 +169,7 @@ def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> 
         tuple(report.value(result, SH[name]) for name in ("resultPath", "value", "resultMessage", "focusNode"))
         for result in report.objects(None, SH.result)
     ]
-    path, value, message, node = min(faults, key=lambda one: (one[0] is None, str(one)))
+    path, value, message, node = min(faults, key=lambda fault: (fault[0] is None, str(fault)))
     while isinstance(node, rdflib.BNode) and (above := next(shapes.subjects(None, node), None)) is not None:
         node = above
     written = f"sh:{_end(str(path))}" if isinstance(value, rdflib.Literal) else _end(str(node))
@@ -206,7 +206,7 @@ def _check_graphs(file: Resource, triples_map: TriplesMap) -> None:
 
 def _check_base(triples_map: TriplesMap) -> None:
     """Individuals lie below the workspace's base, whatever it is."""
-    for term in (triples_map.subject, *(one for pair in triples_map.properties for one in pair.objects)):
+    for term in (triples_map.subject, *(value for pair in triples_map.properties for value in pair.objects)):
         if isinstance(term, TermMap) and _start(term).startswith(ID):
             raise InputError(
                 f"{term.where}: individuals lie below the workspace's base, which may be another: leave out {ID}"
@@ -239,7 +239,8 @@ _CHECKS: dict[str, Callable[[Resource], None]] = {
 
 def _prefixed(shapes: rdflib.Graph, text: str) -> str:
     undeclared = [
-        (shapes.value(one, SH.prefix), shapes.value(one, SH.namespace)) for one in shapes.objects(None, SH.declare)
+        (shapes.value(declaration, SH.prefix), shapes.value(declaration, SH.namespace))
+        for declaration in shapes.objects(None, SH.declare)
     ]
     return "".join(f"PREFIX {prefix}: <{space}>\n" for prefix, space in undeclared) + text
 

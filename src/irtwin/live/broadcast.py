@@ -57,7 +57,7 @@ class Broadcast:
     def __enter__(self) -> Broadcast:
         """Begin to listen."""
         self._listening = _listening(self._path)
-        self._threads = [threading.Thread(target=each, daemon=True) for each in (self._admit, self._send)]
+        self._threads = [threading.Thread(target=work, daemon=True) for work in (self._admit, self._send)]
         for thread in self._threads:
             thread.start()
         return self
@@ -85,9 +85,9 @@ class Broadcast:
 
     def stretches(self, robot_id: str, stretches: Sequence[WatchedStretch]) -> None:
         """Tell what the twin says of a while ago: times, s since 1970, and power, W."""
-        for one in stretches:
-            new = slice(0 if one.begins else 1, None)
-            times, power = _rounded(one.motion.time[new]), _rounded(one.power[new])
+        for stretch in stretches:
+            new = slice(0 if stretch.begins else 1, None)
+            times, power = _rounded(stretch.motion.time[new]), _rounded(stretch.power[new])
             self._recent.add(robot_id, "modelled", times, power)
             self._tell(robot_id, _encoded({"robot": robot_id, "modelled": {"time": times, "power": power}}))
 
@@ -138,7 +138,7 @@ class Broadcast:
                 self._give(robot_id, _encoded(_told(line)) if isinstance(line, State) else line)
 
     def _give(self, robot_id: str, line: bytes) -> None:
-        for client in [one for one in self._clients if one.robot_id == robot_id]:
+        for client in [connected for connected in self._clients if connected.robot_id == robot_id]:
             client.held += line
             if not client.begun:
                 continue
@@ -186,8 +186,8 @@ def _told(state: State) -> dict[str, object]:
     }
 
 
-def _encoded(said: dict[str, object]) -> bytes:
-    return json.dumps(said, separators=(",", ":")).encode() + b"\n"
+def _encoded(message: dict[str, object]) -> bytes:
+    return json.dumps(message, separators=(",", ":")).encode() + b"\n"
 
 
 def _rounded(values: np.ndarray) -> list[float]:

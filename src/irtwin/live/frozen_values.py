@@ -44,10 +44,10 @@ class FrozenValues:
         return None
 
 
-def _same(one: tuple[tuple[float, ...], ...], other: tuple[tuple[float, ...], ...]) -> bool:
+def _same(first: tuple[tuple[float, ...], ...], second: tuple[tuple[float, ...], ...]) -> bool:
     """Whether all values are the same; what was not said, NaN, is the same as itself."""
     return all(
         a == b or (a != a and b != b)
-        for ours, theirs in zip(one, other, strict=True)
+        for ours, theirs in zip(first, second, strict=True)
         for a, b in zip(ours, theirs, strict=True)
     )

@@ -71,8 +71,8 @@ def state_of(robot_id: str, joints: int, time: float, values: Mapping[str, tuple
         if not all(-greatest <= number <= greatest for number in numbers):  # nor NaN
             raise InputError(f"{where}: {STREAMED[field].label} is not a number within {greatest:g}")
     absent = {field: (math.nan,) * (joints if channel.per_joint else 1) for field, channel in STREAMED.items()}
-    said = tuple((absent | dict(values)).values())
-    return State(robot_id, checked_time(time, f"{where}: timestamp"), said)
+    filled = tuple((absent | dict(values)).values())
+    return State(robot_id, checked_time(time, f"{where}: timestamp"), filled)
 
 
 class StateReader:
@@ -214,7 +214,7 @@ def _number(message: Mapping[str, Any], name: str) -> float:
 
 def _centre(message: Mapping[str, Any]) -> tuple[float, float, float]:
     centre = message["payload_com"]
-    if not isinstance(centre, list) or len(centre) != 3 or not all(_is_number(it, 100.0) for it in centre):
+    if not isinstance(centre, list) or len(centre) != 3 or not all(_is_number(number, 100.0) for number in centre):
         raise InputError("`payload_com` must have 3 numbers within 100: m in the frame of the flange")
     x, y, z = map(float, centre)
     return x, y, z
@@ -232,6 +232,10 @@ def _values(message: Mapping[str, Any], channel: Channel, order: Sequence[int]) 
         return (_number(message, name),)
     values = message[name]
     most = _GREATEST[name]
-    if not isinstance(values, list) or len(values) != len(order) or not all(_is_number(it, most) for it in values):
+    if (
+        not isinstance(values, list)
+        or len(values) != len(order)
+        or not all(_is_number(number, most) for number in values)
+    ):
         raise InputError(f"`{name}` must have {len(order)} numbers within {most:g}, one for each joint")
     return tuple([float(values[place]) for place in order])

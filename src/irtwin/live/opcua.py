@@ -198,10 +198,10 @@ class OpcUa:
 
     def _state(self, places: list[_Place], values: list[ua.DataValue], stamp: float) -> State:
         """Return the state of values. Raises InputError where a value is none of a robot."""
-        said: dict[str, tuple[float, ...]] = {}
+        readings: dict[str, tuple[float, ...]] = {}
         for place, value in zip(places, values, strict=True):
-            said[_FIELDS[place.key]] = (*said.get(_FIELDS[place.key], ()), self._number(place, value))
-        return state_of(self.robot_id, len(self._robot.joints), stamp, said, where=self.address)
+            readings[_FIELDS[place.key]] = (*readings.get(_FIELDS[place.key], ()), self._number(place, value))
+        return state_of(self.robot_id, len(self._robot.joints), stamp, readings, where=self.address)
 
     def _number(self, place: _Place, value: ua.DataValue) -> float:
         reading = None if value.Value is None else value.Value.Value
@@ -218,15 +218,15 @@ class OpcUa:
     @asynccontextmanager
     async def _places(self) -> AsyncIterator[tuple[Client, list[_Place]]]:
         """Connect, and give what is to be read. Raises InputError where a node, or its unit, is not known."""
-        client, said = Client(self.address, timeout=_PATIENCE), self._said
-        if "user" in said:
-            client.set_user(said["user"])
+        client, settings = Client(self.address, timeout=_PATIENCE), self._said
+        if "user" in settings:
+            client.set_user(settings["user"])
             client.set_password(os.environ.get("IRTWIN_OPCUA_PASSWORD", ""))
-        if "certificate" in said:
-            files = said["certificate"], said.get("key", ""), None, said.get("server_certificate")
+        if "certificate" in settings:
+            files = settings["certificate"], settings.get("key", ""), None, settings.get("server_certificate")
             await client.set_security(SecurityPolicyBasic256Sha256, *files)
         async with client:
-            nodes = {key: [client.get_node(node) for node in said[key]] for key in _FIELDS if key in said}
+            nodes = {key: [client.get_node(node) for node in settings[key]] for key in _FIELDS if key in settings}
             if "position" not in nodes:
                 nodes |= await self._of_axes(client)
             yield (
@@ -242,7 +242,12 @@ class OpcUa:
         except (ValueError, ua.UaStatusCodeError):
             raise InputError(f"{self.address}: it has no robots by OPC 40010; name position by --nodes FILE") from None
         folders = [await _child(system, f"{robotics}:MotionDevices") for system in systems]
-        devices = {(await one.read_browse_name()).Name: one for it in folders if it for one in await it.get_children()}
+        devices = {
+            (await device.read_browse_name()).Name: device
+            for folder in folders
+            if folder
+            for device in await folder.get_children()
+        }
         name = self._said.get("device", next(iter(devices)) if len(devices) == 1 else None)
         if name not in devices:
             raise InputError(f"{self.address}: its motion devices are {', '.join(devices)}; say device in --nodes FILE")
@@ -258,7 +263,7 @@ class OpcUa:
         return {
             key: all_there
             for key, of_key in nodes.items()
-            if len(all_there := [it for it in of_key if it]) == len(axes)
+            if len(all_there := [node for node in of_key if node]) == len(axes)
         }
 
     async def _place(self, key: str, joint: int, node: Node) -> _Place:
@@ -319,9 +324,9 @@ def _read_file(file: Path | None, joints: int) -> dict[str, Any]:
     return settings
 
 
-def _node_ids(file: Path, key: str, said: Any, joints: int | None) -> list[ua.NodeId]:
-    texts = said if joints is not None else [said]
-    if not isinstance(texts, list) or len(texts) != (joints or 1) or not all(isinstance(it, str) for it in texts):
+def _node_ids(file: Path, key: str, given: Any, joints: int | None) -> list[ua.NodeId]:
+    texts = given if joints is not None else [given]
+    if not isinstance(texts, list) or len(texts) != (joints or 1) or not all(isinstance(text, str) for text in texts):
         raise InputError(f"{file}: {key} should be text{'' if joints is None else f' for each of {joints} joints'}")
     try:
         return [ua.NodeId.from_string(text) for text in texts]

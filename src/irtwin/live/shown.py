@@ -62,7 +62,7 @@ class ShownRuns:
 
     def mapped(self, run_id: str, tables: Tables) -> set[Quad]:
         """Return the quads of the rows of a run that is over, and what follows from them."""
-        quads = {quad for it in tables.items() for quad in self.mapper.quads(*it)}
+        quads = {quad for table in tables.items() for quad in self.mapper.quads(*table)}
         quads |= self._conclusions(quads, self._rules + self._rules_of_runs)
         return quads | self.kinds(run_id, quads)
 
@@ -74,7 +74,7 @@ class ShownRuns:
             concluded = FactsClosure(ontology.schema, {quad.triple for quad in quads}).worth_keeping()
         except (Contradiction, Equality):  # told by `irtwin run`, which sets aside what clashes
             return set()
-        return set(in_graph((it for it in concluded if run in (it.subject, it.object)), GRAPH_OWL_RL))
+        return set(in_graph((triple for triple in concluded if run in (triple.subject, triple.object)), GRAPH_OWL_RL))
 
     def alarms(self, quads: Iterable[Quad]) -> set[Quad]:
         """Return what the rules of `rules/live_rules.ttl` conclude from a run's excursions or state among the quads."""

@@ -87,7 +87,7 @@ def watch(
     ):
         if robot is None:
             reader = StateReader(twin.robots.joints, twin.robots.names)
-            _read(lambda it: feed(reader.states(it), twin.receive, refusals.refuse), port, twin, done, announce)
+            _read(lambda stream: feed(reader.states(stream), twin.receive, refusals.refuse), port, twin, done, announce)
         else:
             robot_id = find_robot(place, robot)
             described = load_robot(place, robot_id)

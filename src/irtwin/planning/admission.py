@@ -46,7 +46,7 @@ def _check_drives(twin: Twin, motion: Motion, file: Path) -> None:
     torque = twin.joint_torque(motion)
     for number, joint in enumerate(twin.robot.joints):
         force = "N" if joint.kind == "prismatic" else "N m"
-        for what, values, limit, room, unit in (
+        for verb, values, limit, room, unit in (
             ("moves at", motion.dq[:, number], joint.velocity, _SPEED, f"{joint.unit}/s"),
             ("takes", torque[:, number], joint.effort, _TORQUE, force),
         ):
@@ -54,6 +54,6 @@ def _check_drives(twin: Twin, motion: Motion, file: Path) -> None:
             if beyond.any():
                 row = int(np.argmax(beyond))
                 raise InputError(
-                    f"{file}: at {motion.time[row]:.3f} s {joint.name} {what} {abs(values[row]):.4g} {unit}, above its "
+                    f"{file}: at {motion.time[row]:.3f} s {joint.name} {verb} {abs(values[row]):.4g} {unit}, above its "
                     f"limit of {limit:.4g} {unit}; give a slower motion"
                 )

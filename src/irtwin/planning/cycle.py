@@ -60,7 +60,7 @@ class CycleTimes:
     @property
     def fastest(self) -> float:
         """The least cycle time, s."""
-        return float(sum(each[0] for each in self._durations) + self._least.sum())
+        return float(sum(durations[0] for durations in self._durations) + self._least.sum())
 
     @property
     def cheapest(self) -> float:
@@ -79,14 +79,17 @@ class CycleTimes:
         own = self._programme.seconds[self._moves]
         timings = [self._chosen(price), *([own] if own.sum() <= room else [])]
         motions = [(factors, self._programme.retimed(factors)) for factors in self._with_pauses(timings, seconds)]
-        factors, motion = min(motions, key=lambda each: self._twin.energy(each[1]))
+        factors, motion = min(motions, key=lambda pair: self._twin.energy(pair[1]))
         saved = saving(self._twin, motion, self._programme.motion)
         return Cycle(factors, motion, cost(self._twin, [motion]).energy, saved)
 
     def curve(self) -> list[Cycle]:
         """Return the timings that take least from the fastest cycle to beyond the cheapest."""
         today = float(self._programme.seconds.sum())
-        return [self.in_time(each) for each in np.geomspace(self.fastest, _LONGER * max(today, self.cheapest), _POINTS)]
+        return [
+            self.in_time(seconds)
+            for seconds in np.geomspace(self.fastest, _LONGER * max(today, self.cheapest), _POINTS)
+        ]
 
     def _of_move(self, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the durations that a move may have, (D,) s rising, and the energy that each takes, (D,) J."""
@@ -110,8 +113,8 @@ class CycleTimes:
 
     def _chosen(self, price: float) -> np.ndarray:
         """Return the moves' durations, (M,) s, that take least where each second costs so many watts besides."""
-        each = zip(self._durations, self._energies, strict=True)
-        return np.array([seconds[np.argmin(energy + price * seconds)] for seconds, energy in each])
+        moves = zip(self._durations, self._energies, strict=True)
+        return np.array([seconds[np.argmin(energy + price * seconds)] for seconds, energy in moves])
 
     def _with_pauses(self, timings: Sequence[np.ndarray], seconds: float) -> Iterator[np.ndarray]:
         """Yield the factors (S,) of timings of the moves, (M,) s each, in a cycle of so many `seconds`.

@@ -153,7 +153,7 @@ class _OnPath:
         taken = float(np.trapezoid(self._power(self._time, *states[:3]), self._time))
         passed = [np.maximum(share - _SHARE, 0) for share in shares(states, self._limits, self._torque).values()]
         backward = np.minimum(ds, 0) * self._time[-1]
-        return taken + stiffness * float(sum((each**2).sum() for each in (*passed, backward))) / len(self._time)
+        return taken + stiffness * float(sum((over**2).sum() for over in (*passed, backward))) / len(self._time)
 
 
 class _Search:

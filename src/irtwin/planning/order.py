@@ -56,7 +56,7 @@ def _improved(cost: np.ndarray, order: list[int]) -> list[int]:
             for start in range(1, len(order) - size):
                 moved, rest = order[start : start + size], order[:start] + order[start + size :]
                 orders = [rest[:at] + moved + rest[at:] for at in range(1, len(rest))]
-                best = min(orders, key=lambda one: length(cost, one))
+                best = min(orders, key=lambda tour: length(cost, tour))
                 if length(cost, best) < length(cost, order) * (1 - 1e-12):
                     order, better = best, True
     return order

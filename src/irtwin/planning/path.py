@@ -107,9 +107,9 @@ def _search(
         setup.solve(max(0.01, until - monotonic()))
         if not setup.haveExactSolutionPath():
             break
-        found = setup.getSolutionPath()
-        setup.getPathSimplifier().ropeShortcutPath(found, _ROPE)
-        corners = np.array([[state[joint] for joint in range(n)] for state in found.getStates()])
+        solution = setup.getSolutionPath()
+        setup.getPathSimplifier().ropeShortcutPath(solution, _ROPE)
+        corners = np.array([[state[joint] for joint in range(n)] for state in solution.getStates()])
         if all(clear_between(collisions, a, b) for a, b in pairwise(corners)):
             return corners
         setup.clear()  # something thin was missed

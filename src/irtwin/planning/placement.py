@@ -74,10 +74,10 @@ class _Way:
         # joints step as they did, so that an arm of seven joints keeps to its way of going among many
         for pose, step in zip(self._poses, np.diff(self._q, axis=0, prepend=self._q[:1]), strict=True):
             target = pin.SE3(pose[:3, :3], pose[:3, 3] - shift)
-            found, meters, radians = nearest(self._twin.robot, target, q + step, self._lower, self._upper)
-            if max(meters, radians) > _REACHED or (rows and np.abs(found - q).max() > _JUMP):
+            reached, meters, radians = nearest(self._twin.robot, target, q + step, self._lower, self._upper)
+            if max(meters, radians) > _REACHED or (rows and np.abs(reached - q).max() > _JUMP):
                 return None
-            q = found
+            q = reached
             rows.append(q)
         moved = self._smooth(np.array(rows))
         return moved if not np.any(shift) or self._allowed(moved) else None
@@ -91,11 +91,11 @@ class _Way:
     def _allowed(self, moved: Motion) -> bool:
         """Return whether joints keep to their limits of speed and torque, or to what they do today."""
         joints = self._twin.robot.joints
-        for limit, one, other in (
+        for limit, values, today in (
             ("velocity", moved.dq, self._motion.dq),
             ("effort", self._twin.joint_torque(moved), self._twin.joint_torque(self._motion)),
         ):
-            most = np.maximum([getattr(joint, limit) for joint in joints], np.abs(other).max(axis=0))
-            if (np.abs(one) > most).any():
+            most = np.maximum([getattr(joint, limit) for joint in joints], np.abs(today).max(axis=0))
+            if (np.abs(values) > most).any():
                 return False
         return True

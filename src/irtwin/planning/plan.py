@@ -151,7 +151,9 @@ def _toured(twin: Twin, task: Task, rate: float) -> Plan:
             quick = leg(start, goal, False)
             cost[start, goal] = twin.energy(quick.motion) if task.least_energy else quick.seconds
     order, given = best_order(cost), list(range(last + 1))
-    made, was = (_joined([leg(*ends, task.least_energy) for ends in pairwise(one)], rate) for one in (order, given))
+    made, was = (
+        _joined([leg(*ends, task.least_energy) for ends in pairwise(visits)], rate) for visits in (order, given)
+    )
     saved = saving(twin, made.motion, was.motion) if twin.knows_power else None
     tour = Tour(tuple(order[1:-1]), saved, was.seconds - made.seconds)
     return replace(made, price=price(twin, [made.motion]), tour=tour)
@@ -163,7 +165,7 @@ def _joined(legs: Sequence[Plan], rate: float) -> Plan:
     time = np.linspace(0.0, ends[-1], max(20, round(ends[-1] * rate)) + 1)
     own = np.concatenate([leg.motion.time + begin for leg, begin in zip(legs, ends, strict=False)])
     states = [np.concatenate([getattr(leg.motion, name) for leg in legs]) for name in ("q", "dq", "ddq")]
-    q, dq, ddq = (np.column_stack([np.interp(time, own, one) for one in values.T]) for values in states)
+    q, dq, ddq = (np.column_stack([np.interp(time, own, column) for column in values.T]) for values in states)
     return replace(
         legs[0],
         motion=replace(legs[0].motion, time=time, q=q, dq=dq, ddq=ddq),

@@ -56,7 +56,7 @@ def read_target(text: str, joints: int, option: str) -> np.ndarray | Pose:
 
 
 def joints_for(
-    robot: Robot, target: np.ndarray | Pose, collisions: CollisionModel, near: np.ndarray | None, what: str
+    robot: Robot, target: np.ndarray | Pose, collisions: CollisionModel, near: np.ndarray | None, label: str
 ) -> np.ndarray:
     """Return joint positions (n,) of a target within all limits, clear of all; of several those nearest to `near`.
 
@@ -64,14 +64,14 @@ def joints_for(
     which pair touches.
     """
     limits = JointLimits.of(robot)
-    solutions = [target] if isinstance(target, np.ndarray) else _solutions(robot, target, limits, near, what)
-    _check_limits(robot, solutions[0], what)
+    solutions = [target] if isinstance(target, np.ndarray) else _solutions(robot, target, limits, near, label)
+    _check_limits(robot, solutions[0], label)
     for q in solutions:
         if not collisions.touches(q):
             return q
     pair = collisions.meeting(solutions[0])
     assert pair is not None
-    raise InputError(f"{what} is in collision: {pair[0]} touches {pair[1]}; choose another one")
+    raise InputError(f"{label} is in collision: {pair[0]} touches {pair[1]}; choose another one")
 
 
 def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits) -> tuple[np.ndarray, float, float]:
@@ -79,25 +79,25 @@ def follow(robot: Robot, target: pin.SE3, start: np.ndarray, limits: JointLimits
     return nearest(robot, target, start, limits.lower + _SPACE, limits.upper - _SPACE)
 
 
-def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray | None, what: str) -> list[np.ndarray]:
+def _solutions(robot: Robot, pose: Pose, limits: JointLimits, near: np.ndarray | None, label: str) -> list[np.ndarray]:
     start = limits.centre if near is None else near
     random = np.random.default_rng(0).uniform(limits.lower, limits.upper, (_STARTS, len(start)))
     tries = [follow(robot, pose.placement, q, limits) for q in (start, *random)]
     solutions = [q for q, away, turned in tries if max(away, turned) < 1e-6]
     if not solutions:
-        _, away, turned = min(tries, key=lambda each: each[1] + _ANGLE * each[2])
+        _, away, turned = min(tries, key=lambda attempt: attempt[1] + _ANGLE * attempt[2])
         shown = " ".join(f"{value:g}" for value in (*pose.place, *pose.angles))
         raise InputError(
-            f"{what} {shown} is out of reach: the flange stays {1000 * away:.0f} mm and {np.degrees(turned):.1f} deg "
+            f"{label} {shown} is out of reach: the flange stays {1000 * away:.0f} mm and {np.degrees(turned):.1f} deg "
             "off it; choose a nearer pose"
         )
     return sorted(solutions, key=lambda q: float(np.linalg.norm(q - start)))
 
 
-def _check_limits(robot: Robot, q: np.ndarray, what: str) -> None:
+def _check_limits(robot: Robot, q: np.ndarray, label: str) -> None:
     for joint, value in zip(robot.joints, q, strict=True):
         if not joint.lower <= value <= joint.upper:
             raise InputError(
-                f"{what}: {joint.name} at {value:g} {joint.unit} is outside its limits, {joint.lower:g} to "
+                f"{label}: {joint.name} at {value:g} {joint.unit} is outside its limits, {joint.lower:g} to "
                 f"{joint.upper:g} {joint.unit}"
             )

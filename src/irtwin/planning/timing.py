@@ -124,10 +124,10 @@ def fastest(path: BSpline, limits: MotionLimits, torque: Torque) -> Timed:
     """
     time, place, speed = _topp_ra(path, limits, torque)
     tried = [_within(_smoothed(path, time, place, speed, window), limits, torque) for window in _WINDOWS]
-    feasible = [each for each in tried if each is not None]
+    feasible = [timed for timed in tried if timed is not None]
     if not feasible:
         raise InputError(_too_heavy(path, limits, torque))
-    return min(feasible, key=lambda each: each.seconds)
+    return min(feasible, key=lambda timed: timed.seconds)
 
 
 def shares(motion: States, limits: MotionLimits, torque: Torque) -> dict[str, np.ndarray]:

@@ -52,9 +52,9 @@ def proposals(twin: Twin, programme: SectionedMotion, off: float | None) -> Iter
         if off is not None:
             taken = balance(twin, (motion, weights))
             savings.append(("switch off", Figure(taken.value - off * seconds, taken.half_width), None))
-        for what, saved, takes in savings:
+        for action, saved, takes in savings:
             if saved.value > (saved.half_width or 0.0):
-                yield PauseProposal(begin, seconds, what, saved, takes)
+                yield PauseProposal(begin, seconds, action, saved, takes)
 
 
 def _elsewhere(twin: Twin, programme: SectionedMotion, number: int) -> tuple[str, Figure, float]:

@@ -46,14 +46,14 @@ def provide(workspace: Workspace, run_id: str) -> Made:
     return Made(
         robot_id=robot_id,
         used=[*read, twin_iri(twin_id)],
-        metered=[] if motion.power is None else [one for one in read if one.startswith("series/")],
+        metered=[] if motion.power is None else [iri for iri in read if iri.startswith("series/")],
         rows=[
             _run_energy(run, twin_id, role, twin, motion, shares),
             *_account(robot_id, run_id, twin_id, entries),
             *_states(robot_id, run_id, supply_states(twin, motion) if twin.knows_power else ()),
             *(
                 JointEnergy(run_id=run_id, joint=joint, robot_id=robot_id, energy_j=energy)
-                for joint, energy in live_energy.per_joint((one.joint, one.energy) for one in shares).items()
+                for joint, energy in live_energy.per_joint((share.joint, share.energy) for share in shares).items()
             ),
         ],
         series={run_id: modelled_series(twin, motion, held_out(role, motion))},
@@ -90,16 +90,16 @@ def _account(robot_id: str, run_id: str, twin_id: str, entries: Sequence[Entry])
 
 
 def _states(robot_id: str, run_id: str, states: Sequence[SupplyState]) -> Iterator[SupplyStateRow]:
-    for number, one in enumerate(states, start=1):
+    for number, state in enumerate(states, start=1):
         yield SupplyStateRow(
             run_id=run_id,
             number=number,
             robot_id=robot_id,
-            state=one.name,
-            seconds=one.seconds,
-            power_w=one.logged,
-            differs=one.differs,
-            **_figure("modelled_power", "w", one.modelled),
+            state=state.name,
+            seconds=state.seconds,
+            power_w=state.logged,
+            differs=state.differs,
+            **_figure("modelled_power", "w", state.modelled),
         )
 
 

@@ -70,8 +70,8 @@ def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[
     joints = [part for part in parts if isinstance(part, JointRow)]
     row, own, documents = _rows(robot.robot_id, joints, runs, diagnosis, curves)
     judged = activity("diagnosis", robot.robot_id, robot_iri(robot.robot_id), started)
-    for one in (row, *own):
-        one.activity_id = judged.activity_id  # type: ignore[attr-defined]
+    for kept in (row, *own):
+        kept.activity_id = judged.activity_id  # type: ignore[attr-defined]
     return [robot, *parts, *runs, judged, row, *own], documents
 
 

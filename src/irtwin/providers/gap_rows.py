@@ -47,11 +47,11 @@ def rows(document: Document, drawn: Curves, of: Of) -> Iterator[OfDiagnosis]:
 
 
 def _rows(table: Table, whole: Any, key: Values, of: Of) -> Iterator[OfDiagnosis]:
-    for place, one in _placed(table, reached(whole, table.steps)):
-        made = key | _row(table, place, one, of)
+    for place, part in _placed(table, reached(whole, table.steps)):
+        made = key | _row(table, place, part, of)
         yield CLASSES[table.name](**made)
         for inner in table.parts:
-            yield from _rows(inner, one, {name: made[name] for name in table.keys}, of)
+            yield from _rows(inner, part, {name: made[name] for name in table.keys}, of)
 
 
 def _placed(table: Table, parts: Any) -> Iterator[tuple[str | int, Any]]:
@@ -64,8 +64,8 @@ def _placed(table: Table, parts: Any) -> Iterator[tuple[str | int, Any]]:
         yield from enumerate(parts if isinstance(parts, tuple) else filter(None, (parts,)), start=1)
 
 
-def _row(table: Table, place: str | int | None, one: Any, of: Of) -> Values:
-    made = {column.name: _value(column, place, one, of) for column in table.columns if not column.unit_of}
+def _row(table: Table, place: str | int | None, part: Any, of: Of) -> Values:
+    made = {column.name: _value(column, place, part, of) for column in table.columns if not column.unit_of}
     joint = made.get("joint")
     if joint is not None and joint not in of.joints:
         raise InputError(f"{of.robot_id} has no joint {joint}; diagnose a data set of this robot")
@@ -73,8 +73,8 @@ def _row(table: Table, place: str | int | None, one: Any, of: Of) -> Values:
     return made | ({"robot_id": of.robot_id} if table.of_robot else {})
 
 
-def _value(column: Column, place: str | int | None, one: Any, of: Of) -> Any:
-    value = place if column.is_place else reached(one, column.steps)
+def _value(column: Column, place: str | int | None, part: Any, of: Of) -> Any:
+    value = place if column.is_place else reached(part, column.steps)
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return of.run_id(str(value)) if column.name == "run_id" else value

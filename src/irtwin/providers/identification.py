@@ -88,20 +88,20 @@ def twin_made(workspace: Workspace, robot_id: str, twin: Twin, known: RobotMotio
     )
 
 
-def _choice(twin_id: str, one: Choice) -> TwinChoice:
+def _choice(twin_id: str, choice: Choice) -> TwinChoice:
     return TwinChoice(
-        choice_id=f"{twin_id}.{one.effect}.{'chosen' if one.chosen else 'open'}",
+        choice_id=f"{twin_id}.{choice.effect}.{'chosen' if choice.chosen else 'open'}",
         twin_id=twin_id,
-        effect=one.effect,
-        joints=", ".join(one.joints) or None,
-        chosen=one.chosen,
-        probability=one.probability,
-        rivals=", ".join(one.rivals) or None,
-        rmse_unit=one.unit,
-        rmse_without=one.rmse_without,
-        rmse_with=one.rmse_with,
-        energy_error_without_percent=one.energy_error_without,
-        energy_error_with_percent=one.energy_error_with,
+        effect=choice.effect,
+        joints=", ".join(choice.joints) or None,
+        chosen=choice.chosen,
+        probability=choice.probability,
+        rivals=", ".join(choice.rivals) or None,
+        rmse_unit=choice.unit,
+        rmse_without=choice.rmse_without,
+        rmse_with=choice.rmse_with,
+        energy_error_without_percent=choice.energy_error_without,
+        energy_error_with_percent=choice.energy_error_with,
     )
 
 
@@ -142,10 +142,12 @@ def _parameters(twin_id: str, robot_id: str, twin: Twin) -> Iterator[ParameterRo
         )
 
 
-def _scaled(twin: Twin, one: Parameter | BaseParameter) -> dict[str, float]:
+def _scaled(twin: Twin, parameter: Parameter | BaseParameter) -> dict[str, float]:
     """Return the ends of a parameter's interval with the scale of torque in it; none where it does not go with that."""
     scale = twin.torque_scale
-    interval = None if scale is None else scale.interval(one.value, one.unit, one.lower, one.upper)
+    interval = (
+        None if scale is None else scale.interval(parameter.value, parameter.unit, parameter.lower, parameter.upper)
+    )
     return {} if interval is None else {"scaled_lower": interval[0], "scaled_upper": interval[1]}
 
 

@@ -154,14 +154,14 @@ class LiveEnergy:
 
     def _excursions(self) -> Iterator[Values]:
         for place, now in self.watch.places.items():
-            for number, one in enumerate(now.excursions, start=1):
+            for number, excursion in enumerate(now.excursions, start=1):
                 yield self._place(place) | {
                     "number": number,
-                    "began": moment_of(one.began),
-                    "ended": None if one.ended is None else moment_of(one.ended),
-                    "lasted_s": one.until - one.began,
-                    "peak_residual": one.peak_residual,
-                    "peak_ratio": one.peak_ratio,
+                    "began": moment_of(excursion.began),
+                    "ended": None if excursion.ended is None else moment_of(excursion.ended),
+                    "lasted_s": excursion.until - excursion.began,
+                    "peak_residual": excursion.peak_residual,
+                    "peak_ratio": excursion.peak_ratio,
                 }
 
     def _place(self, place: str) -> Values:

@@ -56,7 +56,7 @@ def populate(
     while todo := {
         name: left
         for name, subjects in ready(graph).items()
-        if (left := [one for one in subjects if (name, one) not in done and _robot_id(graph, one) not in refused])
+        if (left := [due for due in subjects if (name, due) not in done and _robot_id(graph, due) not in refused])
     }:
         before = len(done)
         for name, subjects in ({of: todo[of] for of in todo if of not in renewed} or todo).items():
@@ -107,7 +107,7 @@ def _renewed(graph: KnowledgeGraph) -> set[str]:
 def in_a_circle(graph: KnowledgeGraph) -> str | None:
     """Return, in one line, which providers wait for each other, so that none of them is ever run; None if none does."""
     asked = ([shorten(str(iri)).rpartition(":")[2] for iri in row.values()] for row in graph.query(_IN_A_CIRCLE))
-    waits = [f"{one} requires {needed}, which {other} populates" for one, needed, other in asked]
+    waits = [f"{waiting} requires {needed}, which {awaited} populates" for waiting, needed, awaited in asked]
     if not waits:
         return None
     return (

@@ -182,7 +182,7 @@ def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[
     files = select(SourceFile.source_file_id).where(SourceFile.robot_id == robot_id)
     with workspace.reading() as session:
         series = [f"series/{series_id}/{run_id}" for series_id, run_id in session.execute(told)]
-        return [*map(run_iri, ids), *series, *(f"source_file/{it}" for it in session.scalars(files))]
+        return [*map(run_iri, ids), *series, *(f"source_file/{file_id}" for file_id in session.scalars(files))]
 
 
 def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:
@@ -232,12 +232,12 @@ def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
 def _with_sheets(robot: description.Robot, row: RobotRow, sheets: Mapping[str, JointRow]) -> description.Robot:
     """Return a robot with the limits and data sheets that rows say."""
 
-    def said(sheet: JointRow) -> dict[str, Any]:
+    def stated(sheet: JointRow) -> dict[str, Any]:
         none = dict.fromkeys(_LIMITS, math.inf) | {"lower": -math.inf}
         values = {name: getattr(sheet, column) for name, column in (_LIMITS | _SHEET).items()}
         return {name: none.get(name) if value is None else value for name, value in values.items()}
 
-    joints = tuple(replace(joint, **said(sheets[joint.name])) for joint in robot.joints)
+    joints = tuple(replace(joint, **stated(sheets[joint.name])) for joint in robot.joints)
     return replace(robot, joints=joints, manufacturer=row.manufacturer, type=row.type, weight=row.weight_kg)
 
 
@@ -316,7 +316,7 @@ def flat_notes(notes: Mapping[str, Any], below: str = "") -> dict[str, list[str]
         if isinstance(value, Mapping):
             flat |= flat_notes(value, f"{below}{name}.")
         elif isinstance(value, list | tuple):
-            flat[f"{below}{name}"] = [_text(one) for one in value]
+            flat[f"{below}{name}"] = [_text(item) for item in value]
         else:
             flat[f"{below}{name}"] = [_text(value)]
     return flat

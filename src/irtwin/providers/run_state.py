@@ -93,4 +93,4 @@ def _metered(workspace: Workspace, run: RunRow) -> Made:
             for number, state in enumerate(profile.states, start=1)
         ),
     ]  # fmt: skip
-    return Made(robot_id, read, rows, metered=[one for one in read if one.startswith("series/")])
+    return Made(robot_id, read, rows, metered=[iri for iri in read if iri.startswith("series/")])

@@ -55,8 +55,8 @@ def provide(workspace: Workspace, action: str) -> Made:
         robots = {of.subject: of.about_robot or str(of.value).rpartition("/")[2] for of in facts}
         robot_id = robots.get(iri) or _earlier(session, action)
         here = {subject for subject, robot in robots.items() if robot == robot_id}
-        said = AssertedFact.subject.in_(here) | (AssertedFact.about_robot == robot_id)
-        used = [f"asserted_fact/{fact_id}" for fact_id in session.scalars(select(AssertedFact.fact_id).where(said))]
+        of_robot = AssertedFact.subject.in_(here) | (AssertedFact.about_robot == robot_id)
+        used = [f"asserted_fact/{fact_id}" for fact_id in session.scalars(select(AssertedFact.fact_id).where(of_robot))]
         runs = _runs(session, robot_id)
     days = {of.subject: str(of.value) for of in facts if of.predicate == _DONE_ON and of.subject in here}
     used += map(run_iri, runs)

@@ -49,7 +49,7 @@ def export_shell(out: Path, location: Location, robot: str | None) -> None:
         model.AssetInformation(model.AssetKind.INSTANCE, global_asset_id=iri, asset_type=sheet["type"]),
         f"{iri}/aas",
         id_short=re.sub(r"\W", "_", f"Robot_{name}", flags=re.ASCII)[:128].rstrip("_"),
-        submodel={model.ModelReference.from_referable(one) for one in submodels},
+        submodel={model.ModelReference.from_referable(submodel) for submodel in submodels},
     )
     store: Any = model.DictIdentifiableStore([shell, *submodels])
     written = io.BytesIO()  # whole before the file is touched

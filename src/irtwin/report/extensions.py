@@ -51,7 +51,9 @@ def _check_question(file: Resource, bound: set[str]) -> None:
         raise InputError(f"{file.path}: `# bind:` names what its report has not; take of {', '.join(sorted(bound))}")
     if file.replaces:
         ((replaced,),) = (
-            read_questions([one.path]).values() for one in shipped().of("reports") if one.name == file.name
+            read_questions([resource.path]).values()
+            for resource in shipped().of("reports")
+            if resource.name == file.name
         )
         lost = set(columns_of(replaced.text)) - set(columns_of(question.text))
         if lost:

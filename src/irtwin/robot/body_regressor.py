@@ -42,22 +42,22 @@ class _Joint:
         count, samples = len(motions), motions.shape[2]
         seen = np.empty((count + 1, len(self.maps), samples))
         np.matmul(self.maps, motions, out=seen[:count])
-        found = seen[:, :6]
+        in_joint = seen[:, :6]
         parts = seen[:count, 6:].reshape(count, 2, 2, -1, samples)
         parts *= self._by(q)[:, None, None]
-        rows = self._rows(found[:count])
+        rows = self._rows(in_joint[:count])
         rows += parts[:, 0]
         rows += parts[:, 1]
-        found[count] = self.axis[:, None]
-        return found
+        in_joint[count] = self.axis[:, None]
+        return in_joint
 
     def handed_down(self, slopes: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return slopes (m, 6, N) by motions seen in the joint's frame as slopes by those of the parent."""
         rows = self._rows(slopes).reshape(len(slopes), -1, slopes.shape[2])
-        found = self.maps[:6].T @ slopes
+        by_parent = self.maps[:6].T @ slopes
         for part, by in zip(self.maps[6:].reshape(2, -1, 6), self._by(q), strict=True):
-            found += part.T @ (rows * by)
-        return np.asarray(found)
+            by_parent += part.T @ (rows * by)
+        return np.asarray(by_parent)
 
     def _rows(self, motions: np.ndarray) -> np.ndarray:
         """Return the rows (m, 2, r / 2, N) of motions (m, 6, N) that depend on the joint's position."""
@@ -74,11 +74,11 @@ def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
     A column of a joint is one stretch of memory.
     """
     joints, count = _joints(model), model.nv
-    found = np.zeros((count, 10 * count, len(q)))
+    regressor = np.zeros((count, 10 * count, len(q)))
     for cut in _pieces(len(q)):
-        states = (np.ascontiguousarray(each[cut].T) for each in (q, dq, ddq))
-        _fill(found[:, :, cut], joints, model.gravity.vector, *states)
-    return found.transpose(2, 0, 1)
+        states = (np.ascontiguousarray(signal[cut].T) for signal in (q, dq, ddq))
+        _fill(regressor[:, :, cut], joints, model.gravity.vector, *states)
+    return regressor.transpose(2, 0, 1)
 
 
 def carried_bodies(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, along: np.ndarray) -> np.ndarray:
@@ -87,12 +87,12 @@ def carried_bodies(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
     It takes one motion of each body instead of one for each joint that carries it.
     """
     joints = _joints(model)
-    found = np.empty((10 * model.nv, len(q)))
+    carried = np.empty((10 * model.nv, len(q)))
     for cut in _pieces(len(q)):
-        states = (np.ascontiguousarray(each[cut].T) for each in (q, dq, ddq, along))
+        states = (np.ascontiguousarray(signal[cut].T) for signal in (q, dq, ddq, along))
         for index, (own, _) in enumerate(_motions(joints, model.gravity.vector, *states)):
-            found[10 * index : 10 * index + 10, cut] = _torques(own[2:], own[0], own[1])[0]
-    return found.T
+            carried[10 * index : 10 * index + 10, cut] = _torques(own[2:], own[0], own[1])[0]
+    return carried.T
 
 
 def regressor_slope(
@@ -104,17 +104,17 @@ def regressor_slope(
     takes as long as a few regressors, where differences would take one for each joint.
     """
     joints = _joints(model)
-    found = np.empty((3, *q.shape))
+    derivatives = np.empty((3, *q.shape))
     for cut in _pieces(len(q)):
         states = np.ascontiguousarray(np.stack([q[cut], dq[cut], ddq[cut]]).swapaxes(1, 2))
         slopes = _slope(joints, model.gravity.vector, states, weights[cut].transpose(1, 2, 0))
-        found[:, cut] = slopes.swapaxes(1, 2)
-    return found[0], found[1], found[2]
+        derivatives[:, cut] = slopes.swapaxes(1, 2)
+    return derivatives[0], derivatives[1], derivatives[2]
 
 
 def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
     """Return (N, n, 3): how fast a frame's origin moves along the base's axes by a unit of each joint's speed."""
-    found = np.zeros((len(q), model.nv, 3))
+    jacobian = np.zeros((len(q), model.nv, 3))
     joints, place = _joints(model), model.frames[frame].placement.translation
     chain = [index - 1 for index in model.supports[model.frames[frame].parentJoint] if index]
     lever = np.concatenate([np.eye(3), -pin.skew(place)], axis=1)
@@ -125,12 +125,12 @@ def point_jacobian(model: pin.Model, frame: int, q: np.ndarray) -> np.ndarray:
         for index in chain:
             motions = joints[index].seen(motions, states[index])
         along, carried = motions[:3, :3], lever @ motions[3:]
-        found[cut, chain] = np.einsum("akn,mkn->nma", along, carried)
-    return found
+        jacobian[cut, chain] = np.einsum("akn,mkn->nma", along, carried)
+    return jacobian
 
 
 def _joints(model: pin.Model) -> list[_Joint]:
-    found = []
+    joints = []
     for index, axis in enumerate(joint_motions(model), start=1):
         across = pin.Motion(axis).action  # of the axis, times a motion
         parent = model.jointPlacements[index].toActionMatrixInverse()
@@ -141,8 +141,8 @@ def _joints(model: pin.Model) -> list[_Joint]:
         first, second, last = np.flatnonzero(series.any(axis=(0, 1, 3)))[[0, 1, -1]].tolist()
         moved = slice(first, last + 1, second - first)  # two or three of three
         maps = np.concatenate([still, series[:, :, moved].reshape(-1, 6)]) @ parent
-        found.append(_Joint(model.parents[index] - 1, axis, maps, moved, -across, slides))
-    return found
+        joints.append(_Joint(model.parents[index] - 1, axis, maps, moved, -across, slides))
+    return joints
 
 
 def _pieces(samples: int) -> Iterator[slice]:
@@ -152,12 +152,12 @@ def _pieces(samples: int) -> Iterator[slice]:
 
 
 def _fill(
-    found: np.ndarray, joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+    regressor: np.ndarray, joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
 ) -> None:
     """Write the regressor (n, 10 n, N) of a few samples (n, N)."""
     for index, (own, chain) in enumerate(_motions(joints, gravity, q, dq, ddq)):
         for carrier, torque in zip(chain, _torques(own[2:], own[0], own[1]), strict=True):
-            found[carrier, 10 * index : 10 * index + 10] = torque
+            regressor[carrier, 10 * index : 10 * index + 10] = torque
 
 
 def _motions(
@@ -175,17 +175,17 @@ def _motions(
     """
     base = np.zeros((2 if along is None else 3, 6, q.shape[1]))
     base[1] -= gravity[:, None]
-    found: list[tuple[np.ndarray, list[int]]] = []
+    motions: list[tuple[np.ndarray, list[int]]] = []
     for index, joint in enumerate(joints):
-        before, carrying = (base, []) if joint.parent < 0 else found[joint.parent]
+        before, carrying = (base, []) if joint.parent < 0 else motions[joint.parent]
         own = joint.seen(before, q[index])
         own[0] += own[-1] * dq[index]
         own[1] += own[-1] * ddq[index] + joint.crossed @ own[0] * dq[index]
         if along is not None:
             own[2] += own[3] * along[index]
             own = own[:3]
-        found.append((own, [*carrying, index]))
-    return found
+        motions.append((own, [*carrying, index]))
+    return motions
 
 
 def _slope(joints: Sequence[_Joint], gravity: np.ndarray, states: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -193,21 +193,21 @@ def _slope(joints: Sequence[_Joint], gravity: np.ndarray, states: np.ndarray, we
     q, dq, ddq = states
     motions = _motions(joints, gravity, q, dq, ddq)
     slopes = [np.zeros_like(own) for own, _ in motions]  # of the sum, by each body's motions
-    found = np.empty((3, *q.shape))
+    state_slopes = np.empty((3, *q.shape))
     for index, joint in reversed(list(enumerate(joints))):
         (own, chain), slope = motions[index], slopes[index]
         _add_torque_slope(slope, own, weights[chain, 10 * index : 10 * index + 10])
         turned = joint.crossed @ own[0]
-        found[1, index] = np.einsum("kn,kn->n", turned, slope[1])
+        state_slopes[1, index] = np.einsum("kn,kn->n", turned, slope[1])
         slope[0] += joint.crossed.T @ slope[1] * dq[index]
-        found[1, index] += joint.axis @ slope[0]
-        found[2, index] = joint.axis @ slope[1]
+        state_slopes[1, index] += joint.axis @ slope[0]
+        state_slopes[2, index] = joint.axis @ slope[1]
         carried = own[:-1].copy()  # the joint's own axis does not depend on its position
         carried[1] -= turned * dq[index]
-        found[0, index] = np.einsum("mkn,mkn->n", joint.crossed @ carried, slope[:-1])
+        state_slopes[0, index] = np.einsum("mkn,mkn->n", joint.crossed @ carried, slope[:-1])
         if joint.parent >= 0:
             slopes[joint.parent] += joint.handed_down(slope[:-1], q[index])
-    return found
+    return state_slopes
 
 
 def _add_torque_slope(slope: np.ndarray, own: np.ndarray, weights: np.ndarray) -> None:
@@ -244,11 +244,11 @@ def _torques(carried: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -
     body, the latter less gravity. Mass acts along the line alone, inertia about the turn alone.
     """
     a = acceleration[:3] + _cross(speed[3:], speed[:3])
-    found = np.empty((len(carried), 10, speed.shape[1]))
-    np.einsum("mkn,kn->mn", carried[:, :3], a, out=found[:, 0])
-    np.einsum("mkn,kpn->mpn", carried, _by_first_moments(a, speed[3:], acceleration[3:]), out=found[:, 1:4])
-    np.einsum("mkn,kpn->mpn", carried[:, 3:], _by_inertia(speed[3:], acceleration[3:]), out=found[:, 4:])
-    return found
+    torques = np.empty((len(carried), 10, speed.shape[1]))
+    np.einsum("mkn,kn->mn", carried[:, :3], a, out=torques[:, 0])
+    np.einsum("mkn,kpn->mpn", carried, _by_first_moments(a, speed[3:], acceleration[3:]), out=torques[:, 1:4])
+    np.einsum("mkn,kpn->mpn", carried[:, 3:], _by_inertia(speed[3:], acceleration[3:]), out=torques[:, 4:])
+    return torques
 
 
 def _by_first_moments(a: np.ndarray, w: np.ndarray, dw: np.ndarray) -> np.ndarray:
@@ -279,9 +279,9 @@ def _by_inertia(w: np.ndarray, dw: np.ndarray) -> np.ndarray:
     )
 
 
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return the cross products (3, N): numpy's take twice as long."""
-    return np.asarray(one[[1, 2, 0]] * other[[2, 0, 1]] - one[[2, 0, 1]] * other[[1, 2, 0]])
+    return np.asarray(first[[1, 2, 0]] * second[[2, 0, 1]] - first[[2, 0, 1]] * second[[1, 2, 0]])
 
 
 def _skew(vector: np.ndarray) -> np.ndarray:

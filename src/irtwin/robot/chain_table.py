@@ -180,16 +180,16 @@ def _bodies(robot: Robot, chain: Sequence[int], table: ChainTable) -> list[Row]:
     rows, at = [], table.base
     for joint, row in zip(chain, table.rows, strict=True):
         at = at @ row_transform(row, table.convention)
-        said, inertia = robot.joints[joint - 1], model.inertias[joint]
+        described, inertia = robot.joints[joint - 1], model.inertias[joint]
         body = pin.SE3(at).actInv(data.oMi[joint]).act(inertia)
         rows.append(
             replace(
                 row,
-                lower=said.lower,
-                upper=said.upper,
-                velocity=said.velocity if np.isfinite(said.velocity) else 0.0,
-                effort=said.effort if np.isfinite(said.effort) else 0.0,
-                name=said.name,
+                lower=described.lower,
+                upper=described.upper,
+                velocity=described.velocity if np.isfinite(described.velocity) else 0.0,
+                effort=described.effort if np.isfinite(described.effort) else 0.0,
+                name=described.name,
                 mass=float(body.mass),
                 com=tuple(body.lever.tolist()),
                 inertia=six_numbers(body.inertia),

@@ -62,7 +62,9 @@ class CollisionModel:
         self._names: list[str] = []
         self._margin = 0.0
         self._nearest = 0  # pair
-        solids = [one for one in structure_of(robot).solids if one.purpose == "collision" and one.kind in PRIMITIVES]
+        solids = [
+            solid for solid in structure_of(robot).solids if solid.purpose == "collision" and solid.kind in PRIMITIVES
+        ]
         shapes = len(solids) + len(obstacles)
         if shapes > _MOST_SHAPES:
             raise InputError(
@@ -216,12 +218,12 @@ class CollisionModel:
 
     def _pair_links(self) -> None:
         parents, objects = self._model.parents, list(self._geometry.geometryObjects)
-        joints = [each.parentJoint for each in objects]
-        for one in range(len(objects)):
-            for other in range(one):
-                if joined(parents, joints[one], joints[other]):
+        joints = [shape.parentJoint for shape in objects]
+        for second in range(len(objects)):
+            for first in range(second):
+                if joined(parents, joints[second], joints[first]):
                     continue
-                self._geometry.addCollisionPair(pin.CollisionPair(other, one))
+                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
         self._leave_out_those_that_always_touch()
         self._own = len(self._geometry.collisionPairs)
 
@@ -250,12 +252,12 @@ class CollisionModel:
                 self._geometry.addCollisionPair(pin.CollisionPair(shape, index))
 
 
-def joined(parents: Sequence[int], one: int, other: int) -> bool:
+def joined(parents: Sequence[int], first: int, second: int) -> bool:
     """Whether bodies that two joints carry, 0 the base, are one, or have one joint between them.
 
     parents: of each joint, by number, as in Pinocchio's model.
     """
-    return one == other or parents[one] == other or parents[other] == one
+    return first == second or parents[first] == second or parents[second] == first
 
 
 def _shape(solid: Solid, where: str) -> coal.ShapeBase:

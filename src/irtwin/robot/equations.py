@@ -129,7 +129,7 @@ def _energies(robot: Robot) -> tuple[Any, Any]:
     """
     count, model, data = len(robot.joints), robot.model, robot.model.createData()
     slides = [joint.kind == "prismatic" for joint in robot.joints]
-    poses = np.stack(np.meshgrid(*(_LENGTHS if each else _ANGLES for each in slides), indexing="ij"), axis=-1)
+    poses = np.stack(np.meshgrid(*(_LENGTHS if sliding else _ANGLES for sliding in slides), indexing="ij"), axis=-1)
     upper = np.triu([[pin.crba(model, data, q)] for q in poses.reshape(-1, count)])
     height = [pin.computePotentialEnergy(model, data, q) for q in poses.reshape(-1, count)]
     mass = _coefficients((upper + np.triu(upper, 1).swapaxes(-1, -2)).reshape(*poses.shape[:-1], count, count), slides)
@@ -140,8 +140,8 @@ def _energies(robot: Robot) -> tuple[Any, Any]:
 
 def _coefficients(values: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
     """Return of values at all poses, an axis a joint, the coefficients of waves, and of powers where a joint slides."""
-    for axis, each in enumerate(slides):
-        if each:
+    for axis, sliding in enumerate(slides):
+        if sliding:
             powers = np.linalg.inv(np.vander(_LENGTHS, increasing=True))
             values = np.moveaxis(np.tensordot(powers, values, (1, axis)), 0, axis)
         else:
@@ -158,12 +158,12 @@ def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.nda
     q, *_ = symbols_of(len(slides))
     terms = []
     for place, amplitude in np.ndenumerate(coefficients):
-        wave = [0 if each else int(_WAVES[k]) for k, each in zip(place, slides, strict=True)]
+        wave = [0 if sliding else int(_WAVES[k]) for k, sliding in zip(place, slides, strict=True)]
         first = next((k for k in wave if k), 0)
         if first < 0:  # the conjugate of one that is counted
             continue
         angle = sum(k * position for k, position in zip(wave, q, strict=True))
-        along = sympy.prod(position**k for k, position, each in zip(place, q, slides, strict=True) if each)
+        along = sympy.prod(position**k for k, position, sliding in zip(place, q, slides, strict=True) if sliding)
         for value, function in ((amplitude.real, sympy.cos), (-amplitude.imag, sympy.sin)):
             value = value * (2.0 if first else 1.0)
             if abs(value) > _DUST * np.abs(beside).max():
@@ -171,10 +171,10 @@ def _in_symbols(coefficients: np.ndarray, slides: Sequence[bool], beside: np.nda
     return sympy.Add(*terms)
 
 
-def deviation_of(robot: Robot, said: Callable[..., Sequence[float]]) -> float:
-    """Return by how much torques (n,) that are `said` of q, dq, ddq (3 n numbers) differ from Pinocchio's at most."""
+def deviation_of(robot: Robot, torque: Callable[..., Sequence[float]]) -> float:
+    """Return by how much a `torque` (n,) of q, dq, ddq (3 n numbers) differs from Pinocchio's at most."""
     data, worst = robot.model.createData(), 0.0
     for state in np.random.default_rng(0).uniform(-2.0, 2.0, (_STATES, 3, len(robot.joints))):
         expected = pin.rnea(robot.model, data, *state)
-        worst = max(worst, float(np.abs(np.array(said(*state.ravel()), dtype=float) - expected).max()))
+        worst = max(worst, float(np.abs(np.array(torque(*state.ravel()), dtype=float) - expected).max()))
     return worst

@@ -27,7 +27,7 @@ def flange(robot: Robot) -> str:
 def link_frame(robot: Robot, link: str) -> int:
     """Return Pinocchio's number of a link's frame. Raises InputError where the robot has no such link."""
     if link not in (known.name for known in robot.links):
-        raise InputError(f'{robot.name} has no link "{link}" (it has {", ".join(one.name for one in robot.links)})')
+        raise InputError(f'{robot.name} has no link "{link}" (it has {", ".join(known.name for known in robot.links)})')
     return int(robot.model.getFrameId(link, pin.FrameType.BODY))
 
 
@@ -50,7 +50,7 @@ def joint_motions(model: pin.Model) -> np.ndarray:
     data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
     jacobians = (pin.getJointJacobian(model, data, joint, pin.LOCAL) for joint in range(1, model.njoints))
-    return np.array([np.reshape(each, (6, -1))[:, joint] for joint, each in enumerate(jacobians)])
+    return np.array([np.reshape(jacobian, (6, -1))[:, joint] for joint, jacobian in enumerate(jacobians)])
 
 
 def joint_axes(robot: Robot, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -61,8 +61,8 @@ def joint_axes(robot: Robot, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     for pose in poses:
         pin.forwardKinematics(robot.model, data, pose)
         placed = list(data.oMi)[1:]
-        directions.append([one.rotation @ axis for one, axis in zip(placed, own, strict=True)])
-        points.append([one.translation.copy() for one in placed])
+        directions.append([placement.rotation @ axis for placement, axis in zip(placed, own, strict=True)])
+        points.append([placement.translation.copy() for placement in placed])
     return np.array(directions), np.array(points)
 
 

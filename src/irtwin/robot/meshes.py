@@ -46,7 +46,7 @@ def find_mesh(name: str, folder: Path, beside: Path) -> Path:
     path = PurePosixPath(rest)
     paths = [path, PurePosixPath(*path.parts[1:])] if scheme == "package" else [path]
     inside, outside = folder.resolve(), False
-    for mesh in (base / one for base in (beside, folder) for one in paths):
+    for mesh in (base / relative for base in (beside, folder) for relative in paths):
         real = real_path(mesh)
         if real is not None and real.is_relative_to(inside) and real.is_file():
             return real
@@ -118,11 +118,11 @@ def _check_collada(content: bytes, where: str) -> float:
     if root.find(f".//{_COLLADA}instance_node") is not None or instances > _MOST_INSTANCES:
         raise InputError(f"{where}: repeats its parts by instances; export it as one mesh")
     unit = root.find(f"{_COLLADA}asset/{_COLLADA}unit")
-    said = "1" if unit is None else unit.get("meter", "1")
+    metres = "1" if unit is None else unit.get("meter", "1")
     try:
-        return float(said)
+        return float(metres)
     except ValueError as error:
-        raise InputError(f"{where}: its unit of {said[:40]!r} m is no number; export it again") from error
+        raise InputError(f"{where}: its unit of {metres[:40]!r} m is no number; export it again") from error
 
 
 def _shown(name: str) -> str:

@@ -48,11 +48,11 @@ def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
 def _joint(body: Element, connection: Connection, limits: Joint, armature: float | None) -> None:
     kind = "slide" if connection.kind == "prismatic" else "hinge"
     assert connection.axis is not None
-    said = {"name": connection.name, "type": kind, "axis": words(*connection.axis)}
+    attributes = {"name": connection.name, "type": kind, "axis": words(*connection.axis)}
     if np.isfinite(limits.lower) and np.isfinite(limits.upper):
-        said["range"] = words(limits.lower, limits.upper)
+        attributes["range"] = words(limits.lower, limits.upper)
     numbers = {"damping": connection.damping, "frictionloss": connection.friction, "armature": armature}
-    SubElement(body, "joint", said | {name: repr(value) for name, value in numbers.items() if value})
+    SubElement(body, "joint", attributes | {name: repr(value) for name, value in numbers.items() if value})
 
 
 def _inertial(body: Element, inertia: pin.Inertia) -> None:

@@ -39,7 +39,7 @@ def build_model(urdf: str) -> pin.Model:
 
 def inverse_dynamics(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
     """Return (N, n) the torque that moves a model's bodies so, N m or N; q, dq, ddq: (N, n)."""
-    states = (np.asfortranarray(each.T) for each in (q, dq, ddq))
+    states = (np.asfortranarray(signal.T) for signal in (q, dq, ddq))
     torque = np.ascontiguousarray(pin.rneaInParallel(1, pin.ModelPool(model, 1), *states).T)  # a loop takes four times
     return np.asarray(torque.reshape(q.shape))  # of one joint it is a plain vector
 

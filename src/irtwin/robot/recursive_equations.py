@@ -66,8 +66,8 @@ def recursive_equations(robot: Robot) -> RecursiveEquations:
     steps = _needed(recursion.steps, torques)
     inputs = [symbol for symbols in symbols_of(count) for symbol in symbols]
     formulas = [torque for _, torque in torques]
-    said = sympy.lambdify(inputs, formulas, "math", cse=lambda formulas: (steps, formulas))
-    return RecursiveEquations(steps, torques, count, deviation_of(robot, said))
+    evaluate = sympy.lambdify(inputs, formulas, "math", cse=lambda formulas: (steps, formulas))
+    return RecursiveEquations(steps, torques, count, deviation_of(robot, evaluate))
 
 
 @dataclass(frozen=True)

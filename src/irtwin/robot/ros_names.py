@@ -48,4 +48,6 @@ def _valid(name: str, otherwise: str) -> str:
 
 def free_name(name: str, taken: Collection[str]) -> str:
     """Return a name, with the first number from 2 on that makes it one that is not taken."""
-    return next(one for one in chain([name], (f"{name}_{number}" for number in count(2))) if one not in taken)
+    return next(
+        candidate for candidate in chain([name], (f"{name}_{number}" for number in count(2))) if candidate not in taken
+    )

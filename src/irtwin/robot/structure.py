@@ -157,7 +157,7 @@ def solids_of(link: Element, colours: Colours, source: str, kinds: Collection[st
             shape = geometry[0] if geometry is not None and len(geometry) else None
             if shape is None or shape.tag not in kinds:
                 continue
-            size = tuple(one for key in _SIZES[shape.tag] for one in numbers(shape.get(key), _COUNTS[key], where))
+            size = tuple(number for key in _SIZES[shape.tag] for number in numbers(shape.get(key), _COUNTS[key], where))
             file = None
             if shape.tag == "mesh":
                 file, size = shape.get("filename", ""), numbers(shape.get("scale", "1 1 1"), 3, where)
@@ -187,9 +187,9 @@ def _body(name: str, link: Element) -> Body:
     moments = inertial.find("inertia")
     turned = None
     if moments is not None:
-        said = inertia_of([float(moments.get(key, "0")) for key in MOMENTS])
+        tensor = inertia_of([float(moments.get(key, "0")) for key in MOMENTS])
         turn = origin.transform[:3, :3]
-        turned = six_numbers(turn @ said @ turn.T)
+        turned = six_numbers(turn @ tensor @ turn.T)
     return Body(name, float(mass.get("value", "0")), origin.xyz, turned)
 
 
@@ -203,8 +203,10 @@ def _connection(joint: Element, child: str, moving: set[str]) -> Connection:
         axis = _three(along / np.linalg.norm(along))
     kind = str(joint.get("type")) if name in moving else "fixed"
     dynamics = joint.find("dynamics") if name in moving else None
-    said = [numbers("0" if dynamics is None else dynamics.get(key, "0"), 1, name)[0] for key in ("damping", "friction")]
-    return Connection(name, kind, _parent(joint), child, origin_of(joint), axis, *said)
+    coefficients = [
+        numbers("0" if dynamics is None else dynamics.get(key, "0"), 1, name)[0] for key in ("damping", "friction")
+    ]
+    return Connection(name, kind, _parent(joint), child, origin_of(joint), axis, *coefficients)
 
 
 def _colour(visual: Element, colours: Colours, where: str) -> tuple[float, ...] | None:

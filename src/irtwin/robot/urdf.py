@@ -53,7 +53,7 @@ def parse_urdf(text: str, source: str = "URDF") -> Robot:
 def _declared(text: str) -> str:
     """Declare the prefixes that a URDF uses only (drake:acceleration): readers of URDF know no namespaces."""
     lacking = sorted(set(_PREFIX.findall(text)) - {"xml", "xmlns", *re.findall(r"xmlns:([\w.-]+)", text)})
-    return re.sub(r"<robot\b", "<robot" + "".join(f' xmlns:{one}="{one}"' for one in lacking), text, count=1)
+    return re.sub(r"<robot\b", "<robot" + "".join(f' xmlns:{prefix}="{prefix}"' for prefix in lacking), text, count=1)
 
 
 def _parse(text: str, source: str) -> Element:
@@ -181,8 +181,8 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
         parents[child] = parent
     roots = [link for link in links if link not in parents]
     if len(roots) != 1:
-        what = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
-        raise InputError(f"{source}: {what}; all links must be connected to one base")
+        fault = "no link is the base (the joints form a loop)" if not roots else f"several bases: {', '.join(roots)}"
+        raise InputError(f"{source}: {fault}; all links must be connected to one base")
     depths = {roots[0]: 0}
     try:
         for link in TopologicalSorter({child: [parent] for child, parent in parents.items()}).static_order():
@@ -196,10 +196,10 @@ def _check_tree(root: Element, links: dict[str, Link], source: str) -> None:
         raise InputError(f"{source}: a chain of more than {_DEEPEST} links cannot be modelled")
 
 
-def _attribute(element: Element, key: str, source: str, what: str) -> str:
+def _attribute(element: Element, key: str, source: str, owner: str) -> str:
     value = element.get(key)
     if not value:
-        raise InputError(f'{source}: {what} has no "{key}"')
+        raise InputError(f'{source}: {owner} has no "{key}"')
     return value
 
 

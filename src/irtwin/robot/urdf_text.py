@@ -74,8 +74,8 @@ def _joint(root: Element, connection: Connection, limits: Joint | None) -> None:
     if connection.damping or connection.friction:
         SubElement(joint, "dynamics", damping=repr(connection.damping), friction=repr(connection.friction))
     if limits is not None:
-        said = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "effort")}
-        known = {name: repr(value) for name, value in said.items() if np.isfinite(value)}
+        values = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "effort")}
+        known = {name: repr(value) for name, value in values.items() if np.isfinite(value)}
         if known:  # the format asks for speed and effort too: 0 is no limit
             SubElement(joint, "limit", {"velocity": "0.0", "effort": "0.0"} | known)
 
@@ -92,8 +92,8 @@ def with_numbers(urdf: str, bodies: Mapping[str, pin.Inertia], dynamics: Mapping
         if element.tag == "link" and name in bodies:
             content = with_child(content, element, "inertial", _inertial(bodies[name]))
         elif element.tag == "joint" and dynamics.get(name):
-            said = next((child.attributes for child in element.children if child.tag == "dynamics"), {})
-            words = said | {key: repr(value) for key, value in dynamics[name].items()}
+            present = next((child.attributes for child in element.children if child.tag == "dynamics"), {})
+            words = present | {key: repr(value) for key, value in dynamics[name].items()}
             tag = " ".join(["<dynamics", *(f"{key}={quoteattr(value)}" for key, value in words.items())])
             content = with_child(content, element, "dynamics", f"{tag}/>")
     return content.decode("utf-8")

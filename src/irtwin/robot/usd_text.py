@@ -33,35 +33,36 @@ def usd_text(robot: Robot, armature: Mapping[str, float]) -> str:
     structure = structure_of(robot)
     joints = {joint.name: joint for joint in robot.joints}
     links = [body.name for body in structure.bodies]
-    names = _identifiers([robot.name, *links, *(one.name for one in structure.connections)])
+    names = _identifiers([robot.name, *links, *(connection.name for connection in structure.connections)])
     whole, base = names[robot.name], links[0]
     moving, places, within = {base: base}, {base: np.eye(4)}, {base: np.eye(4)}  # links of each; in the world; in these
     bodies: dict[str, list[str]] = {base: [*_place(np.eye(4)), *_mass(structure.bodies[0].spatial)]}
     fixed = _prim("PhysicsFixedJoint", "world_to_base", [f"rel physics:body1 = </{whole}/{names[base]}>"])
     connections = [fixed]
-    for one in structure.connections:
-        place = places[one.child] = places[one.parent] @ one.origin.transform
-        on = moving[one.parent]
-        if one.axis is None:
-            moving[one.child], within[one.child] = on, within[one.parent] @ one.origin.transform
-            bodies[on] += _prim("Xform", names[one.child], _place(within[one.child]))
+    for connection in structure.connections:
+        place = places[connection.child] = places[connection.parent] @ connection.origin.transform
+        on = moving[connection.parent]
+        if connection.axis is None:
+            moving[connection.child] = on
+            within[connection.child] = within[connection.parent] @ connection.origin.transform
+            bodies[on] += _prim("Xform", names[connection.child], _place(within[connection.child]))
             continue
-        moving[one.child], within[one.child] = one.child, np.eye(4)
-        bodies[one.child] = [*_place(place), *_mass(robot.model.inertias[1 + robot.index(one.name)])]
-        ends = [f"rel physics:body{end} = </{whole}/{names[link]}>" for end, link in enumerate((on, one.child))]
-        frame = within[one.parent] @ one.origin.transform
-        said = [*ends, *_numbers(one, joints[one.name], frame, armature.get(one.name, 0.0))]
-        axis = "linear" if one.kind == "prismatic" else "angular"
-        kind = "PhysicsPrismaticJoint" if one.kind == "prismatic" else "PhysicsRevoluteJoint"
+        moving[connection.child], within[connection.child] = connection.child, np.eye(4)
+        bodies[connection.child] = [*_place(place), *_mass(robot.model.inertias[1 + robot.index(connection.name)])]
+        ends = [f"rel physics:body{end} = </{whole}/{names[link]}>" for end, link in enumerate((on, connection.child))]
+        frame = within[connection.parent] @ connection.origin.transform
+        lines = [*ends, *_numbers(connection, joints[connection.name], frame, armature.get(connection.name, 0.0))]
+        axis = "linear" if connection.kind == "prismatic" else "angular"
+        kind = "PhysicsPrismaticJoint" if connection.kind == "prismatic" else "PhysicsRevoluteJoint"
         connections.append(
-            _prim(kind, names[one.name], said, ("NewtonJointAPI", f"PhysxJointAxisAPI:{axis}"), one.name)
+            _prim(kind, names[connection.name], lines, ("NewtonJointAPI", f"PhysxJointAxisAPI:{axis}"), connection.name)
         )
     for number, solid in enumerate(structure.solids):
         if solid.kind in _SHAPES:
             bodies[moving[solid.link]] += _shape(solid, within[solid.link], f"{solid.purpose}_{number}")
     prims = (
-        _prim("Xform", names[link], said, ("PhysicsRigidBodyAPI", "PhysicsMassAPI"), link)
-        for link, said in bodies.items()
+        _prim("Xform", names[link], lines, ("PhysicsRigidBodyAPI", "PhysicsMassAPI"), link)
+        for link, lines in bodies.items()
     )
     inside = [line for prim in (*prims, *connections) for line in prim]
     scene = _prim("PhysicsScene", "physicsScene", _GRAVITY)
@@ -70,9 +71,9 @@ def usd_text(robot: Robot, armature: Mapping[str, float]) -> str:
 
 
 def _prim(kind: str, name: str, inside: Iterable[str], schemas: Sequence[str] = (), called: str = "") -> list[str]:
-    said = [f"prepend apiSchemas = [{', '.join(map(_text, schemas))}]"] if schemas else []
-    said += [f"displayName = {_text(called)}"] if called not in ("", name) else []
-    head = [f'def {kind} "{name}" (', *_within(said), ")"] if said else [f'def {kind} "{name}"']
+    metadata = [f"prepend apiSchemas = [{', '.join(map(_text, schemas))}]"] if schemas else []
+    metadata += [f"displayName = {_text(called)}"] if called not in ("", name) else []
+    head = [f'def {kind} "{name}" (', *_within(metadata), ")"] if metadata else [f'def {kind} "{name}"']
     return [*head, "{", *_within(inside), "}"]
 
 
@@ -98,11 +99,11 @@ def _mass(body: pin.Inertia) -> list[str]:
     ]
 
 
-def _numbers(one: Connection, joint: Joint, frame: np.ndarray, armature: float) -> Iterator[str]:
+def _numbers(connection: Connection, joint: Joint, frame: np.ndarray, armature: float) -> Iterator[str]:
     """Yield what a joint says: its frames, whose x axis it moves about or along, limits, and numbers."""
-    assert one.axis is not None
-    turn = pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), np.array(one.axis)).matrix()
-    slides = one.kind == "prismatic"
+    assert connection.axis is not None
+    turn = pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), np.array(connection.axis)).matrix()
+    slides = connection.kind == "prismatic"
     angle, per_angle = (1.0, 1.0) if slides else (1 / _PER_DEGREE, _PER_DEGREE)
     axis = "linear" if slides else "angular"
     yield 'uniform token physics:axis = "X"'
@@ -115,8 +116,8 @@ def _numbers(one: Connection, joint: Joint, frame: np.ndarray, armature: float) 
             yield f"float physics:{end}Limit = {getattr(joint, end) * angle!r}"
     for newton, physx, value in (
         ("armature", ("armature",), armature),
-        ("damping", ("viscousFrictionCoefficient",), one.damping * per_angle),
-        ("friction", ("staticFrictionEffort", "dynamicFrictionEffort"), one.friction),
+        ("damping", ("viscousFrictionCoefficient",), connection.damping * per_angle),
+        ("friction", ("staticFrictionEffort", "dynamicFrictionEffort"), connection.friction),
     ):
         yield f"float newton:{newton} = {float(value)!r}"
         yield from (f"float physxJointAxis:{axis}:{name} = {float(value)!r}" for name in physx)
@@ -126,8 +127,8 @@ def _shape(solid: Solid, link: np.ndarray, name: str) -> list[str]:
     place = link @ solid.origin.transform
     if solid.kind == "box":
         place = place @ np.diag([*solid.size, 1.0])
-    said = {"box": ["double size = 1"], "sphere": [f"double radius = {solid.size[0]!r}"]}
-    said["cylinder"] = [
+    sizes = {"box": ["double size = 1"], "sphere": [f"double radius = {solid.size[0]!r}"]}
+    sizes["cylinder"] = [
         f"double radius = {solid.size[0]!r}",
         'uniform token axis = "Z"',
         f"double height = {solid.size[-1]!r}",
@@ -135,18 +136,22 @@ def _shape(solid: Solid, link: np.ndarray, name: str) -> list[str]:
     colour = [] if solid.colour is None else [f"color3f[] primvars:displayColor = [{_tuple(solid.colour[:3])}]"]
     schemas = ("PhysicsCollisionAPI",) if solid.purpose == "collision" else ()
     unseen = ['uniform token purpose = "guide"'] if schemas else []
-    return _prim(_SHAPES[solid.kind], name, [*_place(place), *said[solid.kind], *colour, *unseen], schemas)
+    return _prim(_SHAPES[solid.kind], name, [*_place(place), *sizes[solid.kind], *colour, *unseen], schemas)
 
 
 def _identifiers(names: Iterable[str]) -> dict[str, str]:
     """Return names as USD allows them: letters, digits and lines; no two the same."""
-    found: dict[str, str] = {}
+    identifiers: dict[str, str] = {}
     taken: set[str] = {"physicsScene", "world_to_base"}
     for name in dict.fromkeys(names):
         plain = re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII) or "_"
-        found[name] = next(one for one in (plain, *(f"{plain}_{k}" for k in range(len(taken) + 1))) if one not in taken)
-        taken.add(found[name])
-    return found
+        identifiers[name] = next(
+            candidate
+            for candidate in (plain, *(f"{plain}_{k}" for k in range(len(taken) + 1)))
+            if candidate not in taken
+        )
+        taken.add(identifiers[name])
+    return identifiers
 
 
 def _text(value: str) -> str:

@@ -29,14 +29,14 @@ class Element:
 
     def child(self, tag: str) -> Element | None:
         """Return its first child of a tag, None where it has none."""
-        return next((one for one in self.children if one.tag == tag), None)
+        return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
         """Yield it and all within it, in the order of the file."""
         todo = [self]
         while todo:
-            yield (one := todo.pop())
-            todo += reversed(one.children)
+            yield (element := todo.pop())
+            todo += reversed(element.children)
 
 
 def outermost(content: bytes) -> Element:

@@ -37,22 +37,26 @@ def described(robot: Robot, packaged: Mapping[str, str] | None = None) -> Descri
     limits = {joint.name: joint for joint in robot.joints}
     renamed = Structure(
         tuple(_body(body, links) for body in structure.bodies),
-        tuple(_connection(one, joints, links, limits.get(one.name)) for one in structure.connections),
+        tuple(
+            _connection(connection, joints, links, limits.get(connection.name)) for connection in structure.connections
+        ),
         tuple(_solid(solid, links, meshes) for solid in structure.solids),
     )
     moved = [_limited(replace(joint, name=joints[joint.name])) for joint in robot.joints]
     again = replace(robot_of(name, renamed, moved, f"{robot.name} for ROS"), manufacturer=robot.manufacturer)
     changed = [("robot", {robot.name: name}), ("joint", joints), ("link", links)]
-    said = [f'{what} "{old}" is {new} in ROS' for what, names in changed for old, new in names.items() if old != new]
-    return Described(again, renamed, (*said, *_changes(robot), *_meshes(structure, meshes)))
+    renamings = [
+        f'{kind} "{old}" is {new} in ROS' for kind, names in changed for old, new in names.items() if old != new
+    ]
+    return Described(again, renamed, (*renamings, *_changes(robot), *_meshes(structure, meshes)))
 
 
 def _fixed(structure: Structure, moving: dict[str, str]) -> dict[str, str]:
     """Return the other joints' names, which ROS does not ask for; none is that of a joint that moves."""
     return {
-        one.name: f"{one.name}_fixed" if one.name in moving.values() else one.name
-        for one in structure.connections
-        if one.name not in moving
+        connection.name: f"{connection.name}_fixed" if connection.name in moving.values() else connection.name
+        for connection in structure.connections
+        if connection.name not in moving
     }
 
 

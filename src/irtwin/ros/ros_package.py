@@ -42,7 +42,7 @@ def write_package(robot: Robot, folder: Path, meshes: Mapping[str, bytes] | None
     _check_folder(folder, name)
     model = CollisionModel(made.robot)
     chain = _chain(made.robot)
-    said = {
+    values = {
         "package": name,
         "robot": made.robot.name,
         "title": robot.name,
@@ -61,7 +61,7 @@ def write_package(robot: Robot, folder: Path, meshes: Mapping[str, bytes] | None
         write(folder / place, contents[mesh])
     write(folder / "urdf" / f"{made.robot.name}.urdf", made.robot.urdf.encode())
     for place, template in _files(made.robot.name).items():
-        write(folder / place, _templates().get_template(template).render(said).encode())
+        write(folder / place, _templates().get_template(template).render(values).encode())
     return [*made.said, *_unchecked(model)]
 
 

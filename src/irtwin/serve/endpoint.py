@@ -28,7 +28,7 @@ _ROOM = 4  # largest answers that may wait for their clients
 _NAMED_GRAPHS = "SELECT ?graph WHERE { GRAPH ?graph { } } ORDER BY ?graph"
 _PREFIXES = {"sd": "http://www.w3.org/ns/sparql-service-description#", "formats": "http://www.w3.org/ns/formats/"}
 _SERVICE = """
-[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature sd:UnionDefaultGraph ;
+[] a sd:Service ; sd:endpoint %s ; sd:supportedLanguage %s ; sd:feature %s ;
   sd:resultFormat formats:SPARQL_Results_JSON, formats:SPARQL_Results_XML, formats:SPARQL_Results_CSV,
     formats:SPARQL_Results_TSV, formats:Turtle, formats:N-Triples, formats:RDF_XML, formats:JSON-LD ;
   sd:defaultDataset [ a sd:Dataset ; sd:defaultGraph [ a sd:Graph ] %s ] .
@@ -83,17 +83,26 @@ class Endpoint:
         """Read what is to be done with a graph; who may not change one is refused before he is listened to."""
         method = request.method
         if method in ("GET", "HEAD"):
-            return graph_store.read(parameters)
+            operation = graph_store.read(parameters)
+            await self._check_there(request, operation.default_graphs)
+            return operation
         if method == "OPTIONS":
             raise Refusal(204, "", {"Allow": _METHODS_OF_GRAPH})
         if method not in ("PUT", "POST", "DELETE"):
             raise Refusal(405, f"{method} is not for a graph", {"Allow": _METHODS_OF_GRAPH})
         self._updates.admit(request.headers.get("authorization", ""))
         if method == "DELETE":
-            return graph_store.dropped(parameters)
+            operation = graph_store.dropped(parameters)
+            await self._check_there(request, parameters["graph"])
+            return operation
         sent = request.headers.get("content-type", ""), await self._body(request), _address(request)
         change = graph_store.replaced if method == "PUT" else graph_store.merged
         return await asyncio.to_thread(change, parameters, *sent)
+
+    async def _check_there(self, request: Request, graphs: Sequence[str]) -> None:
+        for name in graphs:
+            if not await self._asking.holds(request, "GRAPH ?graph { ?s ?p ?o }", {"graph": name}):
+                raise Refusal(404, f"there is no graph {name}")
 
     async def _body(self, request: Request) -> bytes:
         return await read_body(request, self._limits.request, self._limits.seconds)
@@ -113,7 +122,7 @@ class Endpoint:
             return page.response()
         _, graphs = await self._asking.written(request, _NAMED_GRAPHS, "text/csv")
         named = graphs.decode().splitlines()[1:]
-        return _description(accept, _address(request), named, self._updates.allowed)
+        return _description(accept, _address(request), named, self._updates.allowed, bool(self._limits.services))
 
     async def _update(self, operation: Operation, request: Request) -> Response:
         headers = request.headers
@@ -155,13 +164,14 @@ class Endpoint:
         return head
 
 
-def _description(accept: str, address: str, graphs: Sequence[str], updates: bool) -> Response:
+def _description(accept: str, address: str, graphs: Sequence[str], updates: bool, services: bool) -> Response:
     """Return the SPARQL 1.1 Service Description of the service at `address`, in the form that the client prefers."""
     media_type = negotiation.chosen(accept, negotiation.TRIPLES, "the description")
     languages = "sd:SPARQL11Query, sd:SPARQL11Update" if updates else "sd:SPARQL11Query"
+    features = "sd:UnionDefaultGraph" + ", sd:BasicFederatedQuery" * services
     named = "".join(f"; sd:namedGraph [ a sd:NamedGraph ; sd:name {NamedNode(graph)} ]" for graph in graphs)
     prefixes = "".join(f"@prefix {name}: <{iri}> . " for name, iri in _PREFIXES.items())
-    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, named), RdfFormat.TURTLE)
+    quads = parse(prefixes + _SERVICE % (NamedNode(address), languages, features, named), RdfFormat.TURTLE)
     form = RdfFormat.from_media_type(media_type)
     body = serialize((quad.triple for quad in quads), format=form, prefixes=_PREFIXES)
     return Response(body, media_type=media_type, headers={"Vary": "Accept"})
@@ -179,7 +189,7 @@ async def _send(answer: Reply, head: AnswerHead, request: Request, send: Send) -
     if head.etag is not None:
         headers["ETag"] = head.etag
     encoded = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
-    known = {one.strip() for one in request.headers.get("if-none-match", "").split(",")}
+    known = {tag.strip() for tag in request.headers.get("if-none-match", "").split(",")}
     is_known = head.etag in known and request.method != "POST"
     await send({"type": "http.response.start", "status": 304 if is_known else 200, "headers": encoded})
     async for piece in answer.pieces():

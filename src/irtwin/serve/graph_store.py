@@ -22,7 +22,7 @@ def read(parameters: Parameters) -> Operation:
     named = parameters.get("graph", ())
     if len(named) > 1 or (named and "default" in parameters):
         raise Refusal(400, "ask for one graph: `graph=IRI` or `default`")
-    return Operation("query", _ALL, tuple(named))
+    return Operation("query", _ALL, tuple(_iri(name).value for name in named))
 
 
 def replaced(parameters: Parameters, content_type: str, body: bytes, base: str) -> Operation:
@@ -54,7 +54,11 @@ def _own(parameters: Parameters) -> NamedNode:
     named = parameters.get("graph", ())
     if len(named) != 1 or "default" in parameters:
         raise Refusal(400, "name the one graph that is changed: `graph=IRI`")
+    return _iri(named[0])
+
+
+def _iri(name: str) -> NamedNode:
     try:
-        return NamedNode(named[0])
+        return NamedNode(name)
     except ValueError:
-        raise Refusal(400, f"{named[0]!r} is no absolute IRI") from None
+        raise Refusal(400, f"{name!r} is no absolute IRI") from None

@@ -28,11 +28,11 @@ def best(accept: str, offered: Sequence[str]) -> str | None:
     return choice if _quality(choice, ranges) > 0 else None
 
 
-def chosen(accept: str, offered: Sequence[str], what: str) -> str:
+def chosen(accept: str, offered: Sequence[str], label: str) -> str:
     """Return the media type that an Accept header prefers of what is `offered`. Raises Refusal where none will do."""
     media_type = best(accept, offered)
     if media_type is None:
-        raise Refusal(406, f"{what} comes as {', '.join(offered)}; none of them is in Accept")
+        raise Refusal(406, f"{label} comes as {', '.join(offered)}; none of them is in Accept")
     return media_type
 
 
@@ -44,7 +44,7 @@ def wants_page(accept: str) -> bool:
 def _quality(media_type: str, ranges: Mapping[str, float]) -> float:
     """Return the quality of the range that names a media type most closely, 0 where none does."""
     kind = media_type.partition("/")[0]
-    return next((ranges[one] for one in (media_type, f"{kind}/*", "*/*") if one in ranges), 0.0)
+    return next((ranges[pattern] for pattern in (media_type, f"{kind}/*", "*/*") if pattern in ranges), 0.0)
 
 
 def _ranges(accept: str) -> dict[str, float]:
@@ -52,8 +52,10 @@ def _ranges(accept: str) -> dict[str, float]:
     ranges: dict[str, float] = {}
     for part in accept.split(","):
         name, *parameters = (piece.strip().lower() for piece in part.split(";"))
-        said = [value for key, _, value in (one.partition("=") for one in parameters) if key.strip() == "q"]
-        quality = _number(said[0]) if said else 1.0
+        given = [
+            value for key, _, value in (parameter.partition("=") for parameter in parameters) if key.strip() == "q"
+        ]
+        quality = _number(given[0]) if given else 1.0
         if quality is not None and "" not in name.partition("/"):
             ranges.setdefault(name, quality)
     return ranges

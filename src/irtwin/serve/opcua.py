@@ -81,7 +81,7 @@ class _Plant:
     async def follow(self) -> None:
         """Look at the graph again and again."""
         self._ours, self._machinery, self._ecm = [
-            await self._server.register_namespace(it) for it in (_OURS, _MACHINERY, _ECM)
+            await self._server.register_namespace(uri) for uri in (_OURS, _MACHINERY, _ECM)
         ]
         self._machines = await self._server.nodes.objects.add_folder(self._machinery, "Machines")
         while True:

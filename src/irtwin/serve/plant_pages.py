@@ -129,11 +129,11 @@ class PlantPages:
 
     async def _done(self, request: Request) -> Response:
         """Keep that an action was done, and lead back to the list."""
-        said = read_form(await read_body(request, self._limits.request, self._limits.seconds))
-        self._updates.admit(said.authorization)
-        if not await self._asking.holds(request, KNOWN, {"action": said.action}):
-            raise Refusal(404, f"the graph knows no saving action {said.action}")
-        await self._updates.do(said.operation, self._asking.base, said.authorization, said.author)
+        done = read_form(await read_body(request, self._limits.request, self._limits.seconds))
+        self._updates.admit(done.authorization)
+        if not await self._asking.holds(request, KNOWN, {"action": done.action}):
+            raise Refusal(404, f"the graph knows no saving action {done.action}")
+        await self._updates.do(done.operation, self._asking.base, done.authorization, done.author)
         return RedirectResponse("/#saving", status_code=303)
 
     async def _made_table(self, request: Request) -> Response:
@@ -167,18 +167,18 @@ class PlantPages:
         sides = [comparison.side(request.query_params, which, self._asking.base) for which in ("a", "b")]
         if None in sides:
             return None, answers
-        asked = {name: one for name, one in page.questions("comparison").items() if "first" in one.bind}
+        asked = {name: question for name, question in page.questions("comparison").items() if "first" in question.bind}
         robot_iri = self._individual("robot", request.query_params["robot"])
         before, after = [
-            await self._asking.answers(request, asked, {"robot": robot_iri, **_iris(one.bindings())})
-            for one in sides if one is not None
+            await self._asking.answers(request, asked, {"robot": robot_iri, **_iris(side.bindings())})
+            for side in sides if side is not None
         ]  # fmt: skip
         return comparison.comparison(before, after), {**answers, **before}
 
     async def _both_logs(self, request: Request) -> dict[str, Any] | None:
         """Return what is drawn of two runs over each other, None where it is not runs that are compared."""
         sides = [comparison.side(request.query_params, which, self._asking.base) for which in ("a", "b")]
-        runs = [one.run for one in sides if one is not None and one.run is not None]
+        runs = [side.run for side in sides if side is not None and side.run is not None]
         asked = {name: page.questions("run")[name] for name in ("run", "series", "joints")}
         known = [await self._known(request, asked, {"run": run}, "run") for run in runs]
         drawn = [
@@ -231,7 +231,7 @@ class PlantPages:
 def _iris(bindings: Bindings) -> Bindings:
     """Return bindings as they are. Refusal where a text is no IRI."""
     try:
-        return {name: NamedNode(one).value if isinstance(one, str) else one for name, one in bindings.items()}
+        return {name: NamedNode(value).value if isinstance(value, str) else value for name, value in bindings.items()}
     except ValueError:
         raise Refusal(404, "no run has this name") from None
 
@@ -244,8 +244,8 @@ async def html(drawn: Callable[[], str], policy: str = POLICY) -> Response:
 
 async def refusal_page(refusal: Refusal) -> Response:
     """Return what is not answered as a page that leads back to the plant."""
-    said = {"heading": "Not here" if refusal.status == 404 else "Not answered", "status": refusal.status}
-    answer = await html(lambda: page.render("refused.html.jinja", {}, {}, message=refusal.message, **said))
+    words = {"heading": "Not here" if refusal.status == 404 else "Not answered", "status": refusal.status}
+    answer = await html(lambda: page.render("refused.html.jinja", {}, {}, message=refusal.message, **words))
     answer.status_code = refusal.status
     answer.headers.update(refusal.headers)
     return answer

@@ -36,13 +36,15 @@ class Limits:
     answer: int = 256 << 20  # bytes
     request: int = 1 << 20  # bytes
     waiting: int = 64  # queries
+    services: tuple[str, ...] = ()  # IRIs of endpoints that it may ask by SERVICE
 
 
 @dataclass(frozen=True)
 class AnswerHead:
     """What is known of an answer before its bytes: media type, how the graph stands (`irtwin.asking`), and its ETag.
 
-    An answer has an ETag where all of it was there before its first byte left.
+    The ETag is made of the answer, where all was there before its first byte left, else of the query and the state of
+    the graph, where these say what it is.
     """
 
     media_type: str
@@ -73,7 +75,7 @@ class Worker:
     @classmethod
     async def start(cls, location: Location, limits: Limits) -> Worker:
         """Start a process, and wait until it has opened the graph."""
-        arguments = map(str, (limits.memory, limits.seconds, limits.answer))
+        arguments = map(str, (limits.memory, limits.seconds, limits.answer, *limits.services))
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "irtwin.serve.worker", *arguments),
             stdin=asyncio.subprocess.PIPE,

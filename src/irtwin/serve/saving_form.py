@@ -36,14 +36,14 @@ class SaidDone:
 
 def read_form(body: bytes) -> SaidDone:
     """Read a form of `action`, `day`, `by` and `token`; without a day what was said is taken back. Raises Refusal."""
-    said = {name: values[-1] for name, values in read_parameters(body.decode("ascii", errors="replace")).items()}
+    fields = {name: values[-1] for name, values in read_parameters(body.decode("ascii", errors="replace")).items()}
     try:
-        action = NamedNode(said.get("action", ""))
-        done_on = day(said.get("day", ""))
+        action = NamedNode(fields.get("action", ""))
+        done_on = day(fields.get("day", ""))
     except InputError as error:
         raise Refusal(400, f"day: {error}") from None
     except ValueError:
-        raise Refusal(400, f"action {said.get('action', '')[:100]!r} is no IRI; take one of the list") from None
+        raise Refusal(400, f"action {fields.get('action', '')[:100]!r} is no IRI; take one of the list") from None
     change = _DONE if done_on else _TAKEN_BACK
     text = change.format(irt=IRT, graph=GRAPH_ASSERTED, action=action, day=Literal(done_on))
-    return SaidDone(action.value, Operation("update", text), said.get("by", ""), f"Bearer {said.get('token', '')}")
+    return SaidDone(action.value, Operation("update", text), fields.get("by", ""), f"Bearer {fields.get('token', '')}")

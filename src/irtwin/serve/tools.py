@@ -91,7 +91,8 @@ class _Calls:
             beside = [] if simulator is None else [f"--simulator={self._inside(simulator)}"]
             command = ["diagnose", "--quiet", f"--json={out}", *beside, "--", str(self._inside(data_set))]
             notes = self._said(command, self._seconds * _LONGER).stderr
-            return self._told(json.loads(out.read_text(encoding="utf-8")), command, notes)
+            again = [argument.replace(str(out), out.name) for argument in command]
+            return self._told(json.loads(out.read_text(encoding="utf-8")), again, notes)
 
     def predict(self, twin: _File, motion: _File) -> dict[str, Any]:
         """Say what energy a motion will take, by a twin that `irtwin diagnose --save-twin` wrote."""
@@ -99,7 +100,8 @@ class _Calls:
             out = Path(folder) / "predicted.parquet"
             command = ["predict", "--quiet", f"--out={out}", "--", str(self._inside(twin)), str(self._inside(motion))]
             done = self._said(command, self._seconds * _LONGER)
-        return self._told(done.stdout.removeprefix(f"{out}: ").strip(), command, done.stderr)
+        again = [argument.replace(str(out), out.name) for argument in command]
+        return self._told(done.stdout.removeprefix(f"{out}: ").strip(), again, done.stderr)
 
     def _inside(self, path: str) -> Path:
         file = (self._folder / path).resolve()

@@ -4,14 +4,20 @@ Oxigraph cannot be told to stop. The server writes one line of JSON to standard 
 one for each query, and reads frames from standard output: a letter, the length of what follows, and that. `B` says that
 the query begins, `H` is a head (JSON), `D` a piece of the answer, `E` the end. A head with a `status` is a refusal, and
 all that comes. Where a SPARQL server keeps the graph, a query that is ended here may go on there, up to its own limit.
+
+By SERVICE a query may ask the endpoints that the server was started with. Oxigraph sends them what stands in the clause
+and no header of ours, and follows no redirect.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
+import signal
 import struct
 import sys
+from collections.abc import Collection
 from contextlib import suppress
 from typing import IO, Any, cast
 
@@ -45,6 +51,7 @@ class _Sink:
         self._left = most_bytes
         self._held = bytearray()
         self._etag: str | None = None
+        self.asked: str | None = None  # what was asked of which state of the graph, where that names the answer
 
     def write(self, data: bytes) -> int:
         self._left -= len(data)
@@ -62,13 +69,18 @@ class _Sink:
         if not self.begun and len(self._held) <= _MOST_KEPT:
             self.small = bytes(self._held)
         if not self.begun:
-            named = hashlib.sha256(self.media_type.encode() + b"\0" + self._held)
-            self._etag = f'W/"{named.hexdigest()[:32]}"'
+            self._etag = self._named(self._held)
         self._send()
         _frame(self._out, b"E", b"")
 
+    def _named(self, of: bytes | bytearray) -> str:
+        named = hashlib.sha256(self.media_type.encode() + b"\0" + of)
+        return f'W/"{named.hexdigest()[:32]}"'
+
     def _send(self) -> None:
         if not self.begun:
+            if self._etag is None and self.asked is not None:
+                self._etag = self._named(self.asked.encode())
             head = {"media_type": self.media_type, "standing": self.standing, "etag": self._etag}
             _frame(self._out, b"H", json.dumps(head).encode())
             self.begun = True
@@ -76,11 +88,11 @@ class _Sink:
         self._held.clear()
 
 
-def main(memory: int, seconds: float, most_bytes: int) -> None:
-    """Answer queries until standard input ends; bytes of memory and seconds for each."""
+def main(memory: int, seconds: float, most_bytes: int, services: Collection[str]) -> None:
+    """Answer queries until standard input ends; bytes of memory and seconds for each; `services` they may ask."""
     out = sys.stdout.buffer
     location = Location.told(json.loads(sys.stdin.buffer.readline()))
-    if location.graph_url is None:
+    if location.graph_url is None and not services:
         leave_network()
     with reading(location) as current:
         limit_memory(memory)
@@ -93,7 +105,11 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
                 graph = current(request["at_once"])
                 _frame(out, b"B", b"")
                 sink.standing = standing(graph, location.folder)
-                _answer_once(graph, request, sink)
+                if services and "service" in request["text"].lower():
+                    signal.alarm(math.ceil(seconds) + 1)  # ends what waits for another server, should ours be gone
+                    _answer_from_elsewhere(graph, request, sink, services)
+                else:
+                    _answer_once(graph, request, sink)
             except (Refusal, InputError, MemoryError, OSError, RuntimeError) as error:
                 if sink.begun:
                     sys.exit(f"irtwin: an answer was broken off: {error}")
@@ -103,6 +119,8 @@ def main(memory: int, seconds: float, most_bytes: int) -> None:
 def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
     """Answer as before where the graph has not changed since; keep an answer that is small."""
     answers, asked = graph.answers, (request["text"], json.dumps({**request, "at_once": None}, sort_keys=True))
+    if graph.seen is not None and answers.can_keep(request["text"]):
+        sink.asked = graph.seen + asked[1]
     kept = answers.get(*asked)
     if kept is None:
         _answer(graph, request, sink)
@@ -114,8 +132,22 @@ def _answer_once(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) ->
         sink.end()
 
 
-def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink) -> None:
-    answer = graph.answer(request["text"], request["default_graphs"], request["named_graphs"], base=request["base"])
+def _answer_from_elsewhere(
+    graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink, services: Collection[str]
+) -> None:
+    """Answer a query that may ask other servers: not as before, as they may have changed."""
+    try:
+        _answer(graph, request, sink, services)
+    except (OSError, RuntimeError) as error:
+        said = str(error).partition("\n")[0].removesuffix(" with payload:")[:300]
+        raise Refusal(502, f"a server that SERVICE names does not answer this: {said}") from None
+    finally:
+        signal.alarm(0)
+
+
+def _answer(graph: KnowledgeGraph, request: dict[str, Any], sink: _Sink, services: Collection[str] = ()) -> None:
+    graphs = request["default_graphs"], request["named_graphs"]
+    answer = graph.answer(request["text"], *graphs, base=request["base"], services=services)
     file, accept = cast(IO[bytes], sink), request["accept"]
     if isinstance(answer, QuerySolutions | QueryBoolean):
         sink.media_type = negotiation.chosen(accept, negotiation.SOLUTIONS, "this answer")
@@ -143,6 +175,6 @@ def _frame(out: IO[bytes], kind: bytes, data: bytes) -> None:
 if __name__ == "__main__":
     with suppress(BrokenPipeError):  # the server is gone
         try:
-            main(int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3]))
+            main(int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3]), sys.argv[4:])
         except InputError as error:  # the graph has gone since the server began
             sys.exit(f"irtwin: {error}")

@@ -99,7 +99,9 @@ class Signals:
 
     def rows(self, chosen: slice | np.ndarray) -> Self:
         """Return some of the samples."""
-        some: dict[str, Any] = {name: it[chosen] for name, it in vars(self).items() if isinstance(it, np.ndarray)}
+        some: dict[str, Any] = {
+            name: values[chosen] for name, values in vars(self).items() if isinstance(values, np.ndarray)
+        }
         return replace(self, **some)
 
 

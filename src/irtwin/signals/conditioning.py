@@ -60,11 +60,13 @@ def condition(
         even = scipy.interpolate.make_interp_spline(signals.time, values, k=order)(time)
         if isinstance(cutoff, float):
             return low_pass(even, rate, cutoff)
-        return np.column_stack([low_pass(one, rate, own) for one, own in zip(even.T, cutoff, strict=True)])
+        return np.column_stack([low_pass(column, rate, own) for column, own in zip(even.T, cutoff, strict=True)])
 
     cutoffs = dict.fromkeys(_STATES, float(cutoff) if states_cutoff is None else states_cutoff)
-    logged = {name: it for name, it in signals.logged().items() if name not in REQUIRED}
-    measured: dict[str, Any] = {name: clean(it, cutoffs.get(name, float(cutoff))) for name, it in logged.items()}
+    logged = {name: values for name, values in signals.logged().items() if name not in REQUIRED}
+    measured: dict[str, Any] = {
+        name: clean(values, cutoffs.get(name, float(cutoff))) for name, values in logged.items()
+    }
     q = clean(signals.q, cutoffs["q"], order=3)
     dq = _agreeing(measured.pop("dq", None), differentiate(q, rate), time)
     ddq = _agreeing(measured.pop("ddq", None), differentiate(dq, rate), time)
@@ -218,7 +220,7 @@ def _agreeing(logged: np.ndarray | None, derived: np.ndarray, time: np.ndarray) 
     if logged is None:
         return derived
     aligned = earlier(time, logged, lag_of(logged, derived, 1 / (time[1] - time[0])))
-    best = min(aligned, logged, key=lambda one: np.mean((one - derived) ** 2))
+    best = min(aligned, logged, key=lambda candidate: np.mean((candidate - derived) ** 2))
     return best if np.mean((best - derived) ** 2) <= _AGREEMENT**2 * np.mean(derived**2) else derived
 
 
@@ -228,7 +230,7 @@ def lag_of(logged: np.ndarray, derived: np.ndarray, rate: float) -> float:
     Their difference is the lag times the slope of these. That of the logged ones is the instrument: noise of positions
     is in both others.
     """
-    slope, instrument = (differentiate(one, rate) for one in (derived, logged))
+    slope, instrument = (differentiate(signal, rate) for signal in (derived, logged))
     weights = 1 / np.maximum(np.mean(instrument**2, axis=0), np.finfo(float).tiny)
-    across, along = (np.sum(weights * np.mean(one * instrument, axis=0)) for one in (derived - logged, slope))
+    across, along = (np.sum(weights * np.mean(values * instrument, axis=0)) for values in (derived - logged, slope))
     return float(across / along) if along > 0 else 0.0

@@ -40,9 +40,9 @@ def robot_of_table(name: str, robot: TomlTable) -> Robot:
         raise InputError(f"{robot.file}: [[robot.dh.row]] is missing; give one for each joint, base to flange")
     if len(rows) > _MOST_ROWS:
         raise InputError(f"{robot.file}: [[robot.dh.row]]: {len(rows)} rows; a robot has at most {_MOST_ROWS}")
-    read = [_row(robot, number, each) for number, each in enumerate(rows, start=1)]
+    read = [_row(robot, number, row) for number, row in enumerate(rows, start=1)]
     described = DhTable(tuple(read), convention, _placement(table, "base"), _placement(table, "tool"))
-    twice = [each for each in described.joint_names if described.joint_names.count(each) > 1]
+    twice = [joint for joint in described.joint_names if described.joint_names.count(joint) > 1]
     if twice:
         raise InputError(f'{robot.file}: [[robot.dh.row]]: two joints are named "{twice[0]}"; give each its own name')
     return from_table(name, described)

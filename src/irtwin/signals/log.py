@@ -123,8 +123,8 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     read: list[Run] = []
     for number, values in enumerate(take(document, "run", list, file, "[[run]]"), start=1):
         listing = TomlTable(file, f"[[run]] {number}", values if isinstance(values, dict) else {})
-        pieces, said, found = _pieces(folder, listing, robot, repair, commanded, topics)
-        read, repairs, findings = read + pieces, repairs + said, findings + found
+        pieces, notes, faults = _pieces(folder, listing, robot, repair, commanded, topics)
+        read, repairs, findings = read + pieces, repairs + notes, findings + faults
     listed = _resolved(read, file)
     runs = tuple(run for run in listed if run.role != PLANNED)
     if not runs:
@@ -196,9 +196,9 @@ def own_runs(runs: Sequence[Run]) -> list[Run]:
 
 
 def _held(robot: Robot) -> str:
-    one = len(robot.held) == 1
-    what = "joint {} mimics another: it is" if one else "joints {} mimic others: they are"
-    return f"{what.format(', '.join(robot.held))} held at zero, and left out of the logs"
+    single = len(robot.held) == 1
+    phrase = "joint {} mimics another: it is" if single else "joints {} mimic others: they are"
+    return f"{phrase.format(', '.join(robot.held))} held at zero, and left out of the logs"
 
 
 def payload_told(file: Path) -> tuple[float, tuple[float, float, float]]:
@@ -325,11 +325,11 @@ def _pieces(
     if role not in ROLES:
         raise table.fault("role", f'= "{role}"; use {", ".join(ROLES)}')
     planned = role == PLANNED
-    signals, said = read_signals(path, robot, repair=repair, measured=not planned, commanded=commanded, topics=topics)
+    signals, notes = read_signals(path, robot, repair=repair, measured=not planned, commanded=commanded, topics=topics)
     if planned:
         signals = signals.motion
         check_plan(signals, path)
-    pieces, found = as_sampled(signals, path, () if planned else robot.joint_names)
+    pieces, faults = as_sampled(signals, path, () if planned else robot.joint_names)
     run = Run(
         name=path.stem,
         file=path,
@@ -346,11 +346,11 @@ def _pieces(
     )
     if len(pieces) > 1 and (run.pieces or run.cycles):
         run = replace(run, pieces=None, cycles=None)
-        said.append(
+        notes.append(
             f"{table.file}: {table.name} pieces and cycles are left out: the run is cut at holes in time, and nothing "
             "says what was made in which part"
         )
-    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], said, found
+    return [_piece(run, number, piece) for number, piece in enumerate(pieces, start=1)], notes, faults
 
 
 def _made(table: TomlTable, role: str) -> dict[str, Any]:

@@ -99,17 +99,17 @@ def _bad_samples(
     keep = np.ones(len(columns["time"]), dtype=bool)
     dropped: list[str] = []
 
-    def drop(bad: np.ndarray, column: str, what: str) -> None:
+    def drop(bad: np.ndarray, column: str, fault: str) -> None:
         if not bad.any():
             return
         rows = np.flatnonzero(bad)
         if not repair:
             raise InputError(
-                f"{source.path}, {source.place(rows[0])}, column {column}: {what}; correct it, or use --repair to drop "
-                "such samples"
+                f"{source.path}, {source.place(rows[0])}, column {column}: {fault}; correct it, or use --repair to "
+                "drop such samples"
             )
         shown = ", ".join(source.place(row) for row in rows[:10]) + (" ..." if len(rows) > 10 else "")
-        dropped.append(f"{source.path}: {len(rows)} samples dropped, column {column} {what}: {shown}")
+        dropped.append(f"{source.path}: {len(rows)} samples dropped, column {column} {fault}: {shown}")
         keep[rows] = False
 
     for name, values in columns.items():

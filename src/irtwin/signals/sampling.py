@@ -150,13 +150,13 @@ def _updates(q: np.ndarray, step: int) -> np.ndarray:
     return np.concatenate(rows)
 
 
-def checked_cutoff(hz: float, runs: Sequence[Signals], said: str) -> float:
-    """Return a stated cutoff, Hz. Raises InputError, beginning with `said`, where runs cannot be filtered with it."""
+def checked_cutoff(hz: float, runs: Sequence[Signals], label: str) -> float:
+    """Return a stated cutoff, Hz. Raises InputError, beginning with `label`, where runs cannot be filtered with it."""
     longest = max(float(run.time[-1] - run.time[0]) for run in runs)
     least, most = FEWEST_PERIODS / longest, min(0.5 / interval(run.time) for run in runs)
     if not least <= hz < most:
         raise InputError(
-            f"{said} should be at least {least:.3g} Hz, {FEWEST_PERIODS} periods in the longest run, and below "
+            f"{label} should be at least {least:.3g} Hz, {FEWEST_PERIODS} periods in the longest run, and below "
             f"{most:.4g} Hz, half the slowest sampling rate, not {hz:g} Hz"
         )
     return hz
@@ -179,13 +179,14 @@ def frozen(signals: Signals, joints: Sequence[str]) -> Iterator[tuple[str, slice
             continue
         channel = CHANNELS[field]
         for k, column in enumerate(channel.columns(joints)):
-            one, q = (values[:, k], signals.q[:, k : k + 1]) if channel.per_joint else (values, signals.q)
-            ends = {one.min(), one.max()} - {0.0}
-            steps = np.abs(np.diff(one, prepend=one[0], append=one[-1]))  # before each sample, and after the last
+            samples, q = (values[:, k], signals.q[:, k : k + 1]) if channel.per_joint else (values, signals.q)
+            ends = {samples.min(), samples.max()} - {0.0}
+            # before each sample, and after the last
+            steps = np.abs(np.diff(samples, prepend=samples[0], append=samples[-1]))
             jump = _JUMP * np.median(steps[steps > 0]) if steps.any() else np.inf
-            for own in _long(one):
+            for own in _long(samples):
                 jumps = max(steps[own.start], steps[own.stop]) > jump
-                if jumps and one[own.start] not in ends and np.ptp(q[own], axis=0).max(initial=0.0) > LEAST_RANGE:
+                if jumps and samples[own.start] not in ends and np.ptp(q[own], axis=0).max(initial=0.0) > LEAST_RANGE:
                     yield column, own
 
 

@@ -67,12 +67,12 @@ def at_all(of: Callable[[Motion], np.ndarray], motion: Motion) -> np.ndarray:
         return of(motion)
     assert motion.cutoff
     band = _between((motion.whole or motion).rate, motion.cutoff, every)
-    found = of(motion.rows(np.r_[0:first, 0:count:every, last:count]))
-    some = found[first : len(found) - (count - last)]
+    values = of(motion.rows(np.r_[0:first, 0:count:every, last:count]))
+    some = values[first : len(values) - (count - last)]
     inner = banded(band, some.reshape(len(some), -1), last - first, _SPARSE_AT_ONCE).reshape(
         last - first, *some.shape[1:]
     )
-    return np.concatenate([found[:first], inner, found[len(found) - (count - last) :]])
+    return np.concatenate([values[:first], inner, values[len(values) - (count - last) :]])
 
 
 def factor_at_some(values: np.ndarray, motion: Motion) -> np.ndarray:

@@ -65,14 +65,14 @@ class Alone:
             asked = np.append(own[NAMES.index("delay")], lead).tobytes()
             if asked not in known:
                 damps_error = self.servos.model.file.damps_error
-                every = [one.commands(begin, self.step, without, lead, damps_error) for one in self.stretches]
+                every = [stretch.commands(begin, self.step, without, lead, damps_error) for stretch in self.stretches]
                 known[asked] = np.stack(every, axis=1)
             commanded[:, place] = known[asked] + own[offset]
         moved = self._moved(numbers, commanded)
-        at = [one.time / self.step for one in self.stretches]
+        at = [stretch.time / self.step for stretch in self.stretches]
         return [
-            [_between(moved[:, :, one, place], at[place]) for place in range(len(self.stretches))]
-            for one in range(len(numbers))
+            [_between(moved[:, :, set_index, place], at[place]) for place in range(len(self.stretches))]
+            for set_index in range(len(numbers))
         ]
 
     def _moved(self, numbers: np.ndarray, commanded: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ class Alone:
         springs = compiled.qpos_spring[servos.model.positions], bool(spring.any())
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
-        q, v = (np.broadcast_to(one, commanded.shape[1:]).copy() for one in self.begun)
+        q, v = (np.broadcast_to(state, commanded.shape[1:]).copy() for state in self.begun)
         load, bodies = self._load(own[len(OF_JOINTS) :])
         soft, back = _dry(servos, own, step)
         lower, upper = self._stops()
@@ -128,7 +128,7 @@ class Alone:
         """Return where joints stop, (2, n): at the model's ranges, or as far beyond as the robot was."""
         compiled, dof = self.servos.model.compiled, self.servos.model.speeds
         joints = compiled.dof_jntid[dof]
-        q = np.concatenate([one.q for one in self.stretches])
+        q = np.concatenate([stretch.q for stretch in self.stretches])
         stops = np.array(
             [
                 np.minimum(compiled.jnt_range[joints, 0], q.min(axis=0)),
@@ -150,7 +150,7 @@ def _dry(servos: Servos, numbers: np.ndarray, step: float) -> tuple[np.ndarray, 
 
 def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Alone:
     """Return stretches of runs as each joint by itself is played over them."""
-    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
+    steps = int(np.ceil(max(stretch.time[-1] for stretch in stretches) / step)) + 1
     shape = (1 + len(OF_ROBOT), steps, len(stretches), len(servos.model.joints))
     load, inertia = np.empty(shape), np.empty(shape)
     own, flange = servos.model.compiled, servos.model.flange
@@ -158,18 +158,23 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
     for angles in _ASIDE * np.eye(2):
         models.append(copy.copy(own))
         models[-1].opt.gravity = tilted(own, angles)
-    for place, one in track(enumerate(stretches), "load of the bodies in each stretch"):
-        motion = smoothed(one.q, interval(one.time), _SMOOTH)
-        found = np.array([_bodies(servos, compiled, *motion) for compiled in models])
-        found[2:5] = (found[2:5] - found[1]) / _ASIDE
-        found[5:] = (found[5:] - found[0]) / _ASIDE
-        found[1] -= found[0]
-        found[0, 0] -= one.pushed(servos.model, one.time, step)
-        between = scipy.interpolate.make_interp_spline(one.time, np.moveaxis(found, 2, 0), k=1)
-        times = np.minimum(np.arange(steps) * step, one.time[-1])
+    for place, stretch in track(enumerate(stretches), "load of the bodies in each stretch"):
+        motion = smoothed(stretch.q, interval(stretch.time), _SMOOTH)
+        bodies = np.array([_bodies(servos, compiled, *motion) for compiled in models])
+        bodies[2:5] = (bodies[2:5] - bodies[1]) / _ASIDE
+        bodies[5:] = (bodies[5:] - bodies[0]) / _ASIDE
+        bodies[1] -= bodies[0]
+        bodies[0, 0] -= stretch.pushed(servos.model, stretch.time, step)
+        between = scipy.interpolate.make_interp_spline(stretch.time, np.moveaxis(bodies, 2, 0), k=1)
+        times = np.minimum(np.arange(steps) * step, stretch.time[-1])
         load[:, :, place], inertia[:, :, place] = np.moveaxis(between(times), 2, 0).swapaxes(1, 2)
     return Alone(
-        servos, tuple(stretches), step, load, inertia, np.array([one.state() for one in stretches]).swapaxes(0, 1)
+        servos,
+        tuple(stretches),
+        step,
+        load,
+        inertia,
+        np.array([stretch.state() for stretch in stretches]).swapaxes(0, 1),
     )
 
 

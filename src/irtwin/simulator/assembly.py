@@ -61,13 +61,20 @@ def assembled(links: Iterable[ModelLink], connections: Sequence[ModelJoint], gra
     spec.compiler.degree = False
     spec.option.gravity = gravity
     above: dict[str, ModelJoint] = {}
-    for one in connections:
+    for joint in connections:
         _check_finite(
-            f'joint "{one.name}"', one.origin, one.anchor, one.axis, *one.numbers.values(), *(one.servo or ())
+            f'joint "{joint.name}"',
+            joint.origin,
+            joint.anchor,
+            joint.axis,
+            *joint.numbers.values(),
+            *(joint.servo or ()),
         )
-        if one.child in above:
-            raise ValueError(f'link "{one.child}" is the child of two joints, {above[one.child].name} and {one.name}')
-        above[one.child] = one
+        if joint.child in above:
+            raise ValueError(
+                f'link "{joint.child}" is the child of two joints, {above[joint.child].name} and {joint.name}'
+            )
+        above[joint.child] = joint
     below: dict[str, list[ModelLink]] = {}
     for link in links:
         _check_finite(f'link "{link.name}"', link.place, link.mass, link.centre, link.inertia)
@@ -81,15 +88,15 @@ def assembled(links: Iterable[ModelLink], connections: Sequence[ModelJoint], gra
             raise ValueError(f"a chain of more than {_MOST} links cannot be modelled")
     if below:
         raise ValueError(f'the joints about link "{next(iter(below.values()))[0].name}" form a loop, or lead nowhere')
-    for one in connections:
-        if one.servo is not None:
-            add_servo(spec, one.name, one.servo)
+    for joint in connections:
+        if joint.servo is not None:
+            add_servo(spec, joint.name, joint.servo)
     return spec
 
 
-def _check_finite(what: str, *values: np.ndarray | float) -> None:
-    if not all(np.isfinite(one).all() for one in values):
-        raise ValueError(f"{what} has a number that is not finite")
+def _check_finite(owner: str, *values: np.ndarray | float) -> None:
+    if not all(np.isfinite(value).all() for value in values):
+        raise ValueError(f"{owner} has a number that is not finite")
 
 
 def _body(parent: mujoco.MjsBody, link: ModelLink, joint: ModelJoint | None) -> mujoco.MjsBody:
@@ -106,25 +113,27 @@ def _body(parent: mujoco.MjsBody, link: ModelLink, joint: ModelJoint | None) -> 
     return body
 
 
-def _joint(body: mujoco.MjsBody, one: ModelJoint) -> None:
-    kind = mujoco.mjtJoint.mjJNT_SLIDE if one.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
-    joint = body.add_joint(name=one.name, type=kind, pos=one.anchor, axis=one.axis)
-    if np.isfinite(one.limits).all():
-        joint.limited, joint.range = True, one.limits
-    if np.isfinite(one.effort):
-        joint.actfrclimited, joint.actfrcrange = True, (-one.effort, one.effort)
-    joint.armature, joint.frictionloss = one.numbers.get("armature", 0.0), one.numbers.get("frictionloss", 0.0)
-    joint.damping[0], joint.stiffness[0] = one.numbers.get("damping", 0.0), one.numbers.get("stiffness", 0.0)
-    joint.springref = one.numbers.get("springref", 0.0)
+def _joint(body: mujoco.MjsBody, connection: ModelJoint) -> None:
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if connection.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+    joint = body.add_joint(name=connection.name, type=kind, pos=connection.anchor, axis=connection.axis)
+    if np.isfinite(connection.limits).all():
+        joint.limited, joint.range = True, connection.limits
+    if np.isfinite(connection.effort):
+        joint.actfrclimited, joint.actfrcrange = True, (-connection.effort, connection.effort)
+    joint.armature = connection.numbers.get("armature", 0.0)
+    joint.frictionloss = connection.numbers.get("frictionloss", 0.0)
+    joint.damping[0] = connection.numbers.get("damping", 0.0)
+    joint.stiffness[0] = connection.numbers.get("stiffness", 0.0)
+    joint.springref = connection.numbers.get("springref", 0.0)
 
 
 def add_servo(spec: mujoco.MjSpec, joint: str, gains: tuple[float, float]) -> bool:
     """Give a joint a position servo in place of its motors; return whether it has none of its own."""
-    own, drives = spec.joint(joint), [one for one in spec.actuators if one.target == joint]
-    if own is None or any(one.biastype == mujoco.mjtBias.mjBIAS_AFFINE for one in drives):
+    own, drives = spec.joint(joint), [actuator for actuator in spec.actuators if actuator.target == joint]
+    if own is None or any(drive.biastype == mujoco.mjtBias.mjBIAS_AFFINE for drive in drives):
         return False
-    for one in drives:
-        spec.delete(one)
+    for drive in drives:
+        spec.delete(drive)
     servo = spec.add_actuator(name=f"{joint}{_SERVO}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     servo.gainprm[0], servo.biasprm[:3] = gains[0], (0.0, -gains[0], -gains[1])

@@ -55,7 +55,7 @@ class Axes:
         values = np.linalg.svd(other.direction.reshape(-1, 3), compute_uv=False)
         if values[1] < _PARALLEL * values[0]:  # what turns about them shows by how they move
             pairs.append((self.point - self.point.mean(axis=0), other.point - other.point.mean(axis=0)))
-        own, its = (np.concatenate([one.reshape(-1, 3) for one in some]) for some in zip(*pairs, strict=True))
+        own, its = (np.concatenate([vectors.reshape(-1, 3) for vectors in some]) for some in zip(*pairs, strict=True))
         left, _, right = np.linalg.svd(own.T @ its)
         turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
         return Axes(self.direction @ turn, self.point @ turn, self.turns)
@@ -92,15 +92,15 @@ def first_unlike(compiled: mujoco.MjModel, joints: Sequence[int], robot: Robot) 
 def alike(compiled: mujoco.MjModel, robot: Robot) -> list[tuple[str, ...]]:
     """Return the names of a model's joints, one after another on a way from its base, that lie as the robot's do."""
     poses = poses_of(robot)
-    own, found = robot_axes(robot, poses), []
+    own, chains = robot_axes(robot, poses), []
     for last in range(compiled.njnt):
         chain = _chain(compiled, last, len(robot.joints))
         kinds = [_TURNS if turns else _SLIDES for turns in own.turns]
         if compiled.jnt_type[chain].tolist() != kinds:
             continue
         if own.first_unlike(model_axes(compiled, chain, own.turns, poses)) is None:
-            found.append(tuple(compiled.joint(place).name for place in chain))
-    return found
+            chains.append(tuple(compiled.joint(place).name for place in chain))
+    return chains
 
 
 def _chain(compiled: mujoco.MjModel, last: int, count: int) -> list[int]:

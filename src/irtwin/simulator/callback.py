@@ -61,15 +61,19 @@ def apply(model: mujoco.MjModel, file: Path | str) -> Rest:
         given = parse_json(text)
     except ValueError as error:
         raise InputError(f"{path}: not JSON ({error}); {_MEND}") from error
-    found = Document.from_json(given) if isinstance(given, dict) and "verdict" in given else from_json(text, path)
-    rest, add = _of_diagnosis(model, found) if isinstance(found, Document) else _of_twin(model, found)
+    saved = Document.from_json(given) if isinstance(given, dict) and "verdict" in given else from_json(text, path)
+    rest, add = _of_diagnosis(model, saved) if isinstance(saved, Document) else _of_twin(model, saved)
     mujoco.set_mjcb_passive(lambda moving, data: add(moving, data) if moving is model else None)
     return rest
 
 
 def _of_twin(model: mujoco.MjModel, twin: Twin) -> tuple[Rest, Added]:
     real = [effect for effect in twin.standing if effect.channel == "torque"]
-    known = [one for one in real if not (one.memory or one.requires or one.disturbance or one.within_bodies)]
+    known = [
+        effect
+        for effect in real
+        if not (effect.memory or effect.requires or effect.disturbance or effect.within_bodies)
+    ]
     rest = [effect for effect in known if not (effect.bodies or effect.in_mjcf)]
     left_out = tuple(dict.fromkeys(effect.id for effect in real if effect not in known))
     return Rest(tuple(dict.fromkeys(effect.id for effect in rest)), left_out), _Torque(model, twin, known, rest)
@@ -99,7 +103,7 @@ class _Torque:
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         dq = data.qvel[self._dq]
         slides = np.where(dq < 0, -1.0, 1.0) * np.maximum(np.abs(dq), STANDSTILL)
-        q, ddq = (np.tile(each, (3, 1)) for each in (data.qpos[self._q], data.qacc[self._dq]))
+        q, ddq = (np.tile(state, (3, 1)) for state in (data.qpos[self._q], data.qacc[self._dq]))
         motion = Motion(np.full(3, data.time), q, np.array([slides, -slides, dq]), ddq, run=_MODEL)
         ahead, back, _ = self._stack.torque_of(self._within, motion, self._values)
         turns = (ahead - back) / 2 * np.sign(slides)
@@ -124,11 +128,11 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, dof: np.ndarray, more: np.
 def _of_diagnosis(model: mujoco.MjModel, document: Document) -> tuple[Rest, Added]:
     dead_band = of_servos()["dead_band"][0]
     bands = {
-        one.joint: one.value
+        parameter.joint: parameter.value
         for cause in document.causes
         if cause.effect == dead_band
-        for one in cause.parameters
-        if one.joint is not None
+        for parameter in cause.parameters
+        if parameter.joint is not None
     }
     left_out = tuple(cause.effect for cause in not_held(document) if cause.effect != dead_band)
     return Rest((dead_band,) if bands else (), left_out), _DeadBands(model, tuple(bands), np.array([*bands.values()]))

@@ -58,11 +58,11 @@ class DifferingNumbers:
         (0, n) where no torque was logged.
         """
         left, logged = (
-            [one[:, 1:] for one in some]
-            for some in (self.played.remainders, [one.measured for one in self.fit.stretches])
+            [samples[:, 1:] for samples in some]
+            for some in (self.played.remainders, [stretch.measured for stretch in self.fit.stretches])
         )
-        alike = np.mean([(one[1:] * one[:-1]).mean(axis=0) for one in left], axis=0)
-        whole = np.mean([(one**2).mean(axis=0) for one in logged], axis=0)
+        alike = np.mean([(remainder[1:] * remainder[:-1]).mean(axis=0) for remainder in left], axis=0)
+        whole = np.mean([(torque**2).mean(axis=0) for torque in logged], axis=0)
         return np.asarray(np.sqrt(np.maximum(alike, 0.0) / np.maximum(whole, 1e-300)))
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
@@ -102,7 +102,7 @@ def choose(fit: Fit) -> DifferingNumbers:
         fit, best, differs = _better(fit, [(best.at, differs), _added(fit, best.at)])
         fit, best, differs = _given_back(fit, fit.solved(best, differs | robots, _AGAIN))
     odds = np.full(differs.shape, -np.inf)
-    for part in (one for one in parts if (one & robots).any()):  # beside few numbers it shows whether it is needed
+    for part in (part for part in parts if (part & robots).any()):  # beside few numbers it shows whether it is needed
         back = _without(fit, best, part, differs | robots)
         odds = np.where(part, _odds(fit, (best, differs | robots), (back, differs | (robots & ~part))), odds)
         if odds[part[:, 0], 0][0] <= 0:
@@ -122,18 +122,18 @@ def _with_part(fit: Fit, best: Played, part: np.ndarray, robots: np.ndarray) -> 
     `part` and `robots` (k, 1): what joints share of it, and of what was found before.
     """
     free, own = _free(fit) | robots, fit.servos.chart(fit.servos.numbers)
-    shared, each = _of_robot(fit, best, free | part)
-    pull = each.sum(axis=0)
+    shared, rights = _of_robot(fit, best, free | part)
+    pull = rights.sum(axis=0)
     if pull @ replace(shared, right=pull).step() / 2 < _SHOWS:
         return best, False
     begun = (best, fit.played(np.where(robots, best.at, own)))
     alone = np.broadcast_to(part, own.shape)
-    first = fit.all_solved([(one, alone) for one in begun], _PASSES)
-    found = fit.best(fit.all_solved([(one, free | part) for one in first]), together=True)
-    back = _without(fit, found, part, free | part)
+    first = fit.all_solved([(played, alone) for played in begun], _PASSES)
+    with_part = fit.best(fit.all_solved([(played, free | part) for played in first]), together=True)
+    back = _without(fit, with_part, part, free | part)
     best = fit.best([best, back], together=bool(robots.any()))  # what came with it may be as good without
-    there = _odds(fit, (found, free | part), (best, free)) > 0
-    return (found if there else best), there
+    there = _odds(fit, (with_part, free | part), (best, free)) > 0
+    return (with_part if there else best), there
 
 
 def _without(fit: Fit, best: Played, part: np.ndarray, free: np.ndarray) -> Played:
@@ -142,10 +142,10 @@ def _without(fit: Fit, best: Played, part: np.ndarray, free: np.ndarray) -> Play
     return fit.solved(fit.played(np.where(part, own, best.at)), free & ~part)
 
 
-def _odds(fit: Fit, found: tuple[Played, np.ndarray], other: tuple[Played, np.ndarray]) -> float:
+def _odds(fit: Fit, with_part: tuple[Played, np.ndarray], without: tuple[Played, np.ndarray]) -> float:
     """Return the odds, natural logarithms, of numbers with a part to those without; each with what is free (k, n)."""
-    worth = np.log(len(NAMES)) + _known(fit, *found) - _known(fit, *other)
-    return float(fit.total(other[0]) - fit.total(found[0]) - worth)
+    worth = np.log(len(NAMES)) + _known(fit, *with_part) - _known(fit, *without)
+    return float(fit.total(without[0]) - fit.total(with_part[0]) - worth)
 
 
 def _given_back(fit: Fit, best: Played) -> tuple[Fit, Played, np.ndarray]:
@@ -169,12 +169,12 @@ def _given_back(fit: Fit, best: Played) -> tuple[Fit, Played, np.ndarray]:
         best = fit.played(np.where(given.any(axis=0), tried.at, best.at))
 
 
-def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Add to the simulator's numbers of each joint a few of most evidence, beside what joints share as it is `found`.
+def _added(fit: Fit, shared_at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Add to the simulator's numbers of each joint a few of most evidence, beside what joints share at `shared_at`.
 
     Return where they are, and which differ.
     """
-    at = np.where(_ROBOTS, found, fit.servos.chart(fit.servos.numbers))
+    at = np.where(_ROBOTS, shared_at, fit.servos.chart(fit.servos.numbers))
     differs = np.zeros(at.shape, dtype=bool)
     for _ in range(_FEW):
         fit = fit.about(at)
@@ -186,8 +186,8 @@ def _added(fit: Fit, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         chosen = np.argmin(evidences, axis=0)
         better = np.min(evidences, axis=0) < evidence
         for joint in np.flatnonzero(better):
-            one, more = tried[chosen[joint]]
-            at[:, joint], differs[:, joint] = one.at[:, joint], more[:, joint]
+            winner, more = tried[chosen[joint]]
+            at[:, joint], differs[:, joint] = winner.at[:, joint], more[:, joint]
         if not better.any():
             break
     return at, differs
@@ -228,18 +228,18 @@ def _evidences(fit: Fit, ways: Sequence[tuple[Played, np.ndarray]]) -> list[np.n
     every = fit.all_slopes([(best, own) for (best, _), own in zip(ways, rows, strict=True)])
     evidences = []
     for (best, differs), slopes in zip(ways, every, strict=True):
-        found: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
+        costs: np.ndarray = fit.cost(best) + np.log(len(NAMES)) * differs.sum(axis=0)
         for joint in range(differs.shape[1]):
-            one = fit.equations(best.at, slopes, differs, joint)
-            found[joint] += one.known(LIKELY[one.rows, 0])
-        evidences.append(found)
+            equations = fit.equations(best.at, slopes, differs, joint)
+            costs[joint] += equations.known(LIKELY[equations.rows, 0])
+        evidences.append(costs)
     return evidences
 
 
 def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:
     """Return the fit with what its misfit and certainty are, and all numbers fitted; `own`: the simulator's, played."""
     free, begun = _free(fit), [own, fit.rolled(fit.begun().at)]
-    best = fit.best([*begun, *(fit.rolled(fit.delayed(fit.limited(fit.played(one.at))).at) for one in begun)])
+    best = fit.best([*begun, *(fit.rolled(fit.delayed(fit.limited(fit.played(start.at))).at) for start in begun)])
     best = fit.solved(fit.played(best.at), free, _PASSES)  # before what is left says how much each channel counts
     for _ in range(2):
         fit = _judged(fit, best, own)
@@ -251,7 +251,7 @@ def _all_free(fit: Fit, own: Played) -> tuple[Fit, Played]:
 
 def _judged(fit: Fit, best: Played, own: Played) -> Fit:
     """Return the fit about numbers; the least that they or the simulator's leave is taken for what is left at best."""
-    usual = np.sqrt(np.minimum(*(np.median(one.squares, axis=0) for one in (best, own))))
+    usual = np.sqrt(np.minimum(*(np.median(played.squares, axis=0) for played in (best, own))))
     return replace(fit, floor=np.maximum(usual, fit.least), certainty=certainty(best)).about(best.at)
 
 
@@ -280,9 +280,9 @@ def _weighed(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray) -> 
     own, loss = fit.servos.chart(fit.servos.numbers), np.full(differs.shape, np.inf)
     worth = np.full(differs.shape, np.log(len(NAMES)))
     for joint in range(differs.shape[1]):
-        one = fit.equations(best.at, slopes, differs, joint)
-        loss[one.rows, joint] = (best.at - own)[one.rows, joint] ** 2 / one.variance / 2
-        worth[one.rows, joint] += np.log(LIKELY[one.rows, 0] ** 2 / one.variance) / 2
+        equations = fit.equations(best.at, slopes, differs, joint)
+        loss[equations.rows, joint] = (best.at - own)[equations.rows, joint] ** 2 / equations.variance / 2
+        worth[equations.rows, joint] += np.log(LIKELY[equations.rows, 0] ** 2 / equations.variance) / 2
     if differs[_HOLDING].any():
         back = best.at.copy()
         back[_HOLDING] = own[_HOLDING]
@@ -299,11 +299,11 @@ def _interval(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray) ->
     spread = np.zeros(differs.shape)
     for joint in range(differs.shape[1]):
         own = fit.equations(best.at, slopes, differs, joint)
-        each = slopes.some(own.rows).right[:, joint]
+        rights = slopes.some(own.rows).right[:, joint]
         doubt = _doubt(fit, best, slopes, differs, joint)
-        spread[own.rows, joint] = np.sqrt(own.disagreement(each, len(own.rows)) + doubt)
-    shared, each = _of_robot(fit, best, differs)
-    spread[shared.rows] = np.sqrt(shared.disagreement(each, 1))[:, None]
+        spread[own.rows, joint] = np.sqrt(own.disagreement(rights, len(own.rows)) + doubt)
+    shared, rights = _of_robot(fit, best, differs)
+    spread[shared.rows] = np.sqrt(shared.disagreement(rights, 1))[:, None]
     return np.array([fit.servos.of_chart(best.at + side * spread) for side in (-NORMAL, NORMAL)])
 
 
@@ -317,12 +317,12 @@ def _of_robot(fit: Fit, best: Played, free: np.ndarray) -> tuple[Equations, np.n
     """Return the equations of rows that joints share and are free (k, n), and each stretch's right side (p, k)."""
     alike = [row for row in SHARED if free[row].any()]
     slopes = fit.slopes(best, (*SMOOTH, *alike))
-    found, rights = [], []
+    marginals, rights = [], []
     for joint in range(free.shape[1]):
         own = fit.equations(best.at, slopes, free, joint)
-        found.append(own.marginal(alike))
+        marginals.append(own.marginal(alike))
         rights.append(replace(own, right=slopes.some(own.rows).right[:, joint]).marginal(alike).right)
-    return Equations.beside(found).together(), np.sum(rights, axis=0)
+    return Equations.beside(marginals).together(), np.sum(rights, axis=0)
 
 
 def _doubt(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray, joint: int) -> np.ndarray:
@@ -331,14 +331,14 @@ def _doubt(fit: Fit, best: Played, slopes: Equations, differs: np.ndarray, joint
     Each adds what freeing it would, as likely as the data leave it that it differs.
     """
     before = fit.equations(best.at, slopes, differs, joint)
-    found = np.zeros(len(before.rows))
-    for row in (one for one in SMOOTH if one not in before.rows):
+    doubt = np.zeros(len(before.rows))
+    for row in (candidate for candidate in SMOOTH if candidate not in before.rows):
         freed = differs.copy()
         freed[row, joint] = True
         after = fit.equations(best.at, slopes, freed, joint)
         variance, step = after.variance, after.step()
-        own, others = after.rows.index(row), [after.rows.index(one) for one in before.rows]
+        own, others = after.rows.index(row), [after.rows.index(kept) for kept in before.rows]
         worth = np.log(len(NAMES)) + np.log(LIKELY[row, 0] ** 2 / variance[own]) / 2
         chance = scipy.special.expit(step[own] ** 2 / variance[own] / 2 - worth)
-        found += chance * (np.maximum(variance[others] - before.variance, 0.0) + step[others] ** 2)
-    return found
+        doubt += chance * (np.maximum(variance[others] - before.variance, 0.0) + step[others] ** 2)
+    return doubt

@@ -21,7 +21,7 @@ def not_held(document: Document) -> tuple[Cause, ...]:
     What was there in some runs alone is nothing that a model is to hold.
     """
     lasting = (cause for cause in _likely(document) if not cause.evidence.runs)
-    return tuple(cause for cause in lasting if any(one.simulator is None for one in cause.parameters))
+    return tuple(cause for cause in lasting if any(parameter.simulator is None for parameter in cause.parameters))
 
 
 def written(model: Model, document: Document, off: Mapping[Key, float] | None = None) -> bytes:
@@ -41,7 +41,7 @@ def drawn(model: Model, document: Document, twin: Twin | None, rng: np.random.Ge
     """Return the model's file with the robot's numbers as they could be, drawn from their covariance in the twin."""
     if twin is None or twin.covariance is None:
         return written(model, document)
-    keys = [(one.effect, one.joint or "", one.name) for one in twin.parameters]
+    keys = [(parameter.effect, parameter.joint or "", parameter.name) for parameter in twin.parameters]
     told = [key for key in _numbers(document) if key in keys]
     places = [keys.index(key) for key in told]
     off = rng.multivariate_normal(np.zeros(len(places)), twin.covariance[np.ix_(places, places)])
@@ -51,10 +51,10 @@ def drawn(model: Model, document: Document, twin: Twin | None, rng: np.random.Ge
 def _numbers(document: Document) -> dict[Key, float]:
     """Return the robot's numbers of joints that a model can hold, by effect, joint and name."""
     return {
-        (cause.effect, one.joint, one.name): one.robot
+        (cause.effect, parameter.joint, parameter.name): parameter.robot
         for cause in _likely(document)
-        for one in cause.parameters
-        if one.robot is not None and one.joint is not None
+        for parameter in cause.parameters
+        if parameter.robot is not None and parameter.joint is not None
     }
 
 

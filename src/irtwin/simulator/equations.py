@@ -34,7 +34,11 @@ class Equations:
     @classmethod
     def beside(cls, many: Sequence[Equations]) -> Equations:
         """Return some of the same rows, one beside the other."""
-        return cls(many[0].rows, np.array([one.normal for one in many]), np.array([one.right for one in many]))
+        return cls(
+            many[0].rows,
+            np.array([equations.normal for equations in many]),
+            np.array([equations.right for equations in many]),
+        )
 
     def together(self, axis: int = 0) -> Equations:
         """Return the sum over an axis: of numbers that all along it share."""
@@ -50,9 +54,9 @@ class Equations:
         at = [list(self.rows).index(row) for row in rows]
         others = [place for place, row in enumerate(self.rows) if row not in rows]
         cross = self.normal[np.ix_(others, at)]
-        found = np.linalg.solve(self.normal[np.ix_(others, others)], cross)
-        normal = self.normal[np.ix_(at, at)] - cross.T @ found
-        return Equations(rows, normal, self.right[..., at] - self.right[..., others] @ found)
+        eliminated = np.linalg.solve(self.normal[np.ix_(others, others)], cross)
+        normal = self.normal[np.ix_(at, at)] - cross.T @ eliminated
+        return Equations(rows, normal, self.right[..., at] - self.right[..., others] @ eliminated)
 
     def likely(self, off: np.ndarray, deviation: np.ndarray) -> Equations:
         """Return those with what is likely before: numbers are `off` (k,), in deviations (k,) of the chart."""
@@ -64,18 +68,18 @@ class Equations:
 
     def step(self, farthest: np.ndarray | float = np.inf) -> np.ndarray:
         """Return the step (k,), or the part of it that goes no farther than (k,)."""
-        found = np.linalg.solve(self.normal, self.right)
-        return np.asarray(found / max(1.0, np.abs(found / farthest).max(initial=0.0)))
+        step = np.linalg.solve(self.normal, self.right)
+        return np.asarray(step / max(1.0, np.abs(step / farthest).max(initial=0.0)))
 
     @property
     def variance(self) -> np.ndarray:
         """How sure numbers are, (k,), by what is left of them."""
         return np.diag(np.linalg.inv(self.normal))
 
-    def disagreement(self, each: np.ndarray, count: int) -> np.ndarray:
+    def disagreement(self, rights: np.ndarray, count: int) -> np.ndarray:
         """Return the variance (k,) of `count` numbers, by how right sides of stretches (p, k) differ, too."""
         inverse = np.linalg.inv(self.normal)
-        between = inverse @ (each.T @ each) @ inverse * len(each) / max(len(each) - count, 1)
+        between = inverse @ (rights.T @ rights) @ inverse * len(rights) / max(len(rights) - count, 1)
         return np.asarray(np.maximum(np.diag(between), np.diag(inverse)))
 
     def known(self, deviation: np.ndarray) -> float:

@@ -42,8 +42,8 @@ _LATE = (0, 1, 2, 3, 4, 6, 8)  # samples by which commands are tried later
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
 
 
-def _rows(values: dict[str, float], other: float) -> np.ndarray:
-    return np.array([values.get(name, other) for name in NAMES])[:, None]
+def _rows(values: dict[str, float], default: float) -> np.ndarray:
+    return np.array([values.get(name, default) for name in NAMES])[:, None]
 
 
 STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKELY, 3.0)
@@ -84,7 +84,7 @@ class Fit:
     @cached_property
     def least(self) -> np.ndarray:
         """A misfit that is none (c, n): less than encoders resolve, and torques are measured to."""
-        squares = np.mean([(one.measured**2).mean(axis=0) for one in self.stretches], axis=0)
+        squares = np.mean([(stretch.measured**2).mean(axis=0) for stretch in self.stretches], axis=0)
         return np.vstack([np.full_like(squares[:1], _LEAST), _LEAST_OF_TORQUE * np.sqrt(squares[1:])])
 
     @property
@@ -103,11 +103,11 @@ class Fit:
 
     def all_played(self, many: Sequence[np.ndarray]) -> list[Played]:
         """Play several numbers of the chart."""
-        found = self.alone.play([self.servos.of_chart(at) for at in many])
+        all_moved = self.alone.play([self.servos.of_chart(at) for at in many])
         beyond = self.beyond or (0.0,) * len(self.stretches)
         return [
-            self._left(at, [one + more for one, more in zip(moved, beyond, strict=True)])
-            for at, moved in zip(many, found, strict=True)
+            self._left(at, [motion + more for motion, more in zip(moved, beyond, strict=True)])
+            for at, moved in zip(many, all_moved, strict=True)
         ]
 
     def rolled(self, at: np.ndarray) -> Played:
@@ -116,8 +116,8 @@ class Fit:
 
     def all_rolled(self, many: Sequence[np.ndarray]) -> list[Played]:
         """Play several numbers of the chart by the whole model."""
-        found = play(self.servos, [self.servos.of_chart(at) for at in many], self.stretches)
-        return [self._left(at, moved) for at, moved in zip(many, found, strict=True)]
+        all_moved = play(self.servos, [self.servos.of_chart(at) for at in many], self.stretches)
+        return [self._left(at, moved) for at, moved in zip(many, all_moved, strict=True)]
 
     def _whole(self, at: np.ndarray) -> list[np.ndarray]:
         asked = at.tobytes()
@@ -128,30 +128,30 @@ class Fit:
     def about(self, at: np.ndarray) -> Fit:
         """Return the fit that plays as the whole model at numbers (k, n) of the chart, with slopes of single joints."""
         single = self.alone.play([self.servos.of_chart(at)])[0]
-        return replace(self, beyond=tuple(one - other for one, other in zip(self._whole(at), single, strict=True)))
+        return replace(self, beyond=tuple(whole - alone for whole, alone in zip(self._whole(at), single, strict=True)))
 
     def _left(self, at: np.ndarray, moved: Sequence[np.ndarray]) -> Played:
-        left = [_remainder(one, played) for one, played in zip(self.stretches, moved, strict=True)]
-        return Played(at, tuple(left), np.array([(each**2).mean(axis=0) for each in left]))
+        left = [_remainder(stretch, played) for stretch, played in zip(self.stretches, moved, strict=True)]
+        return Played(at, tuple(left), np.array([(remainder**2).mean(axis=0) for remainder in left]))
 
-    def replaced(self, one: Played, place: int, moved: np.ndarray) -> Played:
+    def replaced(self, played: Played, place: int, moved: np.ndarray) -> Played:
         """Return what is left where the model did otherwise in a stretch: `moved` (N, c, n)."""
-        left, squares = list(one.remainders), one.squares.copy()
+        left, squares = list(played.remainders), played.squares.copy()
         left[place] = _remainder(self.stretches[place], moved)
         squares[place] = (left[place] ** 2).mean(axis=0)
-        return Played(one.at, tuple(left), squares)
+        return Played(played.at, tuple(left), squares)
 
-    def cost(self, one: Played) -> np.ndarray:
+    def cost(self, played: Played) -> np.ndarray:
         """Return how bad numbers are, (n,), as a logarithm of probability: what is left, and how far they are."""
-        return np.asarray(self.misfit(one) + (self.away(one.at) ** 2).sum(axis=0) / 2)
+        return np.asarray(self.misfit(played) + (self.away(played.at) ** 2).sum(axis=0) / 2)
 
-    def total(self, one: Played) -> float:
+    def total(self, played: Played) -> float:
         """Return how bad numbers of all joints are."""
-        return float(self.cost(one).sum())
+        return float(self.cost(played).sum())
 
-    def misfit(self, one: Played) -> np.ndarray:
+    def misfit(self, played: Played) -> np.ndarray:
         """Return what is left as a logarithm of probability, (n,)."""
-        return np.asarray((self.certainty / 2 * np.log1p(one.squares / self.floor**2)).sum(axis=(0, 1)))
+        return np.asarray((self.certainty / 2 * np.log1p(played.squares / self.floor**2)).sum(axis=(0, 1)))
 
     def away(self, at: np.ndarray) -> np.ndarray:
         """Return how far numbers (k, n) are from the simulator's, in standard deviations of what is likely."""
@@ -159,30 +159,30 @@ class Fit:
         off[_HOLDING] = 0.0
         return np.asarray(off)
 
-    def slopes(self, one: Played, rows: Sequence[int] = SMOOTH) -> Equations:
+    def slopes(self, played: Played, rows: Sequence[int] = SMOOTH) -> Equations:
         """Return the equations (p, n, ...) of each stretch and joint for a step of some rows of the numbers."""
-        return self.all_slopes([(one, rows)])[0]
+        return self.all_slopes([(played, rows)])[0]
 
     def all_slopes(self, many: Sequence[tuple[Played, Sequence[int]]]) -> list[Equations]:
         """Return the equations about several numbers, each of its rows."""
-        stepped = [one.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for one, rows in many for row in rows]
+        stepped = [played.at + STEP * (np.arange(len(NAMES)) == row)[:, None] for played, rows in many for row in rows]
         moved = iter(self.all_played(stepped))
         return [
-            self.sums(one, rows, [next(moved) for _ in rows], np.array([STEP[row, 0] for row in rows]))
-            for one, rows in many
+            self.sums(played, rows, [next(moved) for _ in rows], np.array([STEP[row, 0] for row in rows]))
+            for played, rows in many
         ]
 
-    def sums(self, one: Played, rows: Sequence[Any], moved: Sequence[Played], steps: np.ndarray) -> Equations:
+    def sums(self, played: Played, rows: Sequence[Any], moved: Sequence[Played], steps: np.ndarray) -> Equations:
         """Return the equations (p, n, ...) of each stretch and joint, weighted as the misfit counts.
 
         By what is left where each of the rows is `moved` by one of `steps` (k,).
         """
-        found = []
-        for place, left in enumerate(one.remainders):
-            columns = left - np.array([each.remainders[place] for each in moved]).reshape(-1, *left.shape)
-            weight = self.certainty / (len(left) * (one.squares[place] + self.floor**2))
-            found.append(Equations.of(rows, columns / steps[:, None, None, None], left, weight))
-        return Equations.beside(found)
+        equations = []
+        for place, left in enumerate(played.remainders):
+            columns = left - np.array([stepped.remainders[place] for stepped in moved]).reshape(-1, *left.shape)
+            weight = self.certainty / (len(left) * (played.squares[place] + self.floor**2))
+            equations.append(Equations.of(rows, columns / steps[:, None, None, None], left, weight))
+        return Equations.beside(equations)
 
     def solved(self, best: Played, free: np.ndarray, passes: int = _PASSES) -> Played:
         """Return numbers with those that are free (k, n) fitted."""
@@ -194,32 +194,32 @@ class Fit:
         Each joint has a damping of its own. It keeps what it has where nothing better is found; all joints do where
         what they share is free.
         """
-        found, free = [best for best, _ in begun], [some for _, some in begun]
+        solved, free = [best for best, _ in begun], [some for _, some in begun]
         rows = [[row for row in (*SMOOTH, *SHARED) if some[row].any()] for some in free]
         damping = np.full((len(begun), len(self.servos.model.joints)), 1e-2)
         going = [k for k, own in enumerate(rows) if own]
         for number in range(passes):
-            every = self.all_slopes([(found[k], rows[k]) for k in going])
+            every = self.all_slopes([(solved[k], rows[k]) for k in going])
             steps = [
-                self._steps(found[k].at, slopes, free[k], damping[k] * times)
+                self._steps(solved[k].at, slopes, free[k], damping[k] * times)
                 for k, slopes in zip(going, every, strict=True)
                 for times in _DAMPINGS
             ]
-            ways = [found[k].at for k in going for _ in _DAMPINGS]
+            ways = [solved[k].at for k in going for _ in _DAMPINGS]
             numbers = [self.servos.of_chart(at + step) for at, step in zip(ways, steps, strict=True)]
-            tried = iter(self.all_played([self.servos.chart(one) for one in numbers]))
+            tried = iter(self.all_played([self.servos.chart(candidate) for candidate in numbers]))
             for k in tuple(going):
                 own, together = [next(tried) for _ in _DAMPINGS], any(row in SHARED for row in rows[k])
-                before, chosen = self.cost(found[k]), np.argmin(self._costs(own, together), axis=0)
-                found[k] = self.best((found[k], *own), together)
+                before, chosen = self.cost(solved[k]), np.argmin(self._costs(own, together), axis=0)
+                solved[k] = self.best((solved[k], *own), together)
                 damping[k] = np.maximum(damping[k] * np.array(_DAMPINGS)[chosen], 1e-4)
-                if (before - self.cost(found[k]) < _WORTH).all():
+                if (before - self.cost(solved[k]) < _WORTH).all():
                     going.remove(k)
             if not going:
                 break
-            left = 1e3 * np.sqrt(min(found[k].squares[:, 0].mean() for k in going))
+            left = 1e3 * np.sqrt(min(solved[k].squares[:, 0].mean() for k in going))
             tell_step(f"  numbers of servos, pass {number + 1} of {passes} at most: {left:.3g} mrad left")
-        return found
+        return solved
 
     def _steps(self, at: np.ndarray, slopes: Equations, free: np.ndarray, damping: np.ndarray) -> np.ndarray:
         """Return the step (k, n) of all numbers, none of those that are not free."""
@@ -227,11 +227,12 @@ class Fit:
         joints = [self.equations(at, slopes, free, joint).damped(own) for joint, own in enumerate(damping)]
         alike = [row for row in slopes.rows if row in SHARED]
         if alike:
-            shared = Equations.beside([one.marginal(alike) for one in joints]).together()
+            shared = Equations.beside([equations.marginal(alike) for equations in joints]).together()
             steps[alike] = shared.step(FARTHEST[alike, 0])[:, None]
-        for joint, one in enumerate(joints):
-            own = [row for row in one.rows if row not in SHARED]
-            beside = replace(one, right=one.right - one.normal @ steps[one.rows, joint])  # the step of what they share
+        for joint, equations in enumerate(joints):
+            own = [row for row in equations.rows if row not in SHARED]
+            # less the step of what they share
+            beside = replace(equations, right=equations.right - equations.normal @ steps[equations.rows, joint])
             steps[own, joint] = beside.some(own).step(FARTHEST[own, 0])
         return steps
 
@@ -244,7 +245,7 @@ class Fit:
         return every.together().some(own).likely(self.away(at)[own, joint], LIKELY[own, 0])
 
     def _costs(self, tried: Sequence[Played], together: bool) -> np.ndarray:
-        costs = np.array([self.cost(one) for one in tried])
+        costs = np.array([self.cost(played) for played in tried])
         return np.broadcast_to(costs.sum(axis=1, keepdims=True), costs.shape) if together else costs
 
     def best(self, tried: Sequence[Played], together: bool = False) -> Played:
@@ -255,13 +256,13 @@ class Fit:
         chosen = np.argmin(self._costs(tried, together), axis=0)
 
         def mixed(parts: Sequence[np.ndarray]) -> np.ndarray:
-            return np.stack([parts[one][..., joint] for joint, one in enumerate(chosen)], axis=-1)
+            return np.stack([parts[winner][..., joint] for joint, winner in enumerate(chosen)], axis=-1)
 
         stretches = range(len(self.stretches))
         return Played(
-            mixed([one.at for one in tried]),
-            tuple(mixed([one.remainders[place] for one in tried]) for place in stretches),
-            mixed([one.squares for one in tried]),
+            mixed([played.at for played in tried]),
+            tuple(mixed([played.remainders[place] for played in tried]) for place in stretches),
+            mixed([played.squares for played in tried]),
         )
 
     def limited(self, best: Played) -> Played:
@@ -269,15 +270,17 @@ class Fit:
         numbers, row = self.servos.of_chart(best.at), NAMES.index("torque_limit")
         _, servo = self.servos.dampings(numbers[NAMES.index("damping")])
         asked = [
-            np.abs(numbers[0] * (one.commands(one.time, 1e-3, numbers) - one.q) - servo * one.speed).max(axis=0)
-            for one in self.stretches
+            np.abs(
+                numbers[0] * (stretch.commands(stretch.time, 1e-3, numbers) - stretch.q) - servo * stretch.speed
+            ).max(axis=0)
+            for stretch in self.stretches
         ]
-        found, most = best, np.minimum(numbers[row], np.max(asked, axis=0))
+        better, most = best, np.minimum(numbers[row], np.max(asked, axis=0))
         for shares, about in ((_LIMITS, most), (_NEARER, None)):
-            middle = self.servos.of_chart(found.at)[row] if about is None else about
+            middle = self.servos.of_chart(better.at)[row] if about is None else about
             tried = [np.where(self._free(row), middle * share, numbers) for share in shares]
-            found = self.best((found, *self.all_played([self.servos.chart(one) for one in tried])))
-        return found
+            better = self.best((better, *self.all_played([self.servos.chart(candidate) for candidate in tried])))
+        return better
 
     def delayed(self, best: Played) -> Played:
         """Return numbers with the delays that are better, if any, by whole samples.
@@ -288,7 +291,7 @@ class Fit:
         is_delay = self._free(row)
         apart = interval(self.stretches[0].time)
         tried = [np.where(is_delay, self.servos.numbers + late * apart, numbers) for late in _LATE]
-        return self.best((best, *self.all_played([self.servos.chart(one) for one in tried])))
+        return self.best((best, *self.all_played([self.servos.chart(candidate) for candidate in tried])))
 
     def _free(self, row: int) -> np.ndarray:
         """Return where a row of numbers (k, n) can differ."""
@@ -303,9 +306,9 @@ class Fit:
             stiffness = own[0] * times
             ways = [own[1:3]] + [np.array([stiffness * _SETTLES, stiffness * share]) for share in _STICKS]
             every = [np.vstack([stiffness, *way, np.full_like(stiffness, HOLDS), own[4:]]) for way in ways]
-            grids.append([np.where(self.servos.can_differ, one, own) for one in every])
-        begun = [self.best(self.all_played([self.servos.chart(one) for one in grid])) for grid in grids]
-        return self.best(self.all_solved([(one, free) for one in begun], 3))
+            grids.append([np.where(self.servos.can_differ, start, own) for start in every])
+        begun = [self.best(self.all_played([self.servos.chart(start) for start in grid])) for grid in grids]
+        return self.best(self.all_solved([(played, free) for played in begun], 3))
 
 
 def unjudged(alone: Alone) -> Fit:

@@ -84,13 +84,13 @@ class Model:
         joints, data, full = compiled.dof_jntid[dof], mujoco.MjData(compiled), np.zeros((compiled.nv, compiled.nv))
         limited = compiled.jnt_limited[joints] == 1
         ends = np.where(limited, compiled.jnt_range[joints].T, [[-np.pi], [np.pi]])
-        found = []
+        inertias = []
         for pose in np.random.default_rng(0).uniform(ends[0], ends[1], (_POSES, len(at))):
             data.qpos[at] = pose
             mujoco.mj_forward(compiled, data)
             mujoco.mj_fullM(compiled, data, full)
-            found.append(np.diag(full)[dof] - compiled.dof_armature[dof])
-        return np.asarray(np.maximum(np.mean(found, axis=0), 1e-9))
+            inertias.append(np.diag(full)[dof] - compiled.dof_armature[dof])
+        return np.asarray(np.maximum(np.mean(inertias, axis=0), 1e-9))
 
     @cached_property
     def stiffest(self) -> np.ndarray:
@@ -114,7 +114,7 @@ class Model:
 
     def flange_jacobian(self, q: np.ndarray) -> np.ndarray:
         """Return the Jacobian (N, 3, n) of the flange's place in the world at positions (N, n)."""
-        data, found = mujoco.MjData(self.compiled), np.empty((len(q), 3, q.shape[1]))
+        data, jacobian = mujoco.MjData(self.compiled), np.empty((len(q), 3, q.shape[1]))
         whole = np.empty((3, self.compiled.nv))
         for row, position in enumerate(q):
             data.qpos[self.positions] = position
@@ -123,8 +123,8 @@ class Model:
             body = self.flange.body
             point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.flange.place
             mujoco.mj_jac(self.compiled, data, whole, None, point, body)
-            found[row] = whole[:, self.speeds]
-        return found
+            jacobian[row] = whole[:, self.speeds]
+        return jacobian
 
     def torque(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         """Return the (N, n) torque, N m, that a motion (N, n) takes: bodies, armature, damping, springs, dry friction.
@@ -136,13 +136,13 @@ class Model:
         still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         still.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
         data = mujoco.MjData(still)
-        found = np.empty(q.shape)
+        torque = np.empty(q.shape)
         for row, (position, speed, acceleration) in enumerate(zip(q, dq, ddq, strict=True)):
             data.qpos[self.positions], data.qvel[self.speeds] = position, speed
             data.qacc[self.speeds] = acceleration
             mujoco.mj_inverse(still, data)
-            found[row] = data.qfrc_inverse[self.speeds]
-        return np.asarray(found + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
+            torque[row] = data.qfrc_inverse[self.speeds]
+        return np.asarray(torque + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
     def numbers(self, joint: str) -> Mapping[str, float]:
         """Return a joint of the robot's numbers as the model has them, by what MJCF calls them; those that it holds."""
@@ -164,7 +164,7 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
         )
     called = dict(zip(robot.joint_names, joints or robot.joint_names, strict=True))
     file = read_model_file(path)
-    told = {called[one.name]: (one.kp, one.kd or 0.0) for one in robot.joints if one.kp}
+    told = {called[joint.name]: (joint.kp, joint.kd or 0.0) for joint in robot.joints if joint.kp}
     compiled, delays, gains = compiled_of(file, told)
     places, others = joints_of(compiled, tuple(called.values()), str(path), _offered(compiled, robot))
     model = Model(
@@ -176,8 +176,8 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
 
 def _check_joints(model: Model, robot: Robot) -> None:
     """Raise InputError where a joint moves otherwise than the robot's, or has a number that none can have."""
-    for one, name, dof in zip(robot.joints, model.joints, model.speeds, strict=True):
-        if (model.compiled.jnt_type[model.compiled.dof_jntid[dof]] == _SLIDES) != (one.unit == "m"):
+    for joint, name, dof in zip(robot.joints, model.joints, model.speeds, strict=True):
+        if (model.compiled.jnt_type[model.compiled.dof_jntid[dof]] == _SLIDES) != (joint.unit == "m"):
             raise InputError(f"{model.file.path}: joint {name} slides where the robot's turns, or the other way round")
         for number in NUMBERS:
             value = float(getattr(model.compiled, f"dof_{number}")[dof])
@@ -193,11 +193,11 @@ def _check_joints(model: Model, robot: Robot) -> None:
 
 def _offered(compiled: mujoco.MjModel, robot: Robot) -> str:
     """Say which of a model's joints could be the robot's, by where they lie."""
-    found = alike(compiled, robot)
-    if not found:
+    chains = alike(compiled, robot)
+    if not chains:
         return "no joints of it lie as the robot's do; give a model of this robot"
-    more = f", and so do {len(found) - 1} others" if len(found) > 1 else ""
-    return f"say what it calls the robot's: --joints {','.join(found[0])} lie as these do{more}"
+    more = f", and so do {len(chains) - 1} others" if len(chains) > 1 else ""
+    return f"say what it calls the robot's: --joints {','.join(chains[0])} lie as these do{more}"
 
 
 def joints_of(
@@ -234,9 +234,9 @@ def compiled_of(
         spec = file.spec()
         drop_pictures(spec, file.is_urdf)
         added = {joint: both for joint, both in gains.items() if add_servo(spec, joint, both)}
-        delays = np.array([one.delay for one in spec.actuators], dtype=float)
-        for one in spec.actuators:
-            one.delay, one.nsample = 0.0, 0
+        delays = np.array([actuator.delay for actuator in spec.actuators], dtype=float)
+        for actuator in spec.actuators:
+            actuator.delay, actuator.nsample = 0.0, 0
         change(spec)
         for joint in spec.joints:
             if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):

@@ -36,7 +36,7 @@ class ModelFile:
         "" gives the element another name.
         """
         content = self.content
-        for own in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+        for own in sorted(changes, key=lambda element: -element.start):  # from behind: places before stay right
             text, after = content[own.start : own.inside] or f"<{own.tag}/>".encode(), content[own.inside :]
             for attribute, value in changes[own].items():
                 if attribute:
@@ -53,9 +53,9 @@ class ModelFile:
 
         Raises InputError where the file has none of its own: an included file may have it.
         """
-        for one in self.elements:
-            if one.tag in tags and one.attributes.get(key) == value:
-                return one
+        for element in self.elements:
+            if element.tag in tags and element.attributes.get(key) == value:
+                return element
         raise InputError(f'{self.path}: has no <{tags[0]} {key}="{value}"> of its own; give the file that defines it')
 
     @property
@@ -66,7 +66,7 @@ class ModelFile:
     @property
     def is_urdf(self) -> bool:
         """Whether it is a URDF."""
-        return any(one.tag == "robot" for one in self.elements[:1])
+        return any(element.tag == "robot" for element in self.elements[:1])
 
     def holds(self, number: str) -> bool:
         """Return whether it has a place for a number, by what MJCF calls it."""
@@ -92,8 +92,8 @@ class ModelFile:
 
     def inertial(self, body: str) -> Element | None:
         """Return a body's own inertial, None where the file has none: included, or taken from geoms."""
-        own = (one for one in self.elements if one.tag == "body" and one.attributes.get("name") == body)
-        return next((one.child("inertial") for one in own), None)
+        own = (element for element in self.elements if element.tag == "body" and element.attributes.get("name") == body)
+        return next((element.child("inertial") for element in own), None)
 
 
 def read_xml(path: Path) -> ModelFile:
@@ -114,10 +114,10 @@ def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
     """Raise InputError where a file, or one that it includes, names one outside the folder of the model."""
     seen[file.path] = None
     folders: dict[str, str] = {}
-    for one in file.elements:
-        if one.tag == "compiler":
-            folders |= dict.fromkeys(("meshdir", "texturedir"), one.attributes.get("assetdir", ""))
-            folders |= {key: one.attributes[key] for key in ("meshdir", "texturedir") if key in one.attributes}
+    for node in file.elements:
+        if node.tag == "compiler":
+            folders |= dict.fromkeys(("meshdir", "texturedir"), node.attributes.get("assetdir", ""))
+            folders |= {key: node.attributes[key] for key in ("meshdir", "texturedir") if key in node.attributes}
     for element, named in _files(file):
         place = folder / folders.get(_FOLDERS.get(element, ""), "") / named
         real = real_path(place)
@@ -130,10 +130,10 @@ def check_inside(file: ModelFile, folder: Path, seen: dict[Path, None]) -> None:
 
 
 def _files(file: ModelFile) -> Iterator[tuple[str, str]]:
-    for one in file.elements:
-        for key, value in one.attributes.items():
+    for element in file.elements:
+        for key, value in element.attributes.items():
             if key.startswith("file") and value:
-                yield one.tag, value
+                yield element.tag, value
 
 
 def _with_attribute(tag: bytes, name: str, value: str | None) -> bytes:
@@ -142,8 +142,8 @@ def _with_attribute(tag: bytes, name: str, value: str | None) -> bytes:
     if value is None:
         return whole.sub(b"", tag, count=1)
     several = " " in value
-    said = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*[\"']\s*)" + (rb"[^\"']+" if several else rb"[^\s\"']+"))
-    if said.search(tag):  # of several numbers the first one: those after it are of higher powers
-        return said.sub(lambda match: match[1] + value.encode(), tag, count=1)
+    pattern = re.compile(rb"(\s" + name.encode() + rb"\s*=\s*[\"']\s*)" + (rb"[^\"']+" if several else rb"[^\s\"']+"))
+    if pattern.search(tag):  # of several numbers the first one: those after it are of higher powers
+        return pattern.sub(lambda match: match[1] + value.encode(), tag, count=1)
     end = -2 if tag.endswith(b"/>") else -1
     return tag[:end].rstrip() + f' {name}="{value}"'.encode() + tag[end:]

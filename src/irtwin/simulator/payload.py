@@ -27,10 +27,10 @@ def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray)
 
 def loaded(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> mujoco.MjModel:
     """Return a copy of a compiled model with a mass, kg, `off` (3,) m from its flange."""
-    one = copy.copy(compiled)
-    load(one, flange, mass, off)
-    mujoco.mj_setConst(one, mujoco.MjData(one))
-    return one
+    laden = copy.copy(compiled)
+    load(laden, flange, mass, off)
+    mujoco.mj_setConst(laden, mujoco.MjData(laden))
+    return laden
 
 
 def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Element, dict[str, float | str | None]]:

@@ -68,11 +68,8 @@ class PlayedStretch:
 
     @property
     def speed(self) -> np.ndarray:
-        """The robot's speeds (N, n), over 0.1 s."""
-        apart = max(1, round(_AROUND / 2 / interval(self.time)))
-        rows = np.arange(len(self.time))
-        before, after = np.maximum(rows - apart, 0), np.minimum(rows + apart, len(rows) - 1)
-        return np.asarray((self.q[after] - self.q[before]) / (self.time[after] - self.time[before])[:, None])
+        """The robot's speeds (N, n)."""
+        return speeds(self.time, self.q)
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position and speed (n,) of the robot where it begins."""
@@ -84,15 +81,15 @@ class PlayedStretch:
 
     def pushed(self, model: Model, begin: np.ndarray, step: float) -> np.ndarray:
         """Return the torque (N, n) of pushes over steps that begin at times (N,), s since its beginning."""
-        found = np.zeros((len(begin), len(model.joints)))
-        for one in (push for push in self.pushes if push.run == self.run.name):
-            share = one.share(self.begin + begin + step / 2)
+        torques = np.zeros((len(begin), len(model.joints)))
+        for push in (push for push in self.pushes if push.run == self.run.name):
+            share = push.share(self.begin + begin + step / 2)
             rows = np.flatnonzero(share)
             if len(rows):
                 inside = np.abs(self.time - begin[rows].mean()) <= np.ptp(begin[rows]) / 2 + _AROUND
-                torque = one.force @ model.flange_jacobian(self.q[inside])
-                found[rows] += share[rows, None] * _at(begin[rows], self.time[inside], torque)
-        return found
+                torque = push.force @ model.flange_jacobian(self.q[inside])
+                torques[rows] += share[rows, None] * _at(begin[rows], self.time[inside], torque)
+        return torques
 
     def commands(
         self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0,
@@ -111,11 +108,19 @@ class PlayedStretch:
         ends = np.concatenate([[time[0] - 1e4], time, [time[-1] + 1e4]])
         held = np.vstack([told[:1], told])  # before the first sample: the first
         summed = np.vstack([np.zeros(told.shape[1]), np.cumsum(held * np.diff(ends)[:, None], axis=0)])
-        found = np.empty((len(begin), told.shape[1]))
+        commands = np.empty((len(begin), told.shape[1]))
         for k in range(told.shape[1]):
             at = self.begin + begin - numbers[NAMES.index("delay"), k]
-            found[:, k] = (np.interp(at + step, ends, summed[:, k]) - np.interp(at, ends, summed[:, k])) / step
-        return np.asarray(found + numbers[NAMES.index("offset")])
+            commands[:, k] = (np.interp(at + step, ends, summed[:, k]) - np.interp(at, ends, summed[:, k])) / step
+        return np.asarray(commands + numbers[NAMES.index("offset")])
+
+
+def speeds(time: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the speeds (N, n) of positions (N, n) at times (N,), s, over 0.1 s."""
+    apart = max(1, round(_AROUND / 2 / interval(time)))
+    rows = np.arange(len(time))
+    before, after = np.maximum(rows - apart, 0), np.minimum(rows + apart, len(rows) - 1)
+    return np.asarray((q[after] - q[before]) / (time[after] - time[before])[:, None])
 
 
 def whole(run: Run, pushes: tuple[Push, ...] = ()) -> PlayedStretch:
@@ -138,7 +143,7 @@ def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[Play
 
     Joints that the robot lacks are told zero.
     """
-    needed = [servos.needs(one) for one in numbers]
+    needed = [servos.needs(number_set) for number_set in numbers]
     moved: list[list[np.ndarray]] = [[] for _ in numbers]
     for needs in dict.fromkeys(needed):
         places = [place for place, own in enumerate(needed) if own == needs]
@@ -156,17 +161,17 @@ def _played(
 
     compiled = variant.compiled
     step = compiled.opt.timestep
-    steps = int(np.ceil(max(one.time[-1] for one in stretches) / step)) + 1
+    steps = int(np.ceil(max(stretch.time[-1] for stretch in stretches) / step)) + 1
     size = mujoco.mj_stateSize(compiled, mujoco.mjtState.mjSTATE_FULLPHYSICS)
     datas = [mujoco.MjData(compiled) for _ in os.sched_getaffinity(0)]
-    pairs = [(one, place) for one in range(len(numbers)) for place in range(len(stretches))]
-    models = [servos.compiled(one, variant) for one in numbers]
-    for model in models if all(one.run.signals.torque is None for one in stretches) else ():
+    pairs = [(set_index, place) for set_index in range(len(numbers)) for place in range(len(stretches))]
+    models = [servos.compiled(number_set, variant) for number_set in numbers]
+    for model in models if all(stretch.run.signals.torque is None for stretch in stretches) else ():
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)  # torque alone is asked of sensors
-    on_links = [servos.on_links(one) for one in numbers]
+    on_links = [servos.on_links(number_set) for number_set in numbers]
     states = {
-        (one, place): _state(servos, variant, models[one], stretches[place], size, on_links[one])
-        for one, place in pairs
+        (set_index, place): _state(servos, variant, models[set_index], stretches[place], size, on_links[set_index])
+        for set_index, place in pairs
     }
     efforts = [int(compiled.sensor(f"{joint}{EFFORT}").adr[0]) for joint in servos.model.joints]
     inputs = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
@@ -176,11 +181,11 @@ def _played(
         known: dict[tuple[bytes, int], np.ndarray] = {}  # many sets have their commands as late, and led as far
         some = pairs[first : first + at_once]
         told = np.zeros((len(some), steps, compiled.nu + compiled.nv))
-        for row, (one, place) in enumerate(some):
-            lead, damps_error = servos.lead(numbers[one]), servos.model.file.damps_error
-            asked = np.vstack([numbers[one][_IN_COMMANDS], lead]).tobytes(), place
+        for row, (set_index, place) in enumerate(some):
+            lead, damps_error = servos.lead(numbers[set_index]), servos.model.file.damps_error
+            asked = np.vstack([numbers[set_index][_IN_COMMANDS], lead]).tobytes(), place
             if asked not in known:
-                known[asked] = stretches[place].commands(begin, step, numbers[one], lead, damps_error)
+                known[asked] = stretches[place].commands(begin, step, numbers[set_index], lead, damps_error)
             commands = known[asked]
             for drives in (servos.actuators, *([variant.second] if len(variant.second) else [])):
                 told[row][:, drives] = commands
@@ -188,10 +193,12 @@ def _played(
             told[row][:, compiled.nu + variant.speeds] = torque
             told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
         begun = np.array([states[pair] for pair in some])
-        found, sensed = rollout([models[one] for one, _ in some], datas, begun, told, control_spec=int(inputs))
-        for row, (one, place) in enumerate(some):
+        reached, sensed = rollout(
+            [models[set_index] for set_index, _ in some], datas, begun, told, control_spec=int(inputs)
+        )
+        for row, (set_index, place) in enumerate(some):
             time = stretches[place].time
-            q = variant.measured(np.vstack([begun[row], found[row]])[:, 1 : 1 + compiled.nq], on_links[one])
+            q = variant.measured(np.vstack([begun[row], reached[row]])[:, 1 : 1 + compiled.nq], on_links[set_index])
             played = [_at(time, np.concatenate([[0.0], after]), q)]
             if stretches[place].run.signals.torque is not None:
                 played.append(_at(time, begin, sensed[row][:, efforts]))
@@ -199,7 +206,7 @@ def _played(
 
 
 def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.interp(time, times, each) for each in values.T])
+    return np.column_stack([np.interp(time, times, column) for column in values.T])
 
 
 def _state(

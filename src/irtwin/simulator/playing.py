@@ -48,7 +48,7 @@ class Playing:
     @property
     def is_open(self) -> bool:
         """Whether no number differs, and yet the torque, if it was logged, has more than noise beside the model's."""
-        named = any(one.matters for one in self.document.findings)
+        named = any(finding.matters for finding in self.document.findings)
         return not named and bool((self.chosen.torque_left > _AGREES).any())
 
     def written(self) -> bytes:
@@ -91,9 +91,9 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING) -> Playi
     before = tracked(data_set.robot, own, runs, dict.fromkeys(names, own.numbers))
     after = tracked(data_set.robot, own, runs, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
-    named = {f"{writing.PUSH} {place}": one for place, one in enumerate(pushes)}
+    named = {f"{writing.PUSH} {place}": found_push for place, found_push in enumerate(pushes)}
     families = writing.families([*differing, *named])
-    closed = parts(chosen, numbers, families, {name: one.push for name, one in named.items()})
+    closed = parts(chosen, numbers, families, {name: found_push.push for name, found_push in named.items()})
     horizons = restarted(own, runs, numbers, _of(pushes))
     return Playing(
         replace(
@@ -113,32 +113,32 @@ def _chosen(
     A robot that is `untouched` has no pushes.
     """
     chosen = choose(unjudged(alone(own, stretches, step)))
-    found = () if untouched else find_pushes(chosen)
-    if not found:
+    pushes = () if untouched else find_pushes(chosen)
+    if not pushes:
         return chosen, ()
     tell("Fitting numbers of servos beside what pushed the flange")
-    beside = choose(unjudged(alone(own, [replace(one, pushes=_of(found)) for one in stretches], step)))
+    beside = choose(unjudged(alone(own, [replace(stretch, pushes=_of(pushes)) for stretch in stretches], step)))
     bare = replace(beside.fit, alone=replace(beside.fit.alone, stretches=tuple(stretches)), known={})
     again = find_pushes(replace(beside, fit=bare))
     return (beside, again) if again else (chosen, ())
 
 
-def _of(found: Sequence[FoundPush]) -> tuple[Push, ...]:
-    return tuple(one.push for one in found)
+def _of(pushes: Sequence[FoundPush]) -> tuple[Push, ...]:
+    return tuple(found_push.push for found_push in pushes)
 
 
 def _stretches(runs: Sequence[Run], lasts: float) -> list[PlayedStretch]:
     most = max(1, round(_STRETCHES / len(runs)))
     alone = runs[0].signals.time if len(runs) == 1 else None
     lasts = lasts if alone is None else min(lasts, float(alone[-1] - alone[0]) / _LEAST)
-    return [one for run in runs for one in each(run, lasts, most)]
+    return [stretch for run in runs for stretch in each(run, lasts, most)]
 
 
 def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
     """Return whether the robot ends far from its model: too far for slopes to say which number does that."""
     moved = play(own, [own.numbers], stretches)[0]
-    left = [one.q - played[:, 0] for one, played in zip(stretches, moved, strict=True)]
-    return bool(max(np.sqrt((one**2).mean(axis=0)).max() for one in left) > _FALLEN)
+    left = [stretch.q - played[:, 0] for stretch, played in zip(stretches, moved, strict=True)]
+    return bool(max(np.sqrt((remainder**2).mean(axis=0)).max() for remainder in left) > _FALLEN)
 
 
 def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
@@ -162,12 +162,12 @@ def commanded_runs(data_set: DataSet) -> list[Run]:
         if run.signals.command is None:
             raise InputError(f"{run.file}: has no commands to play; log cmd_JOINT, or leave the run out")
     for k, joint in enumerate(data_set.robot.joints):
-        each = [
+        signals = [
             (run, run.signals.command[:, k], run.signals.q[:, k]) for run in runs if run.signals.command is not None
         ]
-        for run, told, q in each:
+        for run, told, q in signals:
             _check_run(run, joint, told, q)
-        _check_sense(runs[0], joint, [(told, q) for _, told, q in each])
+        _check_sense(runs[0], joint, [(told, q) for _, told, q in signals])
     return runs
 
 
@@ -185,7 +185,7 @@ def _check_run(run: Run, joint: Joint, told: np.ndarray, q: np.ndarray) -> None:
 
 def _check_sense(run: Run, joint: Joint, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
     """Raise where the commands of all runs go against the joint's positions, or are these; `run` is the first."""
-    told, q = (np.concatenate([one - one.mean() for one in some]) for some in zip(*pairs, strict=True))
+    told, q = (np.concatenate([values - values.mean() for values in some]) for some in zip(*pairs, strict=True))
     if np.ptp(told) > _UNMOVED and np.array_equal(told, q):
         raise InputError(f"{run.file}: column cmd_{joint.name} is q_{joint.name}; log what the joint was told")
     if told @ q < -_FOLLOWS * np.linalg.norm(told) * np.linalg.norm(q):

@@ -49,24 +49,24 @@ class FoundPush:
         values = [size, *push.force.tolist(), push.start, push.stop]
         halves = [float(np.linalg.norm(push.force / max(size, 1e-12) * half[:3])), *half[:5].tolist()]
         names = [("f", "N"), ("f_x", "N"), ("f_y", "N"), ("f_z", "N"), ("start", "s"), ("stop", "s")]
-        return [(*name, value, one) for name, value, one in zip(names, values, halves, strict=True)]
+        return [(*name, value, width) for name, value, width in zip(names, values, halves, strict=True)]
 
 
 def find_pushes(chosen: DifferingNumbers) -> tuple[FoundPush, ...]:
     """Return the pushes beside a model with numbers, those of most evidence first; none where the evidence has none."""
-    found = list[FoundPush]()
+    pushes = list[FoundPush]()
     best = chosen.fit.rolled(chosen.played.at)
     fit = replace(chosen.fit, floor=np.maximum(_quiet(chosen.fit, best), chosen.fit.least))
-    while len(found) < _MOST:
+    while len(pushes) < _MOST:
         first = _likeliest(fit, best)
         tried = None if first is None else _fitted(fit, best, *first)
         if tried is None or tried[0].odds <= 0 or not _matters(fit, best, tried[1]):
             break
-        found.append(tried[0])
+        pushes.append(tried[0])
         best = tried[1]
-        stretches = tuple(replace(one, pushes=(*one.pushes, tried[0].push)) for one in fit.stretches)
+        stretches = tuple(replace(stretch, pushes=(*stretch.pushes, tried[0].push)) for stretch in fit.stretches)
         fit = replace(fit, alone=replace(fit.alone, stretches=stretches), known={})
-    return tuple(found)
+    return tuple(pushes)
 
 
 def _matters(fit: Fit, before: Played, after: Played) -> bool:
@@ -78,7 +78,8 @@ def _matters(fit: Fit, before: Played, after: Played) -> bool:
 def _quiet(fit: Fit, best: Played) -> np.ndarray:
     """Return what is left at usual times (c, n), root mean square: half of the time may be pushed."""
     squares = [
-        _binned(left**2, interval(one.time), _BLOCK) for one, left in zip(fit.stretches, best.remainders, strict=True)
+        _binned(left**2, interval(stretch.time), _BLOCK)
+        for stretch, left in zip(fit.stretches, best.remainders, strict=True)
     ]
     return np.asarray(np.sqrt(np.median(np.concatenate(squares), axis=0)))
 
@@ -86,10 +87,12 @@ def _quiet(fit: Fit, best: Played) -> np.ndarray:
 def _likeliest(fit: Fit, best: Played) -> tuple[int, Push] | None:
     """Return the stretch and the window where a constant force explains most of what torque is left."""
     numbers = fit.servos.of_chart(best.at)
-    torques = [_left(fit, one, left[:, 0], numbers) for one, left in zip(fit.stretches, best.remainders, strict=True)]
+    torques = [
+        _left(fit, stretch, left[:, 0], numbers) for stretch, left in zip(fit.stretches, best.remainders, strict=True)
+    ]
     every = np.concatenate(torques)
     noise = np.maximum(1.4826 * np.median(np.abs(every), axis=0), 1e-3 * np.abs(every).max(axis=0) + 1e-9)
-    best_gain, found = float(np.log(len(every) ** 2)), None
+    best_gain, likeliest = float(np.log(len(every) ** 2)), None
     for place, (stretch, torque) in enumerate(zip(fit.stretches, torques, strict=True)):
         if len(torque) < _SHORTEST:
             continue
@@ -98,8 +101,8 @@ def _likeliest(fit: Fit, best: Played) -> tuple[int, Push] | None:
         if gain > best_gain:
             lasts = _samples(interval(stretch.time), _BIN) * interval(stretch.time)
             start = stretch.begin + stretch.time[-1] - (len(torque) - np.array([begin, stop])) * lasts
-            best_gain, found = gain, (place, Push(stretch.run.name, force, *start.tolist()))
-    return found
+            best_gain, likeliest = gain, (place, Push(stretch.run.name, force, *start.tolist()))
+    return likeliest
 
 
 def _left(fit: Fit, stretch: PlayedStretch, off: np.ndarray, numbers: np.ndarray) -> np.ndarray:
@@ -143,8 +146,8 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
     for _ in range(_PASSES):
         sums = fit.sums(here, range(len(_STEPS)), _played(fit, best, place, list(_moved(push))), _STEPS)
         off = np.append(push.force, np.zeros(3)) / _LIKELY
-        found = sums.together().together().likely(off, _DEVIATIONS).damped(1e-9)
-        step = found.step()
+        equations = sums.together().together().likely(off, _DEVIATIONS).damped(1e-9)
+        step = equations.step()
         step[3:] = np.clip(step[3:], -0.2, 0.2)
         before, ways = fit.total(here), [_stepped(push, share * step) for share in (1.0, 0.3)]
         tried = zip((push, *ways), (here, *_played(fit, best, place, ways)), strict=True)
@@ -153,8 +156,8 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
         if before - fit.total(here) < 0.05:
             break
     fit = replace(fit, certainty=certainty(here))  # of what is left beside it
-    variance = found.variance.copy()
-    runs = sum(one.time[-1] for one in fit.stretches) / _BIN
+    variance = equations.variance.copy()
+    runs = sum(stretch.time[-1] for stretch in fit.stretches) / _BIN
     worth = np.log(runs**2 / 2) + np.log(_LIKELY**2 / variance[:3]).sum() / 2 + np.log(len(NAMES))
     gain = fit.total(best) - fit.total(here)
     odds = gain - float(push.force @ push.force) / _LIKELY**2 / 2 - float(worth)
@@ -186,4 +189,4 @@ def _played(fit: Fit, best: Played, place: int, pushes: Sequence[Push]) -> list[
     own = fit.stretches[place]
     stretches = [replace(own, pushes=(*own.pushes, push)) for push in pushes]
     moved = play(fit.servos, [numbers], stretches)[0]
-    return [fit.replaced(best, place, one) for one in moved]
+    return [fit.replaced(best, place, motion) for motion in moved]

@@ -59,17 +59,17 @@ def _limit_alone(fit: Fit, best: Played, places: list[Place], joint: int) -> tup
     """
     others = [place for place in places if place[1] == joint and place[0] != _LIMIT]
     own = fit.servos.chart(fit.servos.numbers)
-    found = fit.rolled(_moved(best.at, others, [(own - best.at)[place] for place in others]))
+    limited = fit.rolled(_moved(best.at, others, [(own - best.at)[place] for place in others]))
     for shares in _OF_LIMIT:
-        tried = [fit.servos.of_chart(found.at) for _ in shares]
+        tried = [fit.servos.of_chart(limited.at) for _ in shares]
         for numbers, share in zip(tried, shares, strict=True):
             numbers[_LIMIT, joint] *= share
         rolled = fit.all_rolled([fit.servos.chart(numbers) for numbers in tried])
-        found = min((found, *rolled), key=fit.total)
+        limited = min((limited, *rolled), key=fit.total)
     price = np.log(len(NAMES)) * len(others)
-    if not others or fit.total(found) >= fit.total(best) + price:
+    if not others or fit.total(limited) >= fit.total(best) + price:
         return best, places
-    return found, [place for place in places if place not in others]
+    return limited, [place for place in places if place not in others]
 
 
 def evidence(chosen: DifferingNumbers) -> float:
@@ -103,14 +103,14 @@ def _of(rows: np.ndarray, places: Sequence[Place]) -> np.ndarray:
     return np.array([rows[row, 0] for row, _ in places])
 
 
-def _about(chosen: DifferingNumbers, best: Played, found: Equations) -> DifferingNumbers:
+def _about(chosen: DifferingNumbers, best: Played, equations: Equations) -> DifferingNumbers:
     """Return the numbers, of which some differ, with what slopes (p, D) say of them."""
-    count, places = len(found.right), found.rows
+    count, places = len(equations.right), equations.rows
     servos, differs = chosen.fit.servos, chosen.differs.copy()
     ends = servos.chart(chosen.interval)
     spread = (ends[1] - ends[0]) / (2 * NORMAL)
     differs[list(BY_WHOLE)] = False
-    variance = _likely(chosen.fit, best, found).disagreement(found.right, len(places))
+    variance = _likely(chosen.fit, best, equations).disagreement(equations.right, len(places))
     for own, place in zip(np.sqrt(variance), places, strict=True):
         differs[place], spread[place] = True, max(spread[place], own)
     spread = np.where(differs, spread, 0.0)
@@ -119,7 +119,7 @@ def _about(chosen: DifferingNumbers, best: Played, found: Equations) -> Differin
     shape = (count, differs.shape[1], len(BY_WHOLE))
     slopes = Equations(BY_WHOLE, np.zeros((*shape, len(BY_WHOLE))), np.zeros(shape))
     for joint in range(differs.shape[1]):
-        own = found.some([place for place in places if place[1] == joint])
+        own = equations.some([place for place in places if place[1] == joint])
         at = np.array([BY_WHOLE.index(row) for row, _ in own.rows], dtype=int)
         slopes.right[:, joint, at] = own.right
         slopes.normal[:, joint, at[:, None], at] = own.normal
@@ -142,10 +142,10 @@ def _likely(fit: Fit, best: Played, slopes: Equations) -> Equations:
 
 
 def _moved(at: np.ndarray, places: Sequence[Place], step: Sequence[float] | np.ndarray) -> np.ndarray:
-    found = at.copy()
+    moved = at.copy()
     for place, own in zip(places, step, strict=True):
-        found[place] += own
-    return found
+        moved[place] += own
+    return moved
 
 
 def softened(chosen: DifferingNumbers) -> DifferingNumbers:
@@ -165,21 +165,21 @@ def _softer(chosen: DifferingNumbers) -> DifferingNumbers | None:
     """Return the numbers with one joint soft that leave least, if they leave less than those that were chosen."""
     fit, own = chosen.fit, chosen.fit.servos.chart(chosen.fit.servos.numbers)
     joints = np.flatnonzero(fit.servos.can_differ[list(SOFT)].any(axis=0)).tolist()
-    rigid, price, found = fit.rolled(chosen.played.at), np.log(len(NAMES)), None
+    rigid, price, winner = fit.rolled(chosen.played.at), np.log(len(NAMES)), None
     before = least = fit.total(rigid) + price * chosen.differs.sum()
-    for joint in track(joints, lambda one: f"whether {fit.servos.model.joints[one]} is soft"):
+    for joint in track(joints, lambda joint: f"whether {fit.servos.model.joints[joint]} is soft"):
         differs = chosen.differs.copy()
         differs[: len(OF_JOINTS), joint] = False
         best, row = _best(fit, np.where(differs, chosen.played.at, own), joint, fit.total(rigid))
         cost = fit.total(best) + price * (differs.sum() + 1)
         if cost < least:
             differs[row, joint] = True
-            least, found = cost, (best, differs)
-    if found is None:
+            least, winner = cost, (best, differs)
+    if winner is None:
         return None
-    odds = np.where(found[1] & ~chosen.differs, before - least, chosen.odds)
-    ends = np.where(found[1] & chosen.differs, chosen.interval, fit.servos.of_chart(found[0].at))
-    return replace(chosen, played=found[0], differs=found[1], odds=odds, interval=ends)
+    odds = np.where(winner[1] & ~chosen.differs, before - least, chosen.odds)
+    ends = np.where(winner[1] & chosen.differs, chosen.interval, fit.servos.of_chart(winner[0].at))
+    return replace(chosen, played=winner[0], differs=winner[1], odds=odds, interval=ends)
 
 
 def _best(fit: Fit, at: np.ndarray, joint: int, rigid: float) -> tuple[Played, int]:
@@ -187,16 +187,16 @@ def _best(fit: Fit, at: np.ndarray, joint: int, rigid: float) -> tuple[Played, i
 
     It is looked for more closely where any closes much of what they do.
     """
-    best, found = fit.rolled(at), (SOFT[0], 0.0)
+    best, best_way = fit.rolled(at), (SOFT[0], 0.0)
     enough = _CLOSES * rigid + (1 - _CLOSES) * fit.total(best)
     ways = [(row, value) for row in SOFT for value in _TRIED]
     for factors in (*_NEARER, ()):
         tried = [at.copy() for _ in ways]
-        for one, (row, value) in zip(tried, ways, strict=True):
-            one[row, joint] = value
-        pairs = zip((best, *fit.all_rolled(tried)), (found, *ways), strict=True)
-        best, found = min(pairs, key=lambda pair: fit.total(pair[0]))
+        for trial, (row, value) in zip(tried, ways, strict=True):
+            trial[row, joint] = value
+        pairs = zip((best, *fit.all_rolled(tried)), (best_way, *ways), strict=True)
+        best, best_way = min(pairs, key=lambda pair: fit.total(pair[0]))
         if fit.total(best) >= enough:
             break
-        ways = [(found[0], found[1] * factor) for factor in factors]
-    return best, found[0]
+        ways = [(best_way[0], best_way[1] * factor) for factor in factors]
+    return best, best_way[0]

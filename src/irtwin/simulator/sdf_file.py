@@ -65,11 +65,11 @@ class SdfFile(ModelFile):
     def changed(self, changes: Changes) -> bytes:
         """Return the file with numbers of joints and controllers changed; all else stays, byte for byte."""
         content = self.content
-        for own in sorted(changes, key=lambda one: -one.start):  # from behind: places before stay right
+        for own in sorted(changes, key=lambda element: -element.start):  # from behind: places before stay right
             for name, value in _texts(own, changes[own]):
-                one = next(one for one in outermost(content).walk() if one.start == own.start)
-                axis, text = one.child("axis"), f"<{name}>{value!r}</{name}>"
-                inside = one if axis is None else axis.child("dynamics")
+                element = next(element for element in outermost(content).walk() if element.start == own.start)
+                axis, text = element.child("axis"), f"<{name}>{value!r}</{name}>"
+                inside = element if axis is None else axis.child("dynamics")
                 if inside is None:
                     assert axis is not None  # else it does not move
                     content = with_child(content, axis, "dynamics", f"<dynamics>{text}</dynamics>")
@@ -87,17 +87,17 @@ class SdfFile(ModelFile):
             names = ", ".join(str(model.get("name")) for model in models)
             raise InputError(f"{self.path}: has {len(models)} models with joints ({names}); give a file of the robot's")
         (model,) = models
-        other = next((one.tag for one in model if one.tag in ("include", "model")), None)
-        if other is not None:
-            raise InputError(f"{self.path}: its model has <{other}>; write it out whole, as `gz sdf -p` does")
+        nested = next((child.tag for child in model if child.tag in ("include", "model")), None)
+        if nested is not None:
+            raise InputError(f"{self.path}: its model has <{nested}>; write it out whole, as `gz sdf -p` does")
         source = f'{self.path}: model "{model.get("name")}"'
         frames = _Frames(model, source)
-        version = tuple(int(one) for one in str(root.get("version", "1.7")).split(".") if one.isdigit())
+        version = tuple(int(part) for part in str(root.get("version", "1.7")).split(".") if part.isdigit())
         links = (_link(link, frames, source) for link in model.findall("link"))
         of_joints = [_joint(joint, frames, source, version <= _BEFORE) for joint in model.findall("joint")]
-        plugins = (one for one in model.iter("plugin") if _is_controller(one.get("name", "")))
-        drives = {(one.findtext("joint_name") or "").strip(): one for one in plugins}
-        joints = [_driven(one, drives[one.name], source) if one.name in drives else one for one in of_joints]
+        plugins = (plugin for plugin in model.iter("plugin") if _is_controller(plugin.get("name", "")))
+        drives = {(plugin.findtext("joint_name") or "").strip(): plugin for plugin in plugins}
+        joints = [_driven(joint, drives[joint.name], source) if joint.name in drives else joint for joint in of_joints]
         gravity = root.findtext("world/gravity")
         return assembled(links, joints, np.array(numbers(gravity or "0 0 -9.81", 3, f"{self.path}: gravity")))
 
@@ -105,10 +105,12 @@ class SdfFile(ModelFile):
 def read_sdf(file: ModelFile) -> SdfFile:
     """Return an SDF, its controllers among its elements; tell which of them do more than is played."""
     servos, more = [], []
-    for one in file.elements:
-        if one.tag == "plugin" and _is_controller(one.attributes.get("name", "")):
-            joint, summed, force = (_text(file, one, name) for name in ("joint_name", "i_gain", "cmd_offset"))
-            servos.append(XmlElement("position", {"joint": joint}, one.start, one.inside, one.stop, one.children))
+    for element in file.elements:
+        if element.tag == "plugin" and _is_controller(element.attributes.get("name", "")):
+            joint, summed, force = (_text(file, element, name) for name in ("joint_name", "i_gain", "cmd_offset"))
+            servos.append(
+                XmlElement("position", {"joint": joint}, element.start, element.inside, element.stop, element.children)
+            )
             more += [joint] if not summed or summed.strip("0.") or force.strip("0.") else []  # Gazebo's own is 0.1
     if more:
         tell(f"  {file.path}: i_gain and cmd_offset of the controllers of {', '.join(more)} are not played")
@@ -135,11 +137,11 @@ def _driven(joint: ModelJoint, controller: Element, source: str) -> ModelJoint:
     return replace(joint, servo=(stiffness, damping), effort=min(joint.effort, most if most > 0 else np.inf))
 
 
-def _texts(own: XmlElement, said: Mapping[str, float | str | None]) -> Iterator[tuple[str, float]]:
+def _texts(own: XmlElement, changes: Mapping[str, float | str | None]) -> Iterator[tuple[str, float]]:
     """Yield names and values of what changes in an element: of a range both ends."""
-    for name, value in said.items():
+    for name, value in changes.items():
         if value is not None:
-            values = (float(one) for one in str(value).split())
+            values = (float(part) for part in str(value).split())
             yield from zip(_OF_CONTROLLER[name] if own.tag == "position" else (name,), values, strict=True)
 
 
@@ -148,19 +150,19 @@ class _Frames:
 
     def __init__(self, model: Element, source: str) -> None:
         self.source = source
-        self.links = {str(one.get("name")) for one in model.findall("link")}
-        fixed = {one: one.get("attached_to", _MODEL) for one in model.findall("frame")}
-        moved = {one: one.findtext("child", "").strip() for one in model.findall("joint")}
-        self.attached = {str(one.get("name")): to for one, to in (fixed | moved).items()}
+        self.links = {str(link.get("name")) for link in model.findall("link")}
+        fixed = {frame: frame.get("attached_to", _MODEL) for frame in model.findall("frame")}
+        moved = {joint: joint.findtext("child", "").strip() for joint in model.findall("joint")}
+        self.attached = {str(element.get("name")): to for element, to in (fixed | moved).items()}
         self._said: dict[str, tuple[Element, str]] = {}
-        for one in (*model.findall("link"), *fixed, *moved):
-            pose, name = one.find("pose"), str(one.get("name"))
+        for element in (*model.findall("link"), *fixed, *moved):
+            pose, name = element.find("pose"), str(element.get("name"))
             beside = None if pose is None else pose.get("relative_to")
-            self._said[name] = one, beside or self.attached.get(name, _MODEL)
+            self._said[name] = element, beside or self.attached.get(name, _MODEL)
         self._found = {_MODEL: _pose(model, source)}
         self.on: dict[str, list[str]] = {}
-        for one in fixed:
-            self.on.setdefault(self._end(str(one.get("name"))), []).append(str(one.get("name")))
+        for frame in fixed:
+            self.on.setdefault(self._end(str(frame.get("name"))), []).append(str(frame.get("name")))
 
     def place(self, name: str) -> np.ndarray:
         """Return where a frame is in the world, (4, 4)."""
@@ -170,16 +172,16 @@ class _Frames:
                 raise InputError(f'{self.source}: has no frame "{way[-1]}", which another is said in')
             way.append(self._said[way[-1]][1])
             self._check(way)
-        for one, beside in reversed(list(pairwise(way))):
-            self._found[one] = self._found[beside] @ _pose(self._said[one][0], f"{self.source}: {one}")
+        for frame, beside in reversed(list(pairwise(way))):
+            self._found[frame] = self._found[beside] @ _pose(self._said[frame][0], f"{self.source}: {frame}")
         return self._found[name]
 
     def link(self, name: str) -> str:
         """Return the link that a frame is fixed to."""
-        found = self._end(name)
-        if found not in self.links and found != WORLD:
+        link = self._end(name)
+        if link not in self.links and link != WORLD:
             raise InputError(f'{self.source}: has no link "{name}", which a joint names')
-        return found
+        return link
 
     def _end(self, name: str) -> str:
         way = [name]
@@ -225,7 +227,7 @@ def _link(link: Element, frames: _Frames, source: str) -> ModelLink:
         _number(body, "mass", 1.0, where),
         within[:3, 3],
         turn @ inertia_of(six) @ turn.T,
-        {one: (own @ frames.place(one))[:3, 3] for one in frames.on.get(name, ())},
+        {frame: (own @ frames.place(frame))[:3, 3] for frame in frames.on.get(name, ())},
     )
 
 
@@ -243,9 +245,9 @@ def _joint(joint: Element, frames: _Frames, source: str, of_model: bool) -> Mode
     if axis is None or kind == "fixed":
         return ModelJoint(name, "fixed", parent, child, origin, within[:3, 3], np.array([0.0, 0.0, 1.0]))
     xyz = axis.find("xyz")
-    said = None if xyz is None else xyz.get("expressed_in")
+    expressed_in = None if xyz is None else xyz.get("expressed_in")
     of_model = axis.findtext("use_parent_model_frame", str(of_model)).strip().lower() in ("true", "1")
-    frame = within if not said and not of_model else np.linalg.inv(place) @ frames.place(said or _MODEL)
+    frame = within if not expressed_in and not of_model else np.linalg.inv(place) @ frames.place(expressed_in or _MODEL)
     along = frame[:3, :3] @ numbers("0 0 1" if xyz is None else xyz.text, 3, f"{where}: axis")
     lower, upper = (
         _number(axis, f"limit/{end}", end_of, where) for end, end_of in (("lower", -np.inf), ("upper", np.inf))
@@ -275,8 +277,8 @@ def _number(element: Element, path: str, otherwise: float, where: str) -> float:
 def _check_words(root: Element, source: str) -> None:
     """Raise InputError where an element with numbers has one that SDF does not know: it would be lost unseen."""
     for name, known in _KNOWN.items():
-        for one in (one for element in root.iter(name) for one in element):
-            if one.tag not in known and ":" not in one.tag:
+        for child in (child for element in root.iter(name) for child in element):
+            if child.tag not in known and ":" not in child.tag:
                 raise InputError(
-                    f"{source}: <{name}> has <{one.tag}>, which SDF does not know; it has {', '.join(known)}"
+                    f"{source}: <{name}> has <{child.tag}>, which SDF does not know; it has {', '.join(known)}"
                 )

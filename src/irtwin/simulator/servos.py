@@ -74,23 +74,23 @@ class Servos:
 
         A spring is held to the servo's stiffness, a compliance to one with which link and servo swing alike.
         """
-        found = np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
+        coordinates = np.where(np.isnan(self.scale), numbers, np.log1p(numbers / self.scale))
         stiffness = numbers[..., 0, :]
-        found[..., _SPRING, :] = (numbers[..., _SPRING, :] - self.numbers[_SPRING]) / stiffness
-        found[..., _SOFT, :] = numbers[..., _SOFT, :] * (stiffness * self._of_links)[..., None, :]
-        return found
+        coordinates[..., _SPRING, :] = (numbers[..., _SPRING, :] - self.numbers[_SPRING]) / stiffness
+        coordinates[..., _SOFT, :] = numbers[..., _SOFT, :] * (stiffness * self._of_links)[..., None, :]
+        return coordinates
 
     def of_chart(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the numbers of coordinates (..., k, n); those that cannot be below zero are not."""
         free = np.isnan(self.scale)
         free[[NAMES.index("delay"), NAMES.index("dead_band"), *_SOFT]] = False
         held = np.where(free, coordinates, np.maximum(coordinates, 0.0))
-        found = np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
-        stiffness = found[..., 0, :]
-        found[..., _SPRING, :] = np.maximum(self.numbers[_SPRING] + held[..., _SPRING, :] * stiffness, 0.0)
+        numbers = np.where(np.isnan(self.scale), held, self.scale * np.expm1(np.where(np.isnan(self.scale), 0.0, held)))
+        stiffness = numbers[..., 0, :]
+        numbers[..., _SPRING, :] = np.maximum(self.numbers[_SPRING] + held[..., _SPRING, :] * stiffness, 0.0)
         softest = np.minimum(held[..., _SOFT, :], _SOFTEST)
-        found[..., _SOFT, :] = softest / (stiffness * self._of_links)[..., None, :]
-        return found
+        numbers[..., _SOFT, :] = softest / (stiffness * self._of_links)[..., None, :]
+        return numbers
 
     @property
     def _of_links(self) -> np.ndarray:
@@ -105,10 +105,10 @@ class Servos:
         is trusted is right.
         """
         free = [name in OF_JOINTS and name not in self.trusted for name in NAMES]
-        found = np.repeat(np.array(free)[:, None], self.numbers.shape[1], axis=1)
-        found[NAMES.index("dead_band")] &= self.model.compiled.actuator_actnum[self.actuators] == 0
-        found[_SOFT] &= self.numbers[NAMES.index("armature")] > 0
-        return found
+        can_differ = np.repeat(np.array(free)[:, None], self.numbers.shape[1], axis=1)
+        can_differ[NAMES.index("dead_band")] &= self.model.compiled.actuator_actnum[self.actuators] == 0
+        can_differ[_SOFT] &= self.numbers[NAMES.index("armature")] > 0
+        return can_differ
 
     @cached_property
     def held(self) -> np.ndarray:
@@ -157,33 +157,33 @@ class Servos:
 
     def compiled(self, numbers: np.ndarray, of: PlayedModel) -> mujoco.MjModel:
         """Return a variant of the model with numbers (k, n) of its own; offset and delay are the commands' to have."""
-        one = copy.copy(of.compiled)
-        one.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)  # an arm is one: looking for more takes time
+        model = copy.copy(of.compiled)
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)  # an arm is one: looking for more takes time
         at, dof = self.actuators, of.speeds
         stiffness, damping, friction, holding, armature, _, _, limit, band, spring, *_ = numbers[: len(OF_JOINTS)]
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if mass:
-            load(one, self.model.flange, float(mass), np.array(off[:3]))
-        one.opt.gravity = tilted(one, off[3:])
+            load(model, self.model.flange, float(mass), np.array(off[:3]))
+        model.opt.gravity = tilted(model, off[3:])
         ends = self.limits(limit)
         if len(of.second):
-            one.actuator_gainprm[of.second, 0], one.actuator_biasprm[of.second, 1] = -stiffness, stiffness
-            one.actuator_forcerange[of.second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
-            one.actuator_forcelimited[at] = 0
-            one.jnt_actfrclimited[of.joints], one.jnt_actfrcrange[of.joints] = 1, ends.T
+            model.actuator_gainprm[of.second, 0], model.actuator_biasprm[of.second, 1] = -stiffness, stiffness
+            model.actuator_forcerange[of.second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
+            model.actuator_forcelimited[at] = 0
+            model.jnt_actfrclimited[of.joints], model.jnt_actfrcrange[of.joints] = 1, ends.T
         else:
-            one.actuator_forcelimited[at], one.actuator_forcerange[at] = 1, ends.T
+            model.actuator_forcelimited[at], model.actuator_forcerange[at] = 1, ends.T
         in_joint, in_servo = self.dampings(damping)
-        one.actuator_gainprm[at, 0], one.actuator_biasprm[at, 1] = stiffness, -stiffness
-        one.actuator_biasprm[at, 0], one.actuator_biasprm[at, 2] = 0.0, -in_servo
-        one.dof_damping[dof], one.dof_frictionloss[dof], one.dof_armature[dof] = in_joint, friction, armature
-        one.jnt_stiffness[of.joints] = spring
+        model.actuator_gainprm[at, 0], model.actuator_biasprm[at, 1] = stiffness, -stiffness
+        model.actuator_biasprm[at, 0], model.actuator_biasprm[at, 2] = 0.0, -in_servo
+        model.dof_damping[dof], model.dof_frictionloss[dof], model.dof_armature[dof] = in_joint, friction, armature
+        model.jnt_stiffness[of.joints] = spring
         changed = holding != self.numbers[NAMES.index("holding")]
-        one.dof_solimp[dof, 0] = holding
-        one.dof_solimp[dof, 1] = np.where(changed, holding, one.dof_solimp[dof, 1])
-        of.soften(one, self.compliance(numbers))
-        mujoco.mj_setConst(one, mujoco.MjData(one))
-        return one
+        model.dof_solimp[dof, 0] = holding
+        model.dof_solimp[dof, 1] = np.where(changed, holding, model.dof_solimp[dof, 1])
+        of.soften(model, self.compliance(numbers))
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model
 
     def dampings(self, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the damping (n,) in joint and in servo: that of a servo of the file changes where it has any."""
@@ -219,7 +219,7 @@ class Servos:
         mass, *off = numbers[len(OF_JOINTS) :, 0]
         if differs[NAMES.index("payload")].any():
             changes |= loaded_tag(self.model, float(mass), np.array(off[:3]))
-        option = next((one for one in file.elements if one.tag == "option"), None)
+        option = next((element for element in file.elements if element.tag == "option"), None)
         if option and differs[NAMES.index("tilt_x")].any():
             changes[option] = {"gravity": " ".join(map(repr, tilted(self.model.compiled, off[3:]).tolist()))}
         return file.changed(changes)
@@ -319,13 +319,13 @@ def servos(model: Model) -> Servos:
 
 def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
     """Return a joint's position servo. Raises InputError, naming `source`, where it is not driven by one alone."""
-    found = _servo(compiled, joint)
-    if found is None:
+    drive = _servo(compiled, joint)
+    if drive is None:
         raise InputError(
             f"{source}: joint {joint} is not driven by one position servo; its commands need one to be "
             f'played: <position joint="{joint}" kp="..."/>'
         )
-    return found
+    return drive
 
 
 def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:

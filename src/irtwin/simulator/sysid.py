@@ -28,7 +28,7 @@ Free = tuple[str, str, list[float], list[float], list[float], list[float]]  # as
 
 def script(chosen: DifferingNumbers, document: Document, logs: Path, out: Path) -> bytes:
     """Return the script that fits what a diagnosis says differs to `logs`, a data set, to be written to `out`."""
-    lacking = [f"{one.effect} of {', '.join(one.joints)}" for one in not_held(document)]
+    lacking = [f"{cause.effect} of {', '.join(cause.joints)}" for cause in not_held(document)]
     model = chosen.fit.servos.model
     return written(free(chosen), lacking, model.file.path, logs, out, model.gains, model.joints)
 
@@ -46,7 +46,7 @@ def written(
 
     gains: of the controllers of joints that have no servo in the model; joints: the robot's as the model calls them.
     """
-    files = [os.path.relpath(one.absolute(), out.absolute().parent) for one in (model, logs)]
+    files = [os.path.relpath(file.absolute(), out.absolute().parent) for file in (model, logs)]
     told = {
         "MODEL, LOGS, FITTED": ", ".join(map(repr, [*files, f"{out.stem}-fitted.xml"])),
         "GAINS": repr(dict(gains or {})),
@@ -77,9 +77,9 @@ def free(chosen: DifferingNumbers) -> Iterator[Free]:
                 yield _bounded(joint, CALLED[name], own[row, place], robots[row, place])
     mass, *off = robots[len(OF_JOINTS) :, 0]
     if chosen.differs[NAMES.index("payload")].any():
-        bare, laden = (together(model.compiled, model.flange, each, np.array(off[:3])) for each in (0.0, mass))
+        bare, laden = (together(model.compiled, model.flange, carried, np.array(off[:3])) for carried in (0.0, mass))
         body = model.compiled.body(model.flange.body).name
-        yield _bounded(body, "mass", *(np.array([one[0], *one[1]]) for one in (bare, laden)))
+        yield _bounded(body, "mass", *(np.array([inertial[0], *inertial[1]]) for inertial in (bare, laden)))
     if chosen.differs[NAMES.index("tilt_x")].any():
         yield _bounded("world", "gravity", *(tilted(model.compiled, some)[:2] for some in ([0.0, 0.0], off[3:])))
 

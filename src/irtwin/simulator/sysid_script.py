@@ -66,19 +66,19 @@ def change(spec: mujoco.MjSpec, parameter: sysid.Parameter, of: str, number: str
 
 def servo_of(spec: mujoco.MjSpec, joint: str) -> Any:
     """Return the servo of a joint, None where it is none's."""
-    return next((one for one in spec.actuators if one.target == joint), None)
+    return next((actuator for actuator in spec.actuators if actuator.target == joint), None)
 
 
 def parameters() -> sysid.ParameterDict:
     """Return what is free: nominal is the model's number, the value to begin from the robot's."""
-    found = sysid.ParameterDict()
+    free = sysid.ParameterDict()
     for of, number, model, robot, least, most in FREE:
         modifier = None if number == "delay" else partial(change, of=of, number=number)
-        one = sysid.Parameter(f"{of} {number}", model, least, most, modifier=modifier)
-        one.value = np.array(robot, dtype=float, ndmin=1)
-        one.inertia_type, one.scale_rot_inertia = sysid.InertiaType.MassIpos, False  # of a mass
-        found.add(one)
-    return found
+        parameter = sysid.Parameter(f"{of} {number}", model, least, most, modifier=modifier)
+        parameter.value = np.array(robot, dtype=float, ndmin=1)
+        parameter.inertia_type, parameter.scale_rot_inertia = sysid.InertiaType.MassIpos, False  # of a mass
+        free.add(parameter)
+    return free
 
 
 def loaded(model: Path) -> mujoco.MjSpec:
@@ -109,11 +109,13 @@ def specification(model: Path, joints: Sequence[str]) -> mujoco.MjSpec:
 def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> tuple[sysid.ModelSequences, list[np.ndarray]]:
     """Return stretches of the observed runs, and the speeds (N, nu) that are commanded in each."""
     model, joints = spec.compile(), JOINTS or data_set.robot.joint_names
-    places = [model.jnt_qposadr[model.joint(one).id] for one in joints]
-    speeds = [model.jnt_dofadr[model.joint(one).id] for one in joints]
-    drives = [next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(one).id) for one in joints]
+    places = [model.jnt_qposadr[model.joint(joint).id] for joint in joints]
+    speeds = [model.jnt_dofadr[model.joint(joint).id] for joint in joints]
+    drives = [
+        next(k for k in range(model.nu) if model.actuator(k).trnid[0] == model.joint(joint).id) for joint in joints
+    ]
     names, states, controls, measured, speeds_told = [], [], [], [], []
-    runs = [one for one in data_set.runs if one.role == "observed"]
+    runs = [run for run in data_set.runs if run.role == "observed"]
     for run in runs:
         signals, commands, lasts = run.signals, np.asarray(run.signals.command), np.ptp(run.signals.time)
         commanded_speeds = np.zeros_like(commands) if signals.command_speed is None else signals.command_speed
@@ -175,8 +177,8 @@ def played_late(
             if delay in of:
                 told[:, drive] = np.interp(control.times - of[delay].value[0], control.times, told[:, drive])
         late.append(sysid.TimeSeries(control.times, told, control.signal_mapping))
-    found: Sequence[sysid.SystemTrajectory] = sysid.sysid_rollout(models=models, control_signal=late, **others)
-    return found
+    trajectories: Sequence[sysid.SystemTrajectory] = sysid.sysid_rollout(models=models, control_signal=late, **others)
+    return trajectories
 
 
 def joint_of(model: mujoco.MjModel, drive: int) -> str:
@@ -187,11 +189,11 @@ def joint_of(model: mujoco.MjModel, drive: int) -> str:
 def written(fitted: sysid.ParameterDict, model: Path) -> str:
     """Return the model with what was fitted, as MJCF."""
     spec = loaded(model)
-    for (of, number, *_), one in zip(FREE, fitted.values(), strict=True):
-        one.apply_modifier(spec)
+    for (of, number, *_), parameter in zip(FREE, fitted.values(), strict=True):
+        parameter.apply_modifier(spec)
         if number == "delay":
             servo = servo_of(spec, of)
-            servo.delay = one.value[0]
+            servo.delay = parameter.value[0]
             servo.nsample = int(np.ceil(servo.delay / spec.option.timestep)) + 1
             servo.interp = 1  # linear; else MuJoCo's delay is of whole steps
     spec.compile()
@@ -219,10 +221,10 @@ def main() -> None:
         mu_factor=10.0,  # at the end, where nothing is won, it tries all it has
     )
     left = [residual(x, free.copy())[0] for x in (free.as_nominal_vector(), free.as_vector(), result.x)]
-    rms = [1e3 * np.sqrt(np.mean(np.concatenate([one.ravel() for one in some]) ** 2)) for some in left]
+    rms = [1e3 * np.sqrt(np.mean(np.concatenate([part.ravel() for part in some]) ** 2)) for some in left]
     print("Tracking error, mrad (mm): model {:.2f}, by irtwin {:.2f}, fitted {:.2f}".format(*rms))
-    _, spread = sysid.calculate_intervals([one.ravel() for one in left[-1]], result.jac)
-    names = [f"{one.name} {k or ''}" for one in free.values() for k in range(one.size)]
+    _, spread = sysid.calculate_intervals([part.ravel() for part in left[-1]], result.jac)
+    names = [f"{parameter.name} {k or ''}" for parameter in free.values() for k in range(parameter.size)]
     for row in zip(names, free.as_nominal_vector(), free.as_vector(), fitted.as_vector(), spread, strict=True):
         print("{:32} model {:10.4g}  by irtwin {:10.4g}  fitted {:10.4g} +- {:.2g}".format(*row))
     (here / FITTED).write_text(written(fitted, here / MODEL), encoding="utf-8")

@@ -10,11 +10,12 @@ from math import factorial
 import numpy as np
 
 from irtwin.identification.progress import track
+from irtwin.identification.validation import energy, energy_error
 from irtwin.robot.description import Robot
 from irtwin.robot.kinematics import placements
 from irtwin.signals.log import Run
 from irtwin.simulator.choice import DifferingNumbers
-from irtwin.simulator.play import PlayedStretch, Push, each, play, whole
+from irtwin.simulator.play import PlayedStretch, Push, each, play, speeds, whole
 from irtwin.simulator.servos import NAMES, Servos, part_of
 
 _FOLDS = 3
@@ -30,10 +31,12 @@ OfRun = Mapping[str, np.ndarray]  # by a run's name, numbers (k, n)
 class Tracked:
     """A run played as a whole: the tracking error's mean `squares` (c, n), rad^2 and N^2 m^2.
 
-    At some times (P,), s: positions of robot and model (P, n), and how far apart they have the flange, `off` (P,) m.
+    energy_error: %, of the work that joints do on the arm; None where no torque was logged. At some times (P,), s:
+    positions of robot and model (P, n), and how far apart they have the flange, `off` (P,) m.
     """
 
     squares: np.ndarray
+    energy_error: float | None
     time: np.ndarray
     robot: np.ndarray
     model: np.ndarray
@@ -79,40 +82,49 @@ class Parts:
 
     def closed(self, names: Sequence[str], of: Sequence[Sequence[str]]) -> np.ndarray:
         """Return the mean squares (G, c, n) that some names close, on average over orders in which parts `of` join."""
-        others, found = [part for part in of if part != names], np.zeros_like(self.before)
+        others, closed = [part for part in of if part != names], np.zeros_like(self.before)
         for count in range(len(others) + 1):
             weight = factorial(count) * factorial(len(others) - count) / factorial(len(of))
             for some in combinations(others, count):
                 there = frozenset(name for part in some for name in part)
-                found += weight * (self.squares[there] - self.squares[there | set(names)])
-        return found
+                closed += weight * (self.squares[there] - self.squares[there | set(names)])
+        return closed
 
 
 def held_out(chosen: DifferingNumbers, runs: Sequence[Run]) -> OfRun:
     """Return for each run numbers that other runs alone say; of one run alone its own."""
     folds = min(_FOLDS, len(runs))
-    found: dict[str, np.ndarray] = {}
+    by_run: dict[str, np.ndarray] = {}
     for fold in range(folds):
         names = {run.name for run in runs[fold::folds]}
-        left_out = np.array([one.run.name in names for one in chosen.fit.stretches])
-        found |= dict.fromkeys(names, chosen.without(left_out) if folds > 1 else chosen.numbers)
-    return found
+        left_out = np.array([stretch.run.name in names for stretch in chosen.fit.stretches])
+        by_run |= dict.fromkeys(names, chosen.without(left_out) if folds > 1 else chosen.numbers)
+    return by_run
 
 
 def tracked(
     robot: Robot, own: Servos, runs: Sequence[Run], numbers: OfRun, pushes: tuple[Push, ...] = ()
 ) -> list[Tracked]:
     """Play runs as a whole, each with its numbers and pushes."""
-    found = []
-    for run in track(runs, lambda one: f"playing {one.name}"):
+    tracks = []
+    for run in track(runs, lambda run: f"playing {run.name}"):
         every = whole(run, pushes)
-        left = every.measured - play(own, [numbers[run.name]], [every])[0][0]
+        measured, played = every.measured, play(own, [numbers[run.name]], [every])[0][0]
+        left = measured - played
         some = slice(None, None, max(1, len(left) // _POSES))
         poses = every.q[some], (every.q - left[:, 0])[some]
         places = [placements(robot, q)[:, :3, 3] for q in poses]
         off = np.linalg.norm(places[0] - places[1], axis=1)
-        found.append(Tracked((left**2).mean(axis=0), run.signals.time[some], *poses, off))
-    return found
+        works = [work(every.time, done) for done in (measured, played)] if measured.shape[1] > 1 else None
+        error = None if works is None else energy_error(*works)
+        tracks.append(Tracked((left**2).mean(axis=0), error, run.signals.time[some], *poses, off))
+    return tracks
+
+
+def work(time: np.ndarray, done: np.ndarray) -> float:
+    """Return the work (J) that joints do, of positions and torques (N, 2, n): what they take back feeds no other."""
+    power = done[:, 1] * speeds(time, done[:, 0])
+    return energy(time, np.maximum(power, 0.0).sum(axis=1))
 
 
 def restarted(
@@ -124,22 +136,22 @@ def restarted(
     """
     left: list[list[np.ndarray]] = [[], []]
     times = []
-    for run in track(runs, lambda one: f"{one.name} played again and again from where the robot is"):
+    for run in track(runs, lambda run: f"{run.name} played again and again from where the robot is"):
         stretches = each(run, _BEGUN_ANEW, _MOST)
-        times += [one.time for one in stretches]
+        times += [stretch.time for stretch in stretches]
         pushed = each(run, _BEGUN_ANEW, _MOST, pushes)
         for way, (with_, some) in enumerate(((own.numbers, stretches), (numbers[run.name], pushed))):
             played = play(own, [with_], some)[0]
-            left[way] += [(one.q - moved[:, 0]) ** 2 for one, moved in zip(stretches, played, strict=True)]
+            left[way] += [(stretch.q - moved[:, 0]) ** 2 for stretch, moved in zip(stretches, played, strict=True)]
     time = np.concatenate(times)
     squares = [np.concatenate(way).mean(axis=1) for way in left]
-    found = []
+    horizons = []
     for low, high in zip((0.0, *_HORIZONS), _HORIZONS, strict=False):
         inside = (time >= low) & (time < high)
         if inside.any():
             before, after = (float(np.sqrt(way[inside].mean())) for way in squares)
-            found.append((high, before, after))
-    return found
+            horizons.append((high, before, after))
+    return horizons
 
 
 def parts(
@@ -151,7 +163,7 @@ def parts(
     """
     names = tuple(name for family in families for name in family)
     sets = {frozenset[str](), frozenset(names)}
-    sets |= {one for name in names for one in (frozenset([name]), frozenset(names) - {name})}
+    sets |= {subset for name in names for subset in (frozenset([name]), frozenset(names) - {name})}
     sets |= {
         frozenset(name for family in some for name in family)
         for count in range(len(families))
@@ -162,28 +174,28 @@ def parts(
     for same in track(_alike(stretches, numbers), "what each number closes in runs"):
         some = [stretches[place] for place in same]
         own = chosen.fit.servos.numbers
-        found = []
-        for one in wanted:
-            those = tuple(push for name, push in pushes.items() if name in one)
+        by_subset = []
+        for subset in wanted:
+            those = tuple(push for name, push in pushes.items() if name in subset)
             pushed = [replace(stretch, pushes=those) for stretch in some]
-            each_set = np.where(_rows(one), numbers[some[0].run.name], own)
-            found.append(_squares(chosen.fit.servos, each_set, pushed))
-        rows += list(zip(same, np.moveaxis(np.array(found), 1, 0), strict=True))
+            each_set = np.where(_rows(subset), numbers[some[0].run.name], own)
+            by_subset.append(_squares(chosen.fit.servos, each_set, pushed))
+        rows += list(zip(same, np.moveaxis(np.array(by_subset), 1, 0), strict=True))
     squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, c, n)
-    runs = [one.run.name for one in stretches]
+    runs = [stretch.run.name for stretch in stretches]
     group = [runs.index(name) for name in runs] if len(set(runs)) > 1 else list(range(len(runs)))
     means = np.array(
-        [squares[[at for at, of in enumerate(group) if of == one]].mean(axis=0) for one in sorted(set(group))]
+        [squares[[at for at, of in enumerate(group) if of == index]].mean(axis=0) for index in sorted(set(group))]
     )
-    return Parts(names, {one: means[:, place] for place, one in enumerate(wanted)})
+    return Parts(names, {subset: means[:, place] for place, subset in enumerate(wanted)})
 
 
 def _alike(stretches: Sequence[PlayedStretch], numbers: OfRun) -> list[list[int]]:
     """Return places of stretches, those of runs with the same numbers together."""
-    found: dict[bytes, list[int]] = {}
-    for place, one in enumerate(stretches):
-        found.setdefault(numbers[one.run.name].tobytes(), []).append(place)
-    return list(found.values())
+    by_numbers: dict[bytes, list[int]] = {}
+    for place, stretch in enumerate(stretches):
+        by_numbers.setdefault(numbers[stretch.run.name].tobytes(), []).append(place)
+    return list(by_numbers.values())
 
 
 def _rows(names: frozenset[str]) -> np.ndarray:
@@ -192,4 +204,6 @@ def _rows(names: frozenset[str]) -> np.ndarray:
 
 def _squares(own: Servos, numbers: np.ndarray, stretches: Sequence[PlayedStretch]) -> np.ndarray:
     played = play(own, [numbers], stretches)[0]
-    return np.array([((one.measured - moved) ** 2).mean(axis=0) for one, moved in zip(stretches, played, strict=True)])
+    return np.array(
+        [((stretch.measured - moved) ** 2).mean(axis=0) for stretch, moved in zip(stretches, played, strict=True)]
+    )

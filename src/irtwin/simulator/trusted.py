@@ -34,7 +34,7 @@ def trusted(words: Iterable[str]) -> Trusted:
     effects: dict[str, None] = {}
     trusts: set[str] = set()
     for word in words:
-        own = [one for one, family in families.items() if word in (one, family)]
+        own = [effect for effect, family in families.items() if word in (effect, family)]
         those = [name for name, told in numbers.items() if word in told]
         if not own and not those:
             known = sorted({*families.values(), *(family for _, family in numbers.values())})

@@ -118,8 +118,8 @@ class UsdFile(ModelFile):
         for key in set(own.ListInfoKeys()) - _OF_LAYER:
             root.SetInfo(key, own.GetInfo(key))
         layer.subLayerPaths.append(f"./{beneath}")
-        for element, said in changes.items():
-            for number, value in said.items():
+        for element, values in changes.items():
+            for number, value in values.items():
                 if value is not None:  # of a range the end, as drives have no least
                     self._put(layer, element.attributes["path"], number, float(str(value).split()[-1]))
         layer.Save()
@@ -127,8 +127,12 @@ class UsdFile(ModelFile):
     def spec(self) -> mujoco.MjSpec:
         """Return MuJoCo's specification of it. Raises InputError where it cannot be told, ValueError if no tree."""
         bodies = [prim for prim in self.stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
-        connections = [one for prim in _joints(self.stage) if (one := _connection(self, prim)) is not None]
-        moved = {one.child for one in connections if one.parent != WORLD or one.kind != "fixed"}
+        connections = [
+            connection for prim in _joints(self.stage) if (connection := _connection(self, prim)) is not None
+        ]
+        moved = {
+            connection.child for connection in connections if connection.parent != WORLD or connection.kind != "fixed"
+        }
         links = [_link(self, prim, str(prim.GetPath()) in moved) for prim in bodies]
         return assembled(links, connections, _gravity(self))
 
@@ -140,15 +144,17 @@ class UsdFile(ModelFile):
     def _put(self, layer: Any, path: str, number: str, value: float) -> None:
         prim, over = self.stage.GetPrimAtPath(path), Sdf.CreatePrimInLayer(layer, path)
         kind = _KINDS[prim.GetTypeName()]
-        said = [one for one in _PLACES[number] if prim.GetAttribute(one.named(kind)[0]).HasAuthoredValue()]
-        for one in said or [one for one in _PLACES[number] if not one.attribute.startswith(_FIRST_OF_OTHERS)]:
-            name, schema = one.named(kind)
+        authored = [place for place in _PLACES[number] if prim.GetAttribute(place.named(kind)[0]).HasAuthoredValue()]
+        for place in authored or [
+            place for place in _PLACES[number] if not place.attribute.startswith(_FIRST_OF_OTHERS)
+        ]:
+            name, schema = place.named(kind)
             listed = over.GetInfo("apiSchemas").prependedItems if over.HasInfo("apiSchemas") else []
             if schema not in (*prim.GetAppliedSchemas(), *listed):
                 over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=[*listed, schema]))
             own = prim.GetAttribute(name)
             attribute = Sdf.AttributeSpec(over, name, own.GetTypeName() if own else Sdf.ValueTypeNames.Float)
-            attribute.default = value / self.unit(number, kind, one.per_degree)
+            attribute.default = value / self.unit(number, kind, place.per_degree)
 
     def unit(self, number: str, kind: str, per_degree: bool) -> float:
         """Return what a joint's number of one is in SI units of a radian."""
@@ -210,9 +216,9 @@ def _joints(stage: Any) -> Iterator[Any]:
 
 def _elements(stage: Any) -> Iterator[Element]:
     for prim in _joints(stage):
-        said = {"name": _name(prim), "joint": _name(prim), "path": str(prim.GetPath())}
-        yield Element("joint", said, 0, 0)
-        yield Element("position", said, 0, 0)
+        attributes = {"name": _name(prim), "joint": _name(prim), "path": str(prim.GetPath())}
+        yield Element("joint", attributes, 0, 0)
+        yield Element("position", attributes, 0, 0)
 
 
 def _name(prim: Any) -> str:
@@ -230,11 +236,11 @@ def _world(file: UsdFile, prim: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _frame(position: Any, turn: Any, stretch: np.ndarray) -> np.ndarray:
-    found, quaternion = np.eye(4), np.array([*turn.GetImaginary(), turn.GetReal()])
+    frame, quaternion = np.eye(4), np.array([*turn.GetImaginary(), turn.GetReal()])
     if quaternion.any():
-        found[:3, :3] = scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix()
-    found[:3, 3] = np.array(position) * stretch
-    return found
+        frame[:3, :3] = scipy.spatial.transform.Rotation.from_quat(quaternion).as_matrix()
+    frame[:3, 3] = np.array(position) * stretch
+    return frame
 
 
 def _end(file: UsdFile, prim: Any, end: int) -> tuple[str, np.ndarray]:
@@ -247,7 +253,7 @@ def _end(file: UsdFile, prim: Any, end: int) -> tuple[str, np.ndarray]:
     while not body.IsPseudoRoot() and not body.HasAPI(UsdPhysics.RigidBodyAPI):
         body = body.GetParent()
     place, stretch = _world(file, target) if targets else (np.eye(4), np.full(3, file.units[0]))
-    position, turn = (prim.GetAttribute(f"physics:local{what}{end}").Get() for what in ("Pos", "Rot"))
+    position, turn = (prim.GetAttribute(f"physics:local{part}{end}").Get() for part in ("Pos", "Rot"))
     frame = place @ _frame(position, turn, stretch)
     if body.IsPseudoRoot():
         return WORLD, frame
@@ -292,13 +298,13 @@ def _connection(file: UsdFile, prim: Any) -> ModelJoint | None:
 
 
 def _number(file: UsdFile, prim: Any, kind: str, number: str) -> float:
-    for one in _PLACES[number]:
-        attribute = prim.GetAttribute(one.named(kind)[0])
+    for place in _PLACES[number]:
+        attribute = prim.GetAttribute(place.named(kind)[0])
         if attribute.HasAuthoredValue():
             value = attribute.Get()
             if not isinstance(value, int | float):
                 raise InputError(f'{file.path}: joint "{_name(prim)}" has no number as its {attribute.GetName()}')
-            return float(value) * file.unit(number, kind, one.per_degree)
+            return float(value) * file.unit(number, kind, place.per_degree)
     return 0.0
 
 

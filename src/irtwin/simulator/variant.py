@@ -52,21 +52,21 @@ class PlayedModel:
         q[:, self.soft] += qpos[:, self.links] * on_links[self.soft]
         return q
 
-    def soften(self, one: mujoco.MjModel, compliance: np.ndarray) -> None:
+    def soften(self, compiled: mujoco.MjModel, compliance: np.ndarray) -> None:
         """Give the joints behind motors the springs of compliances (n,), rad/(N m).
 
         Dry friction keeps its law: MuJoCo's softens by the inertia at hand, and that is the rotor's alone now.
         """
         dof = self.speeds[self.soft]
-        rotor, link = one.dof_armature[dof], self.of.links[self.soft]
+        rotor, link = compiled.dof_armature[dof], self.of.links[self.soft]
         stiffness = 1 / compliance[self.soft]
-        one.jnt_stiffness[one.dof_jntid[self.behind]] = stiffness
-        one.dof_damping[self.behind] = 2 * DAMPED * np.sqrt(stiffness * link)
-        before = one.dof_solimp[dof, 0]
+        compiled.jnt_stiffness[compiled.dof_jntid[self.behind]] = stiffness
+        compiled.dof_damping[self.behind] = 2 * DAMPED * np.sqrt(stiffness * link)
+        before = compiled.dof_solimp[dof, 0]
         odds = before / (1 - before) * (self.of.free[self.soft] + rotor) / rotor
         ends = np.minimum(np.stack([odds, odds]) / (1 + np.stack([odds, odds])), _FIRMEST)
-        one.dof_solref[dof, 0] *= one.dof_solimp[dof, 1] / ends[1]
-        one.dof_solimp[dof, :2] = ends.T
+        compiled.dof_solref[dof, 0] *= compiled.dof_solimp[dof, 1] / ends[1]
+        compiled.dof_solimp[dof, :2] = ends.T
 
 
 def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
@@ -83,13 +83,13 @@ def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
     behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
     joints = [compiled.joint(joint).id for joint in model.joints]
     places = [model.joints.index(joint) for joint in soft]
-    at = (np.array(one, dtype=int) for one in (joints, second, places, behind))
+    at = (np.array(indices, dtype=int) for indices in (joints, second, places, behind))
     return PlayedModel(model, compiled, *at)
 
 
 def _add_second(spec: mujoco.MjSpec, joint: str) -> None:
     """Put an actuator beside a joint's servo, of a force that numbers are to say."""
-    first = next(one for one in spec.actuators if one.target == joint)
+    first = next(actuator for actuator in spec.actuators if actuator.target == joint)
     second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange

@@ -15,6 +15,7 @@ from irtwin.document.document import cause_ids
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.compliance import JointElasticity
 from irtwin.effects.load import CableDrag, ExternalContact
+from irtwin.gap.energy_errors import EnergyErrors
 from irtwin.gap.isolation.closing import share
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.gap.writing import folded
@@ -87,19 +88,20 @@ def document(
     horizons: Horizons,
 ) -> said.Document:
     """Return the document; `before`, `after`: each run played as a whole, by the model and by numbers of other runs."""
-    squares = [np.array([one.squares for one in some]) for some in (before, after)]
+    squares = [np.array([run.squares for run in some]) for some in (before, after)]
     names = sorted(parts.names, key=lambda name: -parts.relative(parts.without(name)).sum())
     causes = _causes(robot, chosen, pushes, parts, names)
     findings = _findings(robot, dict(zip(names, causes, strict=True)), parts, chosen.fit.floor)
     named = any(finding.matters for finding in findings)
-    places, torques = [one[:, 0] for one in squares], [one[:, 1:] for one in squares]
+    places, torques = [side[:, 0] for side in squares], [side[:, 1:] for side in squares]
     closed, interval = share((places[0] - places[1]).sum(axis=1), places[0].sum(axis=1))
     verdict = _verdict(named, closed, *map(_rms, places))
+    energies = _energies(before, after)
     return said.Document(
         verdict=verdict,
         robot=robot.name,
         gap=said.Gap(
-            energy_error_percent=None,
+            energy_error_percent=energies.mean[0] if energies else None,
             torque=_sizes(robot, torques[0][:, 0]) if torques[0].size else None,
             position=_sizes(robot, places[0]),
         ),
@@ -110,9 +112,9 @@ def document(
         shrink=said.Shrink(
             held_out_runs=tuple(runs) if len(runs) > 1 else (),
             noise_floor_from=None,
-            torque_rmse=together(*(one[:, 0] for one in torques)) if torques[0].size else None,
+            torque_rmse=together(*(torque[:, 0] for torque in torques)) if torques[0].size else None,
             power_rmse=None,
-            energy_error_percent=None,
+            energy_error_percent=energies.change if energies else None,
             closed_fraction=said.ClosedFraction(value=closed, interval95=interval) if named else None,
             by_cause=tuple(_change(cause, name, parts) for cause, name in zip(causes, names, strict=True)),
             position_rmse=together(*places),
@@ -120,8 +122,16 @@ def document(
         next_experiment=None,
         unexplained_because="much_is_left" if verdict == "unexplained" else None,
         simulator=simulator,
-        horizons=tuple(said.Horizon(seconds=at, before=one, after=other) for at, one, other in horizons),
+        horizons=tuple(
+            said.Horizon(seconds=at, before=error_before, after=error_after)
+            for at, error_before, error_after in horizons
+        ),
     )
+
+
+def _energies(before: Sequence[Tracked], after: Sequence[Tracked]) -> EnergyErrors | None:
+    errors = [np.array([run.energy_error for run in side if run.energy_error is not None]) for side in (before, after)]
+    return EnergyErrors(*errors) if errors[0].size else None
 
 
 def _sizes(robot: Robot, squares: np.ndarray) -> Mapping[str, said.Size]:
@@ -138,31 +148,31 @@ def curves(robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: 
 
 
 def _apart(runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]) -> FarthestApart:
-    run = int(np.argmax([one.off.max() for one in before]))
-    one, other = before[run], after[run]
-    at = int(one.off.argmax())
+    run = int(np.argmax([played.off.max() for played in before]))
+    by_model, by_numbers = before[run], after[run]
+    at = int(by_model.off.argmax())
     return FarthestApart(
         run=runs[run],
-        time=float(one.time[at]),
-        robot=tuple(one.robot[at].tolist()),
-        before=tuple(one.model[at].tolist()),
-        after=tuple(other.model[at].tolist()),
-        off_before=float(one.off[at]),
-        off_after=float(other.off[at]),
+        time=float(by_model.time[at]),
+        robot=tuple(by_model.robot[at].tolist()),
+        before=tuple(by_model.model[at].tolist()),
+        after=tuple(by_numbers.model[at].tolist()),
+        off_before=float(by_model.off[at]),
+        off_after=float(by_numbers.off[at]),
     )
 
 
 def _errors(
     robot: Robot, runs: Sequence[str], before: Sequence[Tracked], after: Sequence[Tracked]
 ) -> Iterator[RunError]:
-    for run, one, other in zip(runs, before, after, strict=True):
-        found: dict[tuple[str | None, str | None], tuple[float, float]] = {}
-        found["position", None] = _rms(one.squares[0]), _rms(other.squares[0])
-        found["flange", None] = one.flange, other.flange
-        for channel, left, then in zip(("position", None), one.squares, other.squares, strict=False):
+    for run, by_model, by_numbers in zip(runs, before, after, strict=True):
+        errors: dict[tuple[str | None, str | None], tuple[float, float]] = {}
+        errors["position", None] = _rms(by_model.squares[0]), _rms(by_numbers.squares[0])
+        errors["flange", None] = by_model.flange, by_numbers.flange
+        for channel, left, then in zip(("position", None), by_model.squares, by_numbers.squares, strict=False):
             for place, joint in enumerate(robot.joint_names):
-                found[channel, joint] = _rms(left[place]), _rms(then[place])
-        for (of, at), (left, then) in found.items():
+                errors[channel, joint] = _rms(left[place]), _rms(then[place])
+        for (of, at), (left, then) in errors.items():
             yield RunError(run=run, joint=at, before=left, after=then, floor=None, of=of)
 
 
@@ -196,7 +206,7 @@ def _causes(
     odds = [pushes[name].odds if name in pushes else float(chosen.odds[row_of(name)].max()) for name in names]
     return tuple(
         said.Cause(
-            id=one,
+            id=cause_id,
             effect=_told(name)[0],
             joints=tuple(on),
             scope="changed",
@@ -205,7 +215,7 @@ def _causes(
             indistinguishable_from=(),
             evidence=_evidence(chosen, pushes.get(name), parts, name, sure),
         )
-        for one, name, on, sure in zip(ids, names, joints, odds, strict=True)
+        for cause_id, name, on, sure in zip(ids, names, joints, odds, strict=True)
     )
 
 
@@ -237,9 +247,9 @@ def _of_push(push: FoundPush) -> Iterator[said.CauseParameter]:
 
 def _parameters(robot: Robot, chosen: DifferingNumbers, name: str) -> Iterator[said.CauseParameter]:
     if name in PARTS:
-        for each in PARTS[name]:
-            symbol, unit = _SYMBOLS[each]
-            yield replace(_parameter(chosen, each, 0, None, unit), name=symbol)
+        for number in PARTS[name]:
+            symbol, unit = _SYMBOLS[number]
+            yield replace(_parameter(chosen, number, 0, None, unit), name=symbol)
         return
     _, _, turning, sliding = _told(name)
     for place in np.flatnonzero(chosen.differs[row_of(name)]):
@@ -295,14 +305,14 @@ def _findings(
 ) -> tuple[said.Finding, ...]:
     """Return the causes by family, the one that closes most first; `floor` (c, n) as of the fit."""
     of, whole = families(parts.names), parts.relative(parts.before)
-    found = []
+    findings = []
     for some in of:
         own = [cause for name, cause in causes.items() if name in some]
         closed = parts.closed(some, of)
         value, interval = share(parts.relative(closed), whole)
         family = _told(some[0])[1]
         on = tuple(joint for joint in robot.joint_names if any(joint in cause.joints for cause in own))
-        found.append(
+        findings.append(
             said.Finding(
                 id=cause_ids([(family, on)], robot.joint_names)[0],
                 family=family,
@@ -315,12 +325,12 @@ def _findings(
                 share_of=_SHARE_OF[parts.before.shape[1] - 1],
                 matters=_matters(closed.mean(axis=0), parts.before.mean(axis=0), floor),
                 members=tuple(
-                    said.Member(cause=one.id, effect=one.effect, family=family, confidence=one.confidence)
-                    for one in own
+                    said.Member(cause=cause.id, effect=cause.effect, family=family, confidence=cause.confidence)
+                    for cause in own
                 ),
             )
         )
-    return tuple(sorted(found, key=lambda one: -one.share))
+    return tuple(sorted(findings, key=lambda finding: -finding.share))
 
 
 def _matters(closed: np.ndarray, before: np.ndarray, floor: np.ndarray) -> bool:

@@ -96,7 +96,7 @@ def _manifest(archive: Path, source: zipfile.ZipFile) -> dict[str, tuple[str, in
             f"{archive}: made by another irtwin version ({content.get('software')}); restore it with that one"
         )
     try:
-        listed = {str(name): (str(one["sha256"]), one["size"]) for name, one in content["files"].items()}
+        listed = {str(name): (str(entry["sha256"]), entry["size"]) for name, entry in content["files"].items()}
     except (AttributeError, KeyError, TypeError):
         raise foreign from None
     agree = len(source.infolist()) == len(listed) + 1 and set(entries) == set(listed)

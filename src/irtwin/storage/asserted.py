@@ -68,20 +68,23 @@ def follow(rows: Iterable[Base], facts: Sequence[AssertedFact]) -> list[str]:
     it did not know of that.
     """
     by_key = {(row.__tablename__, _key(row)): row for row in rows}
-    values: dict[tuple[str, str], str] = {}
+    words: dict[tuple[str, str], str] = {}
+    told: dict[tuple[str, str], str | None] = {}  # by the data set
     for fact in facts:
         row = by_key.get((fact.table.name, _key(fact)))
         if row is None:
             continue
+        about = str(fact.place), _key(fact)
         now = written(getattr(row, fact.column.name))
-        what = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
+        cell = f"{fact.column.name} of {fact.subject.rpartition('/')[2]}"
         by = f"{fact.author} said on {fact.time:%Y-%m-%d}"
+        in_data_set = told.setdefault(about, now)
         if now == fact.replaced:
             setattr(row, fact.column.name, value_of(fact.column, fact.value))
-            values[str(fact.place), _key(fact)] = f"{what}: {fact.value}, as {by}; the data set says {fact.replaced}"
+            words[about] = f"{cell}: {fact.value}, as {by}; the data set says {in_data_set}"
         elif now != fact.value:
-            values[str(fact.place), _key(fact)] = f"{what}: the data set says {now} now; what {by} no longer holds"
-    return list(values.values())
+            words[about] = f"{cell}: the data set says {in_data_set} now; what {by} no longer holds"
+    return list(words.values())
 
 
 def _key(of: Base) -> str:
@@ -112,7 +115,7 @@ def keep(session: Session, facts: Sequence[AssertedFact], withdrawn: Iterable[st
 def row_of(session: Session, fact: AssertedFact) -> Base | None:
     """Return the row that a fact is about; None where there is none."""
     key = json.loads(str(fact.row_key))
-    mapper = next(one for one in Base.registry.mappers if one.local_table is fact.table)
+    mapper = next(candidate for candidate in Base.registry.mappers if candidate.local_table is fact.table)
     ident = tuple(value_of(column, key[column.name]) for column in fact.table.primary_key)
     return session.get(mapper.class_, ident)
 

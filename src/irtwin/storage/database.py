@@ -225,20 +225,20 @@ class Workspace:
             row.activity_id = activity.activity_id  # type: ignore[attr-defined]
             if isinstance(row, RunEnergy) and not row.taken_activity_id:
                 row.taken_activity_id = made[-1][0].activity_id
-        uses = {(one.activity_id, entity.removeprefix(self.base)) for one, read in made for entity in read}
+        uses = {(kept.activity_id, entity.removeprefix(self.base)) for kept, read in made for entity in read}
         read_rows = [
             ActivityUse(activity_id=of, entity=entity, relation=relation_to(entity)) for of, entity in sorted(uses)
         ]
         with self._writing() as session:
             same = select(Activity.activity_id).where(
-                Activity.provider.in_((*(one.provider for one, _ in made), instead_of)),
+                Activity.provider.in_((*(kept.provider for kept, _ in made), instead_of)),
                 Activity.subject == activity.subject,
             )
             robot_rows.drop_activities(session, robot_rows.with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
             modelled = self._store(series or {}, MODELLED, activity.activity_id)
-            robot_rows.insert_rows(session, [*(one for one, _ in made), *read_rows, *rows, *modelled])
+            robot_rows.insert_rows(session, [*(kept for kept, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
     def keep_run(self, run: RunRow, series: pa.Table, rows: Tables | None = None) -> None:
@@ -391,10 +391,10 @@ class Workspace:
 
     def _make_tables_of_packages(self, tables: Sequence[Table], there: Mapping[str, set[str]]) -> None:
         """Make the tables that are not there, and anew those of another version: providers can fill them again."""
-        other = [table for table in tables if table.name in there and not _is_of_now(table, there)]
-        if other or not all(table.name in there for table in tables):
+        outdated = [table for table in tables if table.name in there and not _is_of_now(table, there)]
+        if outdated or not all(table.name in there for table in tables):
             with self._writing() as session:
-                Base.metadata.drop_all(session.connection(), other)
+                Base.metadata.drop_all(session.connection(), outdated)
                 Base.metadata.create_all(session.connection(), list(tables))
 
 
@@ -421,10 +421,10 @@ def _is_of_now(table: Table, there: Mapping[str, set[str]]) -> bool:
     return there[table.name] == set(table.columns.keys())
 
 
-def _check_that_nothing_is_lost(folder: Path, what: str = f"{_DATABASE} is missing") -> None:
+def _check_that_nothing_is_lost(folder: Path, problem: str = f"{_DATABASE} is missing") -> None:
     """Raise InputError where files lie in a workspace that only a database could have named."""
-    if what.startswith(_DATABASE) and (folder / _DATABASE).exists():
+    if problem.startswith(_DATABASE) and (folder / _DATABASE).exists():
         return
     for name in ("graph", *_FOLDERS):
         if next((folder / name).glob("[!.]*"), None) is not None:
-            raise InputError(f"{folder}: {what}, though {name}/ is full; {_FROM_A_BACKUP}")
+            raise InputError(f"{folder}: {problem}, though {name}/ is full; {_FROM_A_BACKUP}")

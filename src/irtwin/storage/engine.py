@@ -90,12 +90,12 @@ def columns(engine: Engine) -> dict[str, set[str]]:
         if engine.dialect.name != "sqlite":
             of_each = inspect(connection).get_multi_columns()
             return {table: {column["name"] for column in columns} for (_, table), columns in of_each.items()}
-        found: dict[str, set[str]] = {}  # by one question: reflection asks SQLite table by table
+        names: dict[str, set[str]] = {}  # by one question: reflection asks SQLite table by table
         for table, column in connection.exec_driver_sql(
             "SELECT t.name, c.name FROM sqlite_master AS t, pragma_table_xinfo(t.name) AS c WHERE t.type = 'table'"
         ):
-            found.setdefault(table, set()).add(column)
-        return found
+            names.setdefault(table, set()).add(column)
+        return names
 
 
 @contextmanager
@@ -218,10 +218,10 @@ def check_schema(engine: Engine, tables: Container[str]) -> None:
     if engine.dialect.name != "sqlite":
         return
     with engine.connect() as connection:
-        found = connection.exec_driver_sql(
+        objects = connection.exec_driver_sql(
             "SELECT type, name, tbl_name FROM sqlite_master WHERE type IN ('view', 'trigger')"
         ).all()
-    for kind, name, table in found:
+    for kind, name, table in objects:
         if table in tables:
             raise WorkspaceFault(
                 f"{engine.url.database}: holds the {kind} {name!r}, which irtwin did not make; drop it, or restore a "
@@ -249,13 +249,13 @@ def _tell_of_server(url: URL, context: ExceptionContext) -> None:
     """Raise WorkspaceFault for what those who run a PostgreSQL server can mend."""
     error = context.original_exception
     state = str(getattr(error, "sqlstate", None) or "")
-    what = next(
+    problem = next(
         (f"{meaning}; nothing was changed" for code, meaning in _OF_SERVER.items() if state.startswith(code)), None
     )
     if context.is_disconnect and context.connection is not None:
-        what = "the connection to the database was lost; do it again"
-    if what is not None:
-        raise WorkspaceFault(f"{shown(url)}: {what} ({' '.join(str(error).split())[:160]})") from error
+        problem = "the connection to the database was lost; do it again"
+    if problem is not None:
+        raise WorkspaceFault(f"{shown(url)}: {problem} ({' '.join(str(error).split())[:160]})") from error
 
 
 def _damaged(url: URL, reason: str) -> str:

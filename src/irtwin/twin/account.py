@@ -78,7 +78,11 @@ def _covariance(twin: Twin, motion: Motion, ledger: Sequence[LedgerEntry]) -> np
     covariance = np.asarray(slopes @ twin.covariance @ slopes.T)
     seconds = float(motion.time[-1] - motion.time[0])
     lasting = twin.remainder.energy(seconds) if twin.remainder else 0.0  # it looks like what is drawn at rest
-    unsure = {one.effect: one.upper - one.value for one in twin.parameters if one.upper is not None}
+    unsure = {
+        parameter.effect: parameter.upper - parameter.value
+        for parameter in twin.parameters
+        if parameter.upper is not None
+    }
     for k, entry in enumerate(ledger):
         if entry.effect in twin.at_rest:
             alone = unsure.get(entry.effect, 0.0) / NORMAL * seconds
@@ -98,11 +102,11 @@ def _joined(energies: np.ndarray, covariance: np.ndarray, whole: float) -> list[
         together = variance[:, None] + variance + 2 * own
         np.fill_diagonal(together, np.inf)
         gain = np.where(open_ones[:, None], variance[:, None] - together, -np.inf)
-        one, other = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        if gain[one, other] <= 0:
+        first, second = np.unravel_index(int(np.argmax(gain)), gain.shape)
+        if gain[first, second] <= 0:
             break
-        groups[one] = sorted(groups[one] + groups[other])
-        del groups[other]
+        groups[first] = sorted(groups[first] + groups[second])
+        del groups[second]
     return groups
 
 

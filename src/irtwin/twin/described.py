@@ -51,7 +51,10 @@ def described(twin: Twin, robot: Robot) -> Robot:
         for joint, numbers in _numbers(twin).items()
     }
     structure = structure_of(robot)
-    stand = {one.name: {"damping": one.damping, "friction": one.friction} for one in structure.connections}
+    stand = {
+        connection.name: {"damping": connection.damping, "friction": connection.friction}
+        for connection in structure.connections
+    }
     changed = {joint: numbers for joint, numbers in dynamics.items() if stand[joint] != stand[joint] | numbers}
     text = with_numbers(robot.urdf, _bodies(twin, robot, structure), changed)
     return replace(robot, urdf=text, links=parse_urdf(text).links)
@@ -68,10 +71,10 @@ def _numbers(twin: Twin) -> dict[str, dict[str, float]]:
     """Return what MJCF calls a joint's numbers, by joint."""
     standing = {effect.id: effect.in_mjcf for effect in twin.standing}
     numbers: dict[str, dict[str, float]] = {}
-    for one in twin.parameters:
-        name = standing.get(one.effect, {}).get(one.name)
-        if name is not None and one.joint is not None:
-            numbers.setdefault(one.joint, {})[name] = one.value
+    for parameter in twin.parameters:
+        name = standing.get(parameter.effect, {}).get(parameter.name)
+        if name is not None and parameter.joint is not None:
+            numbers.setdefault(parameter.joint, {})[name] = parameter.value
     return numbers
 
 
@@ -83,7 +86,7 @@ def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Ine
     bodies: dict[str, pin.Inertia] = {}
     ids = {effect.id for effect in twin.standing if effect.bodies}
     own = [parameter.value for parameter in twin.parameters if parameter.effect in ids]
-    moved = {one.name: one.child for one in structure.connections}
+    moved = {connection.name: connection.child for connection in structure.connections}
     for joint, values in zip(robot.joint_names, np.reshape(own, (-1, 10)), strict=False):
         index = robot.model.getJointId(joint)
         before = robot.model.inertias[index].toDynamicParameters()
@@ -94,7 +97,7 @@ def _bodies(twin: Twin, robot: Robot, structure: Structure) -> dict[str, pin.Ine
                 f"{robot.name}: the body that {joint} moves is not physically consistent; identify the twin again"
             )
         fixed = _fixed(robot, structure, index, moved[joint])
-        rest = values - sum((one.toDynamicParameters() for one in fixed.values()), np.zeros(10))
+        rest = values - sum((body.toDynamicParameters() for body in fixed.values()), np.zeros(10))
         if not consistent(rest[None])[0]:
             rest = values
             bodies |= dict.fromkeys(fixed, pin.Inertia.Zero())

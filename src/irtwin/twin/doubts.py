@@ -43,7 +43,9 @@ def _of_bodies(twin: Twin) -> Iterator[str]:
 def _of_motion(twin: Twin) -> Iterator[str]:
     """Yield which joints no run moves enough to show what rubs there, where torque was fitted."""
     rubs = {effect.id for effect in twin.stack.effects if effect.family == "friction"}
-    shown = {one.joint for one in twin.parameters if one.effect in rubs and one.lower is not None}
+    shown = {
+        parameter.joint for parameter in twin.parameters if parameter.effect in rubs and parameter.lower is not None
+    }
     still = [name for name in twin.robot.joint_names if rubs and twin.base_parameters and name not in shown]
     if still:
         yield (
@@ -63,14 +65,19 @@ def _of_description(twin: Twin) -> Iterator[str]:
 
 def _of_data_sheet(twin: Twin) -> Iterator[str]:
     """Yield numbers of drives that the runs deny."""
-    parameters = {(one.effect, one.joint, one.name): one for one in twin.parameters if not one.link}
+    parameters = {
+        (parameter.effect, parameter.joint, parameter.name): parameter
+        for parameter in twin.parameters
+        if not parameter.link
+    }
     for effect, term in (*twin.stack.torque_terms, *twin.stack.power_terms):
-        one = parameters.get((effect.id, term.joint, term.name))
-        if one is None or one.joint is None or one.lower is None or one.upper is None or term.expected <= 0:
+        fitted = parameters.get((effect.id, term.joint, term.name))
+        if fitted is None or fitted.joint is None or fitted.lower is None or fitted.upper is None or term.expected <= 0:
             continue
-        if one.upper * _OTHER_UNITS < term.expected or one.lower > _OTHER_UNITS * term.expected:
-            stated, logged = f"{term.expected:.3g} {term.unit}", f"{one.value:.3g} ({one.lower:.3g} to {one.upper:.3g})"
+        if fitted.upper * _OTHER_UNITS < term.expected or fitted.lower > _OTHER_UNITS * term.expected:
+            stated = f"{term.expected:.3g} {term.unit}"
+            logged = f"{fitted.value:.3g} ({fitted.lower:.3g} to {fitted.upper:.3g})"
             yield (
-                f"{one.joint}: the data sheet says {one.name} is {stated}, the runs {logged}; one of both is wrong: "
-                f"mend [robot.joint.{one.joint}] in dataset.toml, or look for what the log lacks"
+                f"{fitted.joint}: the data sheet says {fitted.name} is {stated}, the runs {logged}; one of both is "
+                f"wrong: mend [robot.joint.{fitted.joint}] in dataset.toml, or look for what the log lacks"
             )

@@ -88,15 +88,17 @@ def load(path: Path) -> Twin:
 
 def to_json(twin: Twin) -> str:
     """Return a twin as JSON text: the same twin, the same text."""
-    robot, sheet = twin.robot, [each.name for each in fields(_Sheet)]
+    robot, sheet = twin.robot, [field.name for field in fields(_Sheet)]
     sheets = {joint.name: _Sheet(*(getattr(joint, key) for key in sheet)) for joint in robot.joints}
-    said = {each.name: getattr(twin, each.name) for each in fields(_Twin) if each.name not in ("robot", "covariance")}
+    values = {
+        field.name: getattr(twin, field.name) for field in fields(_Twin) if field.name not in ("robot", "covariance")
+    }
     if twin.covariance is not None:
         rows = enumerate(twin.covariance.tolist(), start=1)
-        said["covariance"] = tuple(" ".join(map(repr, row[:length])) for length, row in rows)
-    whole = _Twin(robot=_Robot(robot.name, robot.manufacturer, robot.type, robot.weight, sheets, robot.urdf), **said)
+        values["covariance"] = tuple(" ".join(map(repr, row[:length])) for length, row in rows)
+    whole = _Twin(robot=_Robot(robot.name, robot.manufacturer, robot.type, robot.weight, sheets, robot.urdf), **values)
     known = {
-        each.name: each.default is MISSING or getattr(whole, each.name) not in (None, ()) for each in fields(_Twin)
+        field.name: field.default is MISSING or getattr(whole, field.name) not in (None, ()) for field in fields(_Twin)
     }
     document = {name: value for name, value in asdict(whole).items() if known[name]}
     head = {"format": _FORMAT, "version": _VERSION, "robot": document.pop("robot")}
@@ -118,9 +120,11 @@ def from_json(text: str | bytes, path: Path) -> Twin:
     effects = document.get("effects")
     if not isinstance(effects, list):
         raise InputError(f"{path}, twin.effects must be an array; {_MEND}")
-    known = {each.name: getattr(read, each.name) for each in fields(read) if each.name not in ("robot", "covariance")}
+    known = {
+        field.name: getattr(read, field.name) for field in fields(read) if field.name not in ("robot", "covariance")
+    }
     robot = _robot(path, read.robot)
-    twin = Twin(robot, tuple(_effect(path, place, each) for place, each in enumerate(effects)), **known)
+    twin = Twin(robot, tuple(_effect(path, place, effect) for place, effect in enumerate(effects)), **known)
     _check_complete(path, twin)
     return twin if read.covariance is None else replace(twin, covariance=_covariance(path, read))
 
@@ -181,8 +185,8 @@ def _robot(path: Path, read: _Robot) -> Robot:
     if lacking:
         raise InputError(f"{path}, twin.robot.joints.{lacking[0]} must be given; {_MEND}")
     joints = tuple(replace(joint, **vars(read.joints[joint.name])) for joint in robot.joints)
-    said = {key: getattr(read, key) for key in ("name", "manufacturer", "type", "weight")}
-    return replace(robot, **said, joints=joints)
+    nameplate = {key: getattr(read, key) for key in ("name", "manufacturer", "type", "weight")}
+    return replace(robot, **nameplate, joints=joints)
 
 
 def _check_complete(path: Path, twin: Twin) -> None:

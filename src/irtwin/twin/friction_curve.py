@@ -30,7 +30,9 @@ def friction_curves(twin: Twin, motions: Sequence[Motion], role: str) -> tuple[F
     It is the sum of the twin's friction effects. Where these depend on angle, temperature or load, it is their mean
     over the motions; what depends on the way that the joint came is left out.
     """
-    laws = sorted((one for one in twin.standing if one.family == "friction" and not one.memory), key=lambda e: e.stage)
+    laws = sorted(
+        (effect for effect in twin.standing if effect.family == "friction" and not effect.memory), key=lambda e: e.stage
+    )
     if twin.covariance is None or not laws:
         return ()
     speeds = np.concatenate([motion.dq for motion in motions])
@@ -38,7 +40,10 @@ def friction_curves(twin: Twin, motions: Sequence[Motion], role: str) -> tuple[F
     grid = _signed(_STEPS, 3, slowest, fastest)
     columns = _columns(twin, laws, motions, grid)
     terms = [(effect.id, term.joint, term.link, term.name) for effect in laws for term in effect.terms(twin.robot)]
-    place = {(one.effect, one.joint, one.link, one.name): k for k, one in enumerate(twin.parameters)}
+    place = {
+        (parameter.effect, parameter.joint, parameter.link, parameter.name): k
+        for k, parameter in enumerate(twin.parameters)
+    }
     own = [place[term] for term in terms]
     torque = columns @ np.array([twin.parameters[k].value for k in own])
     width = NORMAL * np.sqrt(np.einsum("gjk,kl,gjl->gj", columns, twin.covariance[np.ix_(own, own)], columns).clip(0))
@@ -136,9 +141,14 @@ def _binned(speed: np.ndarray, torque: np.ndarray, edges: np.ndarray) -> Measure
 
 def _numbers(twin: Twin, effects: set[str], joint: str) -> tuple[FrictionNumber, ...]:
     return tuple(
-        FrictionNumber(one.effect, one.name, one.value, one.unit, one.lower, one.upper)
-        for one in twin.stated
-        if one.joint == joint and one.effect in effects and one.lower is not None and one.upper is not None
+        FrictionNumber(
+            parameter.effect, parameter.name, parameter.value, parameter.unit, parameter.lower, parameter.upper
+        )
+        for parameter in twin.stated
+        if parameter.joint == joint
+        and parameter.effect in effects
+        and parameter.lower is not None
+        and parameter.upper is not None
     )
 
 

@@ -93,11 +93,11 @@ def identify(
                 torque = fit_both(stack, measured, values, known)
         free, torque = torque, with_consistent_bodies(stack, stack.torque_terms, torque)
         torque = with_run_scatter(stack, counting, torque)
-        found: list[Found] = [(stack.torque_terms, torque)]
+        fits: list[Found] = [(stack.torque_terms, torque)]
         if powered:
             left, power = fit_power(stack, with_power, torque.values)
             predicted = predicted_losses(stack, with_power, torque.values, power.values)
-            found.append((free_terms(stack), power))
+            fits.append((free_terms(stack), power))
         factors = [combine([block.factors[e] for block in counting], used) for e, used in enumerate(stack.pattern)]
         base, condition = _base(stack, factors, torque)
         change = _change(factors, torque.values - free.values)
@@ -105,11 +105,11 @@ def identify(
         terms = [*real_terms(stack), *free_terms(stack)]
         left, through = fit_through_power(stack, with_power)[2:]
         predicted = left
-        found = [(terms, with_consistent_bodies(stack, terms, through))]
-    remaining = _remainder(stack, left, predicted, found[-1][0])
+        fits = [(terms, with_consistent_bodies(stack, terms, through))]
+    remaining = _remainder(stack, left, predicted, fits[-1][0])
     if constants:
-        found.append((constants.terms, constants.estimate))
-    parameters = [parameter for terms, result in found for parameter in _parameters(stack, terms, result, remaining)]
+        fits.append((constants.terms, constants.estimate))
+    parameters = [parameter for terms, result in fits for parameter in _parameters(stack, terms, result, remaining)]
     twin = Twin(
         robot=robot,
         effects=stack.effects,
@@ -119,8 +119,8 @@ def identify(
         base_parameters=base,
         condition_number=condition,
         fitted=tuple(dict.fromkeys(motion.run for motion in motions)),
-        quantities=_quantities(robot, found[: len(found) - bool(constants)], parameters),
-        covariance=scipy.linalg.block_diag(*(normal_covariance(it.covariance, it.blocks) for _, it in found)),
+        quantities=_quantities(robot, fits[: len(fits) - bool(constants)], parameters),
+        covariance=scipy.linalg.block_diag(*(normal_covariance(fit.covariance, fit.blocks) for _, fit in fits)),
         remainder=remaining,
         body_change=change,
         odd_stretches=odd,
@@ -134,16 +134,18 @@ def _with_pauses(twin: Twin, motions: Sequence[Motion]) -> Twin:
         return twin
     left = [part.power - twin.power(part) for motion in motions if motion.power is not None for part in pauses(motion)]
     rest = NORMAL * of_rest(left)
-    parameters = (_widened(one, rest) if one.effect in twin.at_rest else one for one in twin.parameters)
+    parameters = (
+        _widened(parameter, rest) if parameter.effect in twin.at_rest else parameter for parameter in twin.parameters
+    )
     return replace(twin, remainder=replace(twin.remainder, pause=of_pauses(left)), parameters=tuple(parameters))
 
 
-def _widened(one: Parameter, half: float) -> Parameter:
+def _widened(parameter: Parameter, half: float) -> Parameter:
     """Return a parameter that is at least 0 and unsure by `half` of an interval more."""
-    if one.lower is None or one.upper is None:
-        return one
-    width = float(np.hypot(one.upper - one.value, half))
-    return replace(one, lower=max(one.value - width, 0.0), upper=one.value + width)
+    if parameter.lower is None or parameter.upper is None:
+        return parameter
+    width = float(np.hypot(parameter.upper - parameter.value, half))
+    return replace(parameter, lower=max(parameter.value - width, 0.0), upper=parameter.value + width)
 
 
 def _remainder(stack: Stack, blocks: Sequence[Block], predicted: Sequence[Block], terms: Terms) -> Remainder | None:
@@ -162,10 +164,10 @@ def _visible(whole: Stack, *, torque: bool, power: bool) -> Stack:
     return whole.with_effects([effect for effect in whole.effects if effect.id in seen])
 
 
-def _parameters(stack: Stack, terms: Terms, found: Estimate, left: Remainder | None) -> list[Parameter]:
+def _parameters(stack: Stack, terms: Terms, fit: Estimate, left: Remainder | None) -> list[Parameter]:
     """Return the terms' parameters; what lasts of the remainder looks like what is drawn at rest."""
     lasting = np.array([NORMAL * left.mean if left and effect.drawn_at_rest else 0.0 for effect, _ in terms])
-    widths = np.hypot(half_widths(found.covariance, spreads(stack, terms), found.blocks), lasting)
+    widths = np.hypot(half_widths(fit.covariance, spreads(stack, terms), fit.blocks), lasting)
     return [
         Parameter(
             effect=effect.id,
@@ -177,34 +179,32 @@ def _parameters(stack: Stack, terms: Terms, found: Estimate, left: Remainder | N
             lower=None if np.isnan(width) else float(max(value - width, term.lowest)),
             upper=None if np.isnan(width) else float(value + width),
         )
-        for (effect, term), value, width in zip(terms, found.values, widths, strict=True)
+        for (effect, term), value, width in zip(terms, fit.values, widths, strict=True)
     ]
 
 
-def _quantities(robot: Robot, found: Sequence[Found], parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
+def _quantities(robot: Robot, fits: Sequence[Found], parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """Return the catalogue's parameters of effects whose coefficients are others."""
     known = {(parameter.effect, parameter.joint, parameter.name): parameter.value for parameter in parameters}
     told = []
-    for terms, result in found:
+    for terms, result in fits:
         for effect in dict.fromkeys(effect for effect, _ in terms):
             if type(effect).parameters is Effect.parameters:
                 continue
             own = [place for place, (owner, _) in enumerate(terms) if owner is effect]
             given = Coefficients(result.values[own], result.covariance[np.ix_(own, own)], known)
-            for each in effect.parameters(robot, given):
-                place = (each.joint, None, each.name, each.value, each.unit, each.lower, each.upper)
+            for number in effect.parameters(robot, given):
+                place = (number.joint, None, number.name, number.value, number.unit, number.lower, number.upper)
                 told.append(Parameter(effect.id, *place))
     return tuple(told)
 
 
-def _base(
-    stack: Stack, factors: Sequence[np.ndarray], found: Estimate
-) -> tuple[tuple[BaseParameter, ...], float | None]:
+def _base(stack: Stack, factors: Sequence[np.ndarray], fit: Estimate) -> tuple[tuple[BaseParameter, ...], float | None]:
     """Return the base parameters, and the condition number of the equations of torque; None where it is infinite."""
     base = base_parameters(stack)
     condition = condition_number(np.concatenate(factors)[:, :-1], base)
-    values, covariance = base.grouping @ found.values, base.grouping @ found.covariance @ base.grouping.T
-    widths = half_widths(covariance, np.full(len(values), np.inf), found.blocks)
+    values, covariance = base.grouping @ fit.values, base.grouping @ fit.covariance @ base.grouping.T
+    widths = half_widths(covariance, np.full(len(values), np.inf), fit.blocks)
     told = tuple(
         BaseParameter(name, float(value), base.terms[k].unit, float(value - width), float(value + width))
         for name, k, value, width in zip(base.names(), base.independent, values, widths, strict=True)

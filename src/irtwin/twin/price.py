@@ -155,7 +155,7 @@ def _slope(twin: Twin, motion: Motion, weights: np.ndarray) -> np.ndarray:
 def _half_width(twin: Twin, slope: np.ndarray, *left: float) -> float:
     """Return half the 95 % interval of what goes by a `slope` (p,) with the parameters; `left`: what effects leave."""
     assert twin.covariance is not None
-    return NORMAL * float(np.sqrt(max(float(slope @ twin.covariance @ slope), 0.0) + sum(one**2 for one in left)))
+    return NORMAL * float(np.sqrt(max(float(slope @ twin.covariance @ slope), 0.0) + sum(rest**2 for rest in left)))
 
 
 def _seconds(motion: Motion) -> float:

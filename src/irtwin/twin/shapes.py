@@ -55,7 +55,7 @@ def shaped(
     powered = any(motion.power is not None for own in with_torque for motion in own)
     named, stack = {effect for effect in effects if isinstance(effect, str)}, Stack(robot, effects)
     of_torque, of_power = (
-        {one.id for one in stack.effects if one.id in named and _has_open_shape(one, signal, robot)}
+        {effect.id for effect in stack.effects if effect.id in named and _has_open_shape(effect, signal, robot)}
         for signal in ("torque", "power")
     )
     tried = (of_torque if with_torque else set()) | (of_power if powered else set())
@@ -72,7 +72,10 @@ def shaped(
             return _together(metered, [part.power(trial, own) for part, own in zip(metered, values, strict=True)])
 
         stack = _shaped(stack, tried, "power", left)
-    return (*(one for one in effects if one not in tried), *(one for one in stack.effects if one.id in tried))
+    return (
+        *(effect for effect in effects if effect not in tried),
+        *(effect for effect in stack.effects if effect.id in tried),
+    )
 
 
 def _together(parts: Sequence[_Side], fits: Sequence[Estimate]) -> np.ndarray:
@@ -105,7 +108,9 @@ def _has_open_shape(effect: Effect, signal: str, robot: Robot) -> bool:
 
 def _shaped(stack: Stack, open_shapes: Set[str], signal: str, left: Callable[[Stack], np.ndarray]) -> Stack:
     """Give each effect of the signal, whose shape is open, the one that leaves least beside the others' shapes."""
-    opened = [one for one in stack.effects if one.id in open_shapes and _has_open_shape(one, signal, stack.robot)]
+    opened = [
+        effect for effect in stack.effects if effect.id in open_shapes and _has_open_shape(effect, signal, stack.robot)
+    ]
     for _ in range(_SWEEPS if len(opened) > 1 else 1):
         before = stack.effects
         for effect in opened:
@@ -141,7 +146,7 @@ def _with_shape_between(stack: Stack, effect: Effect, left: Callable[[Stack], np
         best = _between(own[0], shapes, lambda shape: float(np.log(left_by([shape])).sum()))
         return stack.with_effects([*before, best, *after])
     if effect.signal == "torque":
-        of_joint = {joint.name: replace(one, joints=None) for one in own for joint in one.acting(stack.robot)}
+        of_joint = {joint.name: replace(shape, joints=None) for shape in own for joint in shape.acting(stack.robot)}
         of_joint = _between_by_joint(of_joint, shapes, stack.robot, lambda some: left_by(_by_shape(some, stack.robot)))
         return stack.with_effects([*before, *_by_shape(of_joint, stack.robot), *after])
     return stack
@@ -149,8 +154,10 @@ def _with_shape_between(stack: Stack, effect: Effect, left: Callable[[Stack], np
 
 def _around(stack: Stack, effect: str) -> tuple[Sequence[Effect], Sequence[Effect], Sequence[Effect]]:
     """Return what stands before an effect, the effect, which may be several, and what stands after."""
-    first = [one.id for one in stack.effects].index(effect)
-    own, after = ([one for one in stack.effects[first:] if (one.id == effect) is of_it] for of_it in (True, False))
+    first = [stacked.id for stacked in stack.effects].index(effect)
+    own, after = (
+        [stacked for stacked in stack.effects[first:] if (stacked.id == effect) is of_it] for of_it in (True, False)
+    )
     return stack.effects[:first], own, after
 
 
@@ -164,9 +171,9 @@ def _between(best: Effect, shapes: Sequence[Effect], left: Callable[[Effect], fl
         def of_number(value: float, best: Effect = best, name: str = name) -> float:
             return left(best.variants(**{name: (float(value),)})[0])
 
-        found = scipy.optimize.minimize_scalar(of_number, bounds=ends, method="bounded", options={"maxiter": _LOOKS})
-        if found.fun < left(best):
-            (best,) = best.variants(**{name: (float(found.x),)})
+        optimum = scipy.optimize.minimize_scalar(of_number, bounds=ends, method="bounded", options={"maxiter": _LOOKS})
+        if optimum.fun < left(best):
+            (best,) = best.variants(**{name: (float(optimum.x),)})
     return best
 
 
@@ -177,15 +184,15 @@ def _between_by_joint(
     left: Callable[[Mapping[str, Effect]], np.ndarray],
 ) -> dict[str, Effect]:
     """Return the same joint by joint; `left` of joints' shapes is what each equation leaves."""
-    found = dict(best)
+    by_joint = dict(best)
     for name, ends in [*shapes[0].ranges.items()] * _PASSES:
         tried = sorted({*(float(shape.shape[name]) for shape in shapes), *ends})
-        found |= _number_by_joint(found, name, tried, robot, left)
-    return found
+        by_joint |= _number_by_joint(by_joint, name, tried, robot, left)
+    return by_joint
 
 
 def _number_by_joint(
-    found: Mapping[str, Effect],
+    by_joint: Mapping[str, Effect],
     name: str,
     tried: Sequence[float],
     robot: Robot,
@@ -194,18 +201,18 @@ def _number_by_joint(
     """Return the shapes whose number leaves less than those that were tried, by joint: one fit looks at all joints."""
     from scipy.optimize import elementwise  # takes a while to import
 
-    joints, points = list(found), np.array(tried)
-    own = np.array([float(found[joint].shape[name]) for joint in joints])
+    joints, points = list(by_joint), np.array(tried)
+    own = np.array([float(by_joint[joint].shape[name]) for joint in joints])
     below = points[np.maximum(np.searchsorted(points, own) - 1, 0)]
     above = points[np.minimum(np.searchsorted(points, own, side="right"), len(points) - 1)]
     inner = np.where((below < own) & (own < above), own, (below + above) / 2)
 
     def shapes_of(values: np.ndarray, which: np.ndarray) -> dict[str, Effect]:
         numbers = zip((joints[k] for k in which), values, strict=True)
-        return {joint: found[joint].variants(**{name: (float(value),)})[0] for joint, value in numbers}
+        return {joint: by_joint[joint].variants(**{name: (float(value),)})[0] for joint, value in numbers}
 
     def left_of(values: np.ndarray, which: np.ndarray) -> np.ndarray:
-        return left({**found, **shapes_of(values, which)})[[robot.index(joints[k]) for k in which]]
+        return left({**by_joint, **shapes_of(values, which)})[[robot.index(joints[k]) for k in which]]
 
     every = np.arange(len(joints))
     least = elementwise.find_minimum(left_of, (below, inner, above), args=(every,), maxiter=_LOOKS_BY_JOINT)

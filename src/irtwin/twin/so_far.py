@@ -186,8 +186,8 @@ class EnergySoFar:
 
     def _run(self, signals: Signals) -> Run:
         """Return signals as a run; a channel that was not said throughout is none."""
-        said = {name: None for name, values in signals.logged().items() if np.isnan(values).any()}
-        whole = Signals(**{**signals.logged(), **said})  # type: ignore[arg-type]
+        lacking = {name: None for name, values in signals.logged().items() if np.isnan(values).any()}
+        whole = Signals(**{**signals.logged(), **lacking})  # type: ignore[arg-type]
         return run_of(self._name, whole, role="live", payload_mass=self._payload, payload_com=self._payload_com)
 
     def _add(self, stretch: WatchedStretch) -> None:
@@ -214,9 +214,9 @@ class EnergySoFar:
         held = self._signals
         if held is None or len(held.time) < 2 or not (self._paced() or to_the_end):
             return
-        said = held.power is not None and not np.isnan(held.power).any()
+        is_whole = held.power is not None and not np.isnan(held.power).any()
         self.seconds += float(held.time[-1] - held.time[0])
-        self._meter(held.power if said else None, held.time)
+        self._meter(held.power if is_whole else None, held.time)
         self._signals = held.rows(slice(-1, None))
 
     def _forget(self, place: int) -> None:

@@ -41,15 +41,15 @@ def supply_states(twin: Twin, motion: Motion) -> tuple[SupplyState, ...]:
         off = motion.power < _OFF * _at_rest(twin)
     on = twin.stack.drives_on(motion)
     closed = still & (np.zeros_like(still) if on is None else on == 0)
-    weights, found = trapezoid(motion.time), []
+    weights, passed = trapezoid(motion.time), []
     states = {"off": off, "moving": ~still, "brakes closed": closed, "drives on at rest": still}
     for name, where in states.items():
         own = np.where(where, weights, 0.0)
         weights = weights - own  # each state is where none before it is
         if seconds := float(own.sum()):
             logged = None if motion.power is None else float(own @ motion.power) / seconds
-            found.append(SupplyState(name, seconds, logged, mean_power(twin, motion, own > 0)))
-    return tuple(found)
+            passed.append(SupplyState(name, seconds, logged, mean_power(twin, motion, own > 0)))
+    return tuple(passed)
 
 
 def _at_rest(twin: Twin) -> float:

@@ -62,10 +62,10 @@ class FittedTorqueScale:
         below, above = max(value - ends[0], 0.0), max(ends[1] - value, 0.0)
         return value - float(np.hypot(value - lower, below)), value + float(np.hypot(upper - value, above))
 
-    def widened(self, one: Quantity) -> Quantity:
+    def widened(self, quantity: Quantity) -> Quantity:
         """Return a quantity with the scale in its interval; one that does not go with torque as it is."""
-        ends = self.interval(one.value, one.unit, one.lower, one.upper)
-        return one if ends is None else replace(one, lower=ends[0], upper=ends[1])
+        ends = self.interval(quantity.value, quantity.unit, quantity.lower, quantity.upper)
+        return quantity if ends is None else replace(quantity, lower=ends[0], upper=ends[1])
 
 
 def torque_degree(unit: str) -> int:
@@ -125,12 +125,12 @@ def _narrowed(known: FittedTorqueScale, slope: float, half: float) -> FittedTorq
     half = float(np.hypot(half, _OF_SENSOR * abs(slope)))
     if half >= known.uncertainty:
         return known
-    said = f"power over torque times speed is {slope:.3f} (give or take {half:.3f})"
+    finding = f"power over torque times speed is {slope:.3f} (give or take {half:.3f})"
     if abs(slope - 1) > np.hypot(half, known.uncertainty):
-        return replace(known, why=f"{known.why}; {said}, farther off than that, and does not count")
+        return replace(known, why=f"{known.why}; {finding}, farther off than that, and does not count")
     weights = np.array([known.uncertainty, half]) ** -2.0
     middle, rest = float(weights @ [1.0, slope] / weights.sum()), float(weights.sum() ** -0.5)
-    return replace(known, low=middle - rest, high=middle + rest, why=f"{known.why}; {said}, which narrows it")
+    return replace(known, low=middle - rest, high=middle + rest, why=f"{known.why}; {finding}, which narrows it")
 
 
 def _told_by_power(motions: Sequence[Motion], torque: Torque) -> tuple[float, float] | None:

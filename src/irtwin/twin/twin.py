@@ -127,7 +127,7 @@ class Twin:
             for effect, term in (*self.stack.torque_terms, *self.stack.power_terms)
         }
         passing = {effect.id for effect in self.stack.effects if effect.runs is not None}
-        keys = [(each.effect, each.joint, each.link, each.name) for each in self.parameters]
+        keys = [(parameter.effect, parameter.joint, parameter.link, parameter.name) for parameter in self.parameters]
         kept = [k for k, key in enumerate(keys) if key in spread and key[0] not in passing]
         values = np.array([self.parameters[k].value for k in kept])
         if self.covariance is not None:
@@ -221,7 +221,10 @@ class Twin:
 
     def over_parameters(self, of_torque: np.ndarray, of_power: np.ndarray) -> np.ndarray:
         """Return slopes over the coefficients of torque and power, (..., K) and (..., L), over the p parameters."""
-        places = {(each.effect, each.joint, each.link, each.name): k for k, each in enumerate(self.parameters)}
+        places = {
+            (parameter.effect, parameter.joint, parameter.link, parameter.name): k
+            for k, parameter in enumerate(self.parameters)
+        }
         slopes = np.zeros((*of_torque.shape[:-1], len(self.parameters)))
         for terms, own in ((self.stack.torque_terms, of_torque), (self.stack.power_terms, of_power)):
             for k, (effect, term) in enumerate(terms):

@@ -63,7 +63,9 @@ class Performance:
             "start": float(time[0]),
             "step": step,
             "q": [pack(np.interp(frames, time, column)) for column in self.q.T],
-            "torque": None if self.torque is None else [pack(np.interp(frames, time, one)) for one in self.torque.T],
+            "torque": None
+            if self.torque is None
+            else [pack(np.interp(frames, time, column)) for column in self.torque.T],
             "energy": base64_text(np.interp(frames, time, self.energy).astype("<f4")),
             "power": pack(np.diff(np.interp(edges, time, work)) / np.diff(edges)),
         }

@@ -60,7 +60,9 @@ def _own_shapes(robot: Robot, meshes: Collection[str]) -> list[Part]:
     parts = []
     solids = structure_of(robot).solids
     for link in robot.links:
-        visual, collision = ([s for s in solids if s.link == link.name and s.purpose == one] for one in PURPOSES)
+        visual, collision = (
+            [s for s in solids if s.link == link.name and s.purpose == purpose] for purpose in PURPOSES
+        )
         whole = bool(visual) and all(_can_be_drawn(solid, meshes) for solid in visual)
         stand_in = [] if whole else [solid for solid in collision if _can_be_drawn(solid, meshes)]
         frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]

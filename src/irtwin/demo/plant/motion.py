@@ -99,7 +99,7 @@ def check(motion: PlantMotion, limits: PlantLimits) -> None:
         "speed": np.abs(motion.dq) > slack * limits.speed,
         "acceleration": np.abs(motion.ddq) > slack * limits.acceleration,
     }
-    for what, where in beyond.items():
+    for quantity, where in beyond.items():
         if where.any():
             row, joint = np.argwhere(where)[0]
-            raise ValueError(f"joint {joint + 1} passes its {what} limit at step {row}")
+            raise ValueError(f"joint {joint + 1} passes its {quantity} limit at step {row}")

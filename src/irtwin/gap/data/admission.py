@@ -36,7 +36,7 @@ def admit(data_set: DataSet, motions: Mapping[str, Motion], shortest: float) -> 
             f"{shortest:g} s in motion"
         )
     moving = {run.name: _moving(motions[run.name]) for run in observed}
-    if not any(each.any() for each in moving.values()):
+    if not any(joints.any() for joints in moving.values()):
         raise InputError(f"{file}: no joint moves in any observed run; log runs in motion")
     _check_dead([run for run in observed if moving[run.name].any()], data_set.robot.joint_names, moving)
     others = [run for run in data_set.runs if run.role != "observed"]

@@ -41,7 +41,7 @@ def baseline(data_set: DataSet, withhold: Sequence[str], moved: float, twin: Twi
         begun = Baseline(robot, (*twin.standing, *twin.unidentified), _prior(twin, moved))
     ids = Stack(begun.robot, begun.effects).ids
     _check_withheld(withhold, ids)
-    return replace(begun, effects=tuple(one for one in begun.effects if _id(one) not in withhold))
+    return replace(begun, effects=tuple(effect for effect in begun.effects if _id(effect) not in withhold))
 
 
 def _prior(twin: Twin, moved: float) -> Prior:
@@ -93,7 +93,7 @@ def _check_withheld(withhold: Sequence[str], effects: Sequence[str]) -> None:
 def _same_robot(data_set: DataSet, twin: Twin) -> Robot:
     """Return the data set's robot, with what the twin knows of its joints and the data set does not say."""
     robot = data_set.robot
-    if [(joint.name, joint.kind) for joint in robot.joints] != [(one.name, one.kind) for one in twin.robot.joints]:
+    if [(joint.name, joint.kind) for joint in robot.joints] != [(axis.name, axis.kind) for axis in twin.robot.joints]:
         raise InputError(
             f"{data_set.folder / 'dataset.toml'}: the twin is of another robot, {twin.robot.name} with the joints "
             f"{', '.join(twin.robot.joint_names)}; the data set's has {', '.join(robot.joint_names)}: give its own twin"
@@ -101,6 +101,6 @@ def _same_robot(data_set: DataSet, twin: Twin) -> Robot:
     return replace(robot, joints=tuple(_completed(*pair) for pair in zip(robot.joints, twin.robot.joints, strict=True)))
 
 
-def _completed(joint: Joint, other: Joint) -> Joint:
-    unknown = [each.name for each in fields(Joint) if getattr(joint, each.name) is None]
-    return replace(joint, **{name: getattr(other, name) for name in unknown})
+def _completed(joint: Joint, known: Joint) -> Joint:
+    unknown = [field.name for field in fields(Joint) if getattr(joint, field.name) is None]
+    return replace(joint, **{name: getattr(known, name) for name in unknown})

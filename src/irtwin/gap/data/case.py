@@ -22,6 +22,7 @@ from irtwin.gap.regression.hypotheses import place_of
 from irtwin.gap.thresholds import Thresholds
 from irtwin.identification.cutoff import cutoff_for
 from irtwin.identification.friction_near_zero import with_friction_near_zero
+from irtwin.identification.progress import tell
 from irtwin.identification.torque_constants import torque_from_current
 from irtwin.robot.description import Joint, Robot
 from irtwin.signals.conditioning import condition_for_fit
@@ -65,10 +66,10 @@ class Case:
     def modelled(self) -> frozenset[tuple[str, str | None]]:
         """Each effect that the twin has, with each joint at which it has it; None: of the whole robot, or known."""
         modelled = set()
-        for one in self.stack.effects:
-            terms = one.terms(self.robot)
+        for effect in self.stack.effects:
+            terms = effect.terms(self.robot)
             known = all(term.fixed for term in terms)  # as a candidate, it has one coefficient for all
-            modelled |= {(one.id, None if known else place_of(term)) for term in terms}
+            modelled |= {(effect.id, None if known else place_of(term)) for term in terms}
         return frozenset(modelled)
 
     @property
@@ -88,7 +89,7 @@ class Case:
 
     @property
     def others(self) -> list[Motion]:
-        """The motions of the runs that observed ones are held against: reference and simulated."""
+        """The motions of the runs that observed ones are held against: reference or simulated."""
         return [motion for run, motion in self.motions.items() if run not in self.observed]
 
     @property
@@ -99,8 +100,7 @@ class Case:
     @property
     def against(self) -> str | None:
         """The role of the runs that the observed ones are held against: "reference", "simulated" or none."""
-        roles = {run.role for run in self.runs}
-        return next((role for role in ("reference", "simulated") if role in roles), None)
+        return next((run.role for run in self.runs if run.role != "observed"), None)
 
     @property
     def alike(self) -> bool:
@@ -121,7 +121,7 @@ class Case:
     @property
     def measured(self) -> list[Motion]:
         """The motions whose torque is known or whose power was measured."""
-        return [one for one in self.motions.values() if one.torque is not None or one.power is not None]
+        return [motion for motion in self.motions.values() if motion.torque is not None or motion.power is not None]
 
     @cached_property
     def shaken(self) -> tuple[tuple[Motion, Motion], ...]:
@@ -164,11 +164,11 @@ class Case:
             if motions:
                 turned, _ = with_friction_near_zero(self.robot, motions, effects)
                 both = zip(robot.joints, turned.joints, strict=True)
-                robot = replace(robot, joints=tuple(_turned(own, one) for own, one in both))
+                robot = replace(robot, joints=tuple(_turned(own, joint) for own, joint in both))
         if self.turning:
             turned, _ = with_friction_near_zero(self.robot, self.with_torque, effects, self.turning)
             both = zip(robot.joints, turned.joints, strict=True)
-            robot = replace(robot, joints=tuple(one if one.name in self.turning else own for own, one in both))
+            robot = replace(robot, joints=tuple(joint if joint.name in self.turning else own for own, joint in both))
         return replace(self, robot=robot)
 
     @property
@@ -179,8 +179,8 @@ class Case:
     def without_lag(self, lag: float) -> Case:
         """Return the case with torque so much earlier, s, and the cutoff's reason saying so."""
         motions = {run: _earlier(motion, lag) for run, motion in self.motions.items()}
-        said = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
-        cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {said}")
+        reason = f"torque comes {1e3 * lag:.2g} ms later than positions, as filters make it: taken out"
+        cutoff = None if self.cutoff is None else replace(self.cutoff, why=f"{self.cutoff.why}; {reason}")
         return replace(self, motions=motions, cutoff=cutoff)
 
     def shows(self, signal: str) -> bool:
@@ -193,6 +193,7 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
 
     Raises InputError where `baseline` and `admit` do.
     """
+    data_set = replace(data_set, runs=_held_against_one(data_set.runs))
     begun = baseline(data_set, withhold, thresholds.data.moved, twin)
     cutoff = cutoff_for(begun.robot, data_set.runs, data_set.cutoff)
     given = {run.name: condition_for_fit(run, begun.robot, cutoff.hz) for run in data_set.runs}
@@ -204,6 +205,16 @@ def case_of(data_set: DataSet, withhold: Sequence[str], thresholds: Thresholds, 
     case = case.with_friction_near_zero()
     sides = [case.others, case.seen] if case.against == "reference" else [case.seen]
     return replace(case, effects=shaped(case.robot, sides, case.effects))
+
+
+def _held_against_one(runs: tuple[Run, ...]) -> tuple[Run, ...]:
+    """Return the runs without reference runs where there are simulated ones: no fit is of a simulator and a robot."""
+    if not any(run.role == "simulated" for run in runs):
+        return runs
+    kept = tuple(run for run in runs if run.role != "reference")
+    if len(kept) < len(runs):
+        tell(f"  beside a simulator reference runs are left out: {len(runs) - len(kept)}")
+    return kept
 
 
 def _earlier(motion: Motion, lag: float) -> Motion:

@@ -40,12 +40,12 @@ class Pair:
 
     def difference(self, signal: str) -> np.ndarray | None:
         """Return first less second of a signal, (M, ...), None where either lacks it."""
-        one, two = getattr(self.first, signal), getattr(self.second, signal)
-        return None if one is None or two is None else self.of(one, two)
+        first, second = getattr(self.first, signal), getattr(self.second, signal)
+        return None if first is None or second is None else self.of(first, second)
 
-    def of(self, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    def of(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return the difference of what the first and the second have at their own times, (M, ...)."""
-        return np.asarray(one[self.inside] - interpolated(self.second.time + self.shift, two, self.time))
+        return np.asarray(first[self.inside] - interpolated(self.second.time + self.shift, second, self.time))
 
 
 def pairs_of(runs: Sequence[Run], motions: Mapping[str, Motion], limits: Data) -> list[Pair]:
@@ -81,7 +81,7 @@ def _shift(first: Motion, second: Motion) -> float:
     spline = scipy.interpolate.make_interp_spline(second.time, second.q)
     even = np.arange(second.time[0], second.time[-1], 1 / first.rate)
     both = zip(first.dq.T, spline.derivative()(even).T, strict=True)
-    agree = np.sum([scipy.signal.correlate(one, other, method="fft") for one, other in both], axis=0)
+    agree = np.sum([scipy.signal.correlate(speed, other, method="fft") for speed, other in both], axis=0)
     lag = int(np.argmax(agree)) - (len(even) - 1)
     every = slice(None, None, max(1, len(first.time) // 500))
     time, q = first.time[every], first.q[every]

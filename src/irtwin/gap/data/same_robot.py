@@ -76,7 +76,7 @@ def _foreign_share(system: System, sides: Sequence[Moments], alone: Sequence[np.
     share = np.zeros(len(system.pattern))
     for common, own, seen in zip(_with_common_bodies(system, sides), alone, (True, False), strict=True):
         groups = np.flatnonzero(system.group_observed == seen)
-        left, least, most = (sum(system.squares(one, int(k)) for k in groups) for one in (common, own, nothing))
+        left, least, most = (sum(system.squares(values, int(k)) for k in groups) for values in (common, own, nothing))
         share += (left - least) / np.maximum(most, np.finfo(float).tiny)
     return share
 

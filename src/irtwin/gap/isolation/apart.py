@@ -139,7 +139,7 @@ def closed_squares(apart: Apart) -> np.ndarray:
     system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
     noise = {True: apart.noise, False: system.noise_before}
-    weighed = {some: [Whole(one) for one in system.group_moments(level)] for some, level in noise.items()}
+    weighed = {some: [Whole(moments) for moments in system.group_moments(level)] for some, level in noise.items()}
     totals = {some: Summed(moments) for some, moments in weighed.items()}
 
     @cache

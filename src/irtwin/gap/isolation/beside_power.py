@@ -64,9 +64,9 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     """Return by how much power, linear about the torque before, misses what it is with the torque after: RMS, W."""
     squares, rows = 0.0, 0
     for motion in case.with_power:
-        one, other = before[0](motion), after[0](motion)
-        slope = power_slope(stack, motion, one, before[1].values)
-        missed = after[1](motion, other)[0] - after[1](motion, one)[0] - (slope * (other - one)).sum(axis=1)
+        former, latter = before[0](motion), after[0](motion)
+        slope = power_slope(stack, motion, former, before[1].values)
+        missed = after[1](motion, latter)[0] - after[1](motion, former)[0] - (slope * (latter - former)).sum(axis=1)
         squares, rows = squares + float(missed @ missed), rows + len(missed)
     return float(np.sqrt(squares / max(rows, 1)))
 
@@ -90,7 +90,7 @@ def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:
 
 def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
     """Return what concerns torque of an attribution of both, in the columns of torque's equations alone."""
-    inside = [k for k, one in enumerate(both.hypotheses) if one.variants[0].effect.signal == "torque"]
+    inside = [k for k, hypothesis in enumerate(both.hypotheses) if hypothesis.variants[0].effect.signal == "torque"]
     mine = [both.hypotheses[k] for k in inside]
     return Attribution(
         tuple(
@@ -98,7 +98,9 @@ def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
             for cause in _causes_of_torque(both)
         ),
         both.noise[:-1],
-        tuple(replace(one, variants=tuple(map(equations.in_torque, one.variants))) for one in mine),
+        tuple(
+            replace(hypothesis, variants=tuple(map(equations.in_torque, hypothesis.variants))) for hypothesis in mine
+        ),
         both.visible[inside],
         both.log_odds[inside],
     )

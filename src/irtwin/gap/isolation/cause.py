@@ -47,7 +47,9 @@ class FoundCause:
 
     def touched(self, robot: Robot) -> tuple[str, ...]:
         """Return the joints that it acts on; none for an effect of the whole robot."""
-        named = [(one.effect, term.joint) for one in self.variants for term in one.terms if term.link is None]
+        named = [
+            (variant.effect, term.joint) for variant in self.variants for term in variant.terms if term.link is None
+        ]
         touched = [effect.touched(robot, joint) for effect, joint in named if joint is not None]
         return tuple(dict.fromkeys(joint for joints in touched for joint in joints))
 

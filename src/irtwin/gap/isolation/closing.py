@@ -59,13 +59,22 @@ def closing(
     return Closing(value, interval, floors, size)
 
 
+def share_above(closed: np.ndarray, held_out: HeldOut, floor: np.ndarray) -> tuple[float, tuple[float, float]] | None:
+    """Return which share squares `closed` (G, g) are of the gap above a floor (g,), RMS, with its 95 % interval.
+
+    None without a gap.
+    """
+    closed_of_groups, above = _above_floor(closed, held_out, floor)
+    return _ratio(closed_of_groups, above, np.ones(len(above)))
+
+
 def closed_fraction(parts: Sequence[tuple[HeldOut, np.ndarray]]) -> tuple[float, tuple[float, float]] | None:
     """Return the fraction of the gap above the floor that is closed, with its 95 % interval over groups.
 
     parts: each channel's groups and noise floor (g,). None without a gap.
     """
-    each = [_above_floor(one.before - one.after, one, floor) for one, floor in parts]
-    closed, above = (np.concatenate(own) for own in zip(*each, strict=True))
+    by_channel = [_above_floor(groups.before - groups.after, groups, floor) for groups, floor in parts]
+    closed, above = (np.concatenate(own) for own in zip(*by_channel, strict=True))
     return _ratio(closed, above, above)
 
 

@@ -14,14 +14,14 @@ from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.closing import Closing, closing
+from irtwin.gap.isolation.closing import Closing, closing, share_above
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, Hypothesis, hypotheses, place_of
 from irtwin.gap.regression.joint_equations import JointEquations
-from irtwin.gap.regression.normal_equations import System, observed_rms
+from irtwin.gap.regression.normal_equations import System, observed_rms, reference_rms
 from irtwin.gap.regression.run_to_run import with_offsets_held
 from irtwin.identification.estimators import Estimate, estimate
 from irtwin.identification.progress import tell_step
@@ -93,6 +93,24 @@ class ChannelFinding:
         runs = [variant.effect.runs for cause in causes for variant in cause.variants]
         acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
         return closing(closed, acting, self.counted, self.floor_within, self.attribution.noise)
+
+    def closed_between(self, causes: Sequence[FoundCause]) -> tuple[float, tuple[float, float]] | None:
+        """Return which share some causes close of what sets the other runs apart, with its 95 % interval.
+
+        That is the gap above what the twin, fitted to the other runs alone, leaves of these, too. None where none is.
+        """
+        if self.floor_within is None:
+            return None
+        closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
+        return share_above(closed, self.counted, self.apart.level(self.floor_within))
+
+    @cached_property
+    def floor_between(self) -> np.ndarray | None:
+        """(g,) RMS that sets no runs apart: the floor, or what the twin leaves of the other runs alone, if more."""
+        before = self.before
+        if self.floor is None or not before.both:
+            return self.floor
+        return np.asarray(np.maximum(self.floor, reference_rms(before, before.noise_before)))
 
     @property
     def chosen(self) -> list[int]:
@@ -231,7 +249,7 @@ def _inside(case: Case, system: System) -> Set[tuple[str, str | None]]:
     if not system.both:
         return case.modelled
     # zero in the other runs where these did not measure it: there, missing is changed
-    return case.modelled | {(one.id, None) for one in catalogue().values() if not can_show(one, case.others)}
+    return case.modelled | {(effect.id, None) for effect in catalogue().values() if not can_show(effect, case.others)}
 
 
 def _hypotheses(case: Case, system: System) -> list[Hypothesis]:
@@ -247,14 +265,16 @@ def _hypotheses(case: Case, system: System) -> list[Hypothesis]:
     return candidates
 
 
-def quantities(robot: Robot, finding: ChannelFinding, one: FoundCause) -> list[Quantity]:
+def quantities(robot: Robot, finding: ChannelFinding, cause: FoundCause) -> list[Quantity]:
     """Return a cause's parameters with 95 % intervals of the fit, those of one variant after the other."""
-    return [each for number in range(len(one.variants)) for each in of_variant(robot, finding, one, number)]
+    return [
+        parameter for number in range(len(cause.variants)) for parameter in of_variant(robot, finding, cause, number)
+    ]
 
 
-def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: int) -> list[Quantity]:
+def of_variant(robot: Robot, finding: ChannelFinding, cause: FoundCause, number: int) -> list[Quantity]:
     """Return the parameters of one of a cause's variants, by its number."""
-    estimate, used, variant = finding.estimate, finding.used, one.variants[number]
+    estimate, used, variant = finding.estimate, finding.used, cause.variants[number]
     known = {
         (effect.id, term.joint, term.name): float(estimate.values[k])
         for k, (effect, term) in enumerate(finding.system.terms)
@@ -262,12 +282,12 @@ def of_variant(robot: Robot, finding: ChannelFinding, one: FoundCause, number: i
     }
     places = [used.index(k) for k in variant.columns]
     joint = place_of(variant.terms[0])
-    effect = variant.effect.on(joint) if joint is not None and len(one.joints) > 0 else variant.effect
+    effect = variant.effect.on(joint) if joint is not None and len(cause.joints) > 0 else variant.effect
     if len(effect.terms(robot)) != len(places):
         return [_coefficient(term, estimate, place) for term, place in zip(variant.terms, places, strict=True)]
     given = Coefficients(estimate.values[places], estimate.covariance[np.ix_(places, places)], known)
     stated = effect.parameters(robot, given)
-    return [each for each in stated if np.isfinite(each.value)]
+    return [parameter for parameter in stated if np.isfinite(parameter.value)]
 
 
 def _coefficient(term: Term, estimate: Estimate, place: int) -> Quantity:
@@ -298,23 +318,23 @@ def branches(finding: ChannelFinding) -> tuple[Branch, ...]:
         Branch(_family(causes[0]), causes[0].scope, _by_size(finding, causes), finding.closing(causes))
         for causes in joined(finding.causes)
     ]
-    return tuple(sorted(of_channel, key=lambda one: -one.closing.size))
+    return tuple(sorted(of_channel, key=lambda branch: -branch.closing.size))
 
 
 def joined(causes: Sequence[FoundCause]) -> list[list[FoundCause]]:
     """Return causes by family and scope, those with a joint in common together; of the whole robot, all."""
     together: list[list[FoundCause]] = []
     for cause in causes:
-        near = [one for one in together if any(_near(cause, other) for other in one)]
-        together = [one for one in together if one not in near]
-        together.append([*(other for one in near for other in one), cause])
+        near = [group for group in together if any(_near(cause, other) for other in group)]
+        together = [group for group in together if group not in near]
+        together.append([*(member for group in near for member in group), cause])
     return together
 
 
-def _near(one: FoundCause, other: FoundCause) -> bool:
-    if (_family(one), one.scope) != (_family(other), other.scope):
+def _near(first: FoundCause, second: FoundCause) -> bool:
+    if (_family(first), first.scope) != (_family(second), second.scope):
         return False
-    return bool(set(one.joints) & set(other.joints)) or not (one.joints or other.joints)
+    return bool(set(first.joints) & set(second.joints)) or not (first.joints or second.joints)
 
 
 def _family(cause: FoundCause) -> str:
@@ -322,7 +342,7 @@ def _family(cause: FoundCause) -> str:
 
 
 def _by_size(finding: ChannelFinding, causes: Sequence[FoundCause]) -> tuple[FoundCause, ...]:
-    return tuple(sorted(causes, key=lambda one: -finding.closing([one]).size))
+    return tuple(sorted(causes, key=lambda cause: -finding.closing([cause]).size))
 
 
 @dataclass(frozen=True)

@@ -43,15 +43,21 @@ class HypothesisPrior:
     @classmethod
     def of(cls, candidates: Sequence[Hypothesis]) -> HypothesisPrior:
         """Take it from all candidates of a search."""
-        effects = {(one.effect, one.scope) for one in candidates}
-        return cls(len(effects), Counter((one.effect, one.scope) for one in candidates if one.joint))
+        effects = {(candidate.effect, candidate.scope) for candidate in candidates}
+        return cls(
+            len(effects), Counter((candidate.effect, candidate.scope) for candidate in candidates if candidate.joint)
+        )
 
-    def log_odds(self, one: Hypothesis, structure: Sequence[Hypothesis]) -> float:
+    def log_odds(self, hypothesis: Hypothesis, structure: Sequence[Hypothesis]) -> float:
         """Return the log odds of a hypothesis beside those that were found; a nuisance's are even."""
-        if one.nuisance:
+        if hypothesis.nuisance:
             return 0.0
-        places = self.joints[one.effect, one.scope] if one.joint else 1
-        count = sum((one.effect, one.scope) == (each.effect, each.scope) for each in structure) if one.joint else 0
+        places = self.joints[hypothesis.effect, hypothesis.scope] if hypothesis.joint else 1
+        count = (
+            sum((hypothesis.effect, hypothesis.scope) == (other.effect, other.scope) for other in structure)
+            if hypothesis.joint
+            else 0
+        )
         if count:  # sets of so many joints are as likely as one another
             return float(np.log((count + 1) / (2 * max(places - count, 1))))
         return -float(np.log(self.effects * places))
@@ -82,12 +88,12 @@ class Posterior:
         misfit: np.ndarray,
     ) -> Posterior:
         """Try candidates beside what was found, everything refitted; `misfit` (g,) is as of `_Search`."""
-        variants = [variant for one in candidates for variant in one.variants]
-        owner = np.repeat(np.arange(len(candidates)), [len(one.variants) for one in candidates])
+        variants = [variant for candidate in candidates for variant in candidate.variants]
+        owner = np.repeat(np.arange(len(candidates)), [len(candidate.variants) for candidate in candidates])
         chosen = [k for _, variant in structure for k in variant.columns]
-        known = [one for one, _ in structure]
-        odds = [prior.log_odds(one, known) - np.log(len(one.variants)) for one in candidates]
-        screened = [one.effect.screened for one in variants]
+        known = [hypothesis for hypothesis, _ in structure]
+        odds = [prior.log_odds(candidate, known) - np.log(len(candidate.variants)) for candidate in candidates]
+        screened = [variant.effect.screened for variant in variants]
         log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)
         seen = evidence(projection, chosen, variants)
         own = np.sqrt(_where_it_explains(projection.system, misfit, seen))
@@ -171,12 +177,12 @@ class Posterior:
         own = self._explaining(self._told[shape], len(self.evidence.information[shape]))
         return float(own - self.log_odds[place])
 
-    def likeliest_at(self, one: Hypothesis) -> int:
+    def likeliest_at(self, hypothesis: Hypothesis) -> int:
         """Return the place of the likeliest hypothesis of those that could be where one is, and have data for them.
 
         Where the data speak against all of them, of all.
         """
-        near = [k for k, other in enumerate(self.hypotheses) if overlap(other, one)]
+        near = [k for k, other in enumerate(self.hypotheses) if overlap(other, hypothesis)]
         near = [k for k in near if self.log_odds[k] > self.log_prior[k]] or near
         return near[int(np.argmax(self.weights(near)[0]))]
 
@@ -216,8 +222,8 @@ class Posterior:
             known = np.maximum(squares / scale[own, None], 0.0)
             room = 1 + sizes[..., None] ** 2 * known
             missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
-            each = 0.5 * (np.log(room).sum(axis=-1) + missed)
-            paid[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-each, axis=0)
+            cost = 0.5 * (np.log(room).sum(axis=-1) + missed)
+            paid[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-cost, axis=0)
         return paid
 
     @cached_property
@@ -240,6 +246,6 @@ def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvide
     return np.asarray(explained.sum(axis=1) / (explained / own).sum(axis=1))
 
 
-def overlap(one: Hypothesis, other: Hypothesis) -> bool:
+def overlap(first: Hypothesis, second: Hypothesis) -> bool:
     """Return whether two hypotheses are at one joint, or one of them anywhere."""
-    return one.joint == other.joint or None in (one.joint, other.joint)
+    return first.joint == second.joint or None in (first.joint, second.joint)

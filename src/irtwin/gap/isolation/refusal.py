@@ -44,9 +44,9 @@ def find_possible(
         finding, floor = search(without | refused.keys())
         least = np.minimum(least, finding.attribution.noise)
         wrong = {
-            (one.effect, next(iter(one.joints), None)): one
+            (refusal.effect, next(iter(refusal.joints), None)): refusal
             for cause in finding.causes
-            for one in _of(case.robot, finding, cause, case.stated)
+            for refusal in _of(case.robot, finding, cause, case.stated)
         }
         if not wrong:
             break
@@ -62,8 +62,8 @@ def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated
     for number, variant in enumerate(cause.variants):
         joint = place_of(variant.terms[0]) if cause.joints else None
         limits = (variant.effect if joint is None else variant.effect.on(joint)).possible(robot, stated)
-        said = of_variant(robot, finding, cause, number) if limits else []
-        whys = [_beyond(one, limits[one.name]) for one in said if one.name in limits]
+        fitted = of_variant(robot, finding, cause, number) if limits else []
+        whys = [_beyond(quantity, limits[quantity.name]) for quantity in fitted if quantity.name in limits]
         if cause.scope == CHANGED:
             whys += [_below_nothing(finding, variant, place) for place in range(len(variant.columns))]
         if why := next(filter(None, whys), None):
@@ -71,14 +71,18 @@ def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated
     return refused
 
 
-def _beyond(one: Quantity, limits: Possible) -> str | None:
+def _beyond(quantity: Quantity, limits: Possible) -> str | None:
     """Say by how much a quantity misses what is possible; None where its interval reaches that."""
-    if one.lower is None or one.upper is None or (one.upper >= limits.low and one.lower <= limits.high):
+    if (
+        quantity.lower is None
+        or quantity.upper is None
+        or (quantity.upper >= limits.low and quantity.lower <= limits.high)
+    ):
         return None
     ends = [f"{end:.3g}" for end in (limits.low, limits.high) if np.isfinite(end)]
     side = "at least" if np.isfinite(limits.low) else "at most"
     allowed = " to ".join(ends) if len(ends) == 2 else f"{side} {ends[0]}"
-    return f"{_value(one)}; {allowed} is possible: {limits.why}"
+    return f"{_value(quantity)}; {allowed} is possible: {limits.why}"
 
 
 def _below_nothing(finding: ChannelFinding, variant: Variant, place: int) -> str | None:
@@ -97,6 +101,6 @@ def _below_nothing(finding: ChannelFinding, variant: Variant, place: int) -> str
     return f"{_value(left)} would be left of it; at least {term.lowest:g} is possible"
 
 
-def _value(one: Quantity) -> str:
-    unit = "" if one.unit == "1" else f" {one.unit}"
-    return f"{one.name} = {one.value:.3g}{unit} ({one.lower:.3g} to {one.upper:.3g})"
+def _value(quantity: Quantity) -> str:
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    return f"{quantity.name} = {quantity.value:.3g}{unit} ({quantity.lower:.3g} to {quantity.upper:.3g})"

@@ -55,7 +55,9 @@ def attribute(
     what is tried `without` some effects is no likelier for that.
     """
     every = in_scope(candidates, both=system.both)
-    candidates = [one for one in every if not {one.effect, (one.effect, one.joint)} & without]
+    candidates = [
+        candidate for candidate in every if not {candidate.effect, (candidate.effect, candidate.joint)} & without
+    ]
     search = _Search(system, candidates, HypothesisPrior.of(every), limits, floor)
     noise = np.ones(len(system.pattern))
     for _ in track(range(2), "looks at what the twin leaves"):
@@ -66,9 +68,10 @@ def attribute(
     structure, noise = search.settled(*search.pruned(*search.forward(before, noise)))
     structure, noise = search.likeliest(*search.pruned(*search.paired(structure, noise)))
     after = search.beside(structure, noise)
-    odds = {_place(one): float(after.log_odds[k]) for k, one in enumerate(after.hypotheses)}
-    beside = np.array([odds.get(_place(one), -np.inf) for one in candidates])  # what was found is at no place twice
-    named = [k for k, one in enumerate(candidates) if not one.nuisance]
+    odds = {_place(hypothesis): float(after.log_odds[k]) for k, hypothesis in enumerate(after.hypotheses)}
+    # what was found is at no place twice
+    beside = np.array([odds.get(_place(candidate), -np.inf) for candidate in candidates])
+    named = [k for k, candidate in enumerate(candidates) if not candidate.nuisance]
     hypotheses = tuple(candidates[k] for k in named)
     return Attribution(search.causes(structure, noise), noise, hypotheses, visible[named], beside[named])
 
@@ -86,7 +89,7 @@ def judged(
     floor, noise: (g,) RMS, 0 or None where unknown, and what the structure leaves.
     """
     search = _Search(system, candidates, HypothesisPrior.of(candidates), limits, floor)
-    return search.causes([(one, one.variants[0]) for one in structure], noise)
+    return search.causes([(hypothesis, hypothesis.variants[0]) for hypothesis in structure], noise)
 
 
 @dataclass(frozen=True)
@@ -223,10 +226,10 @@ class _Search:
         """Look anew for two effects of one joint together: what explains most by itself may be neither of them."""
         for _ in range(_SWEEPS):
             pairs = [(a, b) for a, b in combinations(structure, 2) if a[0].joint and a[0].joint == b[0].joint]
-            for one, other in track(pairs, "two causes of one joint looked for anew"):
-                rest = [each for each in structure if each is not one and each is not other]
-                pair = self.likeliest_pair(rest, noise, one[0])
-                if pair and _places(pair) != _places([one, other]):
+            for first, second in track(pairs, "two causes of one joint looked for anew"):
+                rest = [member for member in structure if member is not first and member is not second]
+                pair = self.likeliest_pair(rest, noise, first[0])
+                if pair and _places(pair) != _places([first, second]):
                     break
             else:
                 break
@@ -241,10 +244,10 @@ class _Search:
         for _ in range(_SWEEPS):
             for place, member in enumerate(structure):
                 posterior = self.instead(member, structure, noise)
-                other = posterior.likeliest_at(member[0])
-                if posterior.log_odds[other] > 0 and _place(posterior.hypotheses[other]) != _place(member[0]):
+                rival = posterior.likeliest_at(member[0])
+                if posterior.log_odds[rival] > 0 and _place(posterior.hypotheses[rival]) != _place(member[0]):
                     structure = [*structure]
-                    structure[place] = posterior.hypotheses[other], posterior.variant(other)
+                    structure[place] = posterior.hypotheses[rival], posterior.variant(rival)
                     noise = self.left(structure, noise)
                     break
             else:
@@ -258,7 +261,7 @@ class _Search:
         """
         pairs: list[list[Member]] = []
         explained, costs, scales = [], [], []
-        there = [one for one in self.candidates if one.joint == like.joint]
+        there = [candidate for candidate in self.candidates if candidate.joint == like.joint]
         alone = self._beside(rest, noise, there)
         firsts = [(hypothesis, alone.variant(place)) for place, hypothesis in enumerate(alone.hypotheses)]
         self.projection(noise).prepare(_columns(firsts))
@@ -304,7 +307,7 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
     """
     hypothesis, variant = member
     own = _index(posterior, hypothesis)
-    near = [k for k, one in enumerate(posterior.hypotheses) if overlap(one, hypothesis)]
+    near = [k for k, candidate in enumerate(posterior.hypotheses) if overlap(candidate, hypothesis)]
     weights, none = posterior.weights(near)
     whole = np.logaddexp.reduce([*weights, none]) - np.log1p(-posterior.limits.unknown)
     sure: dict[tuple[str, str], float] = {}
@@ -312,7 +315,7 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
         key = posterior.hypotheses[k].effect, posterior.hypotheses[k].scope
         sure[key] = sure.get(key, 0.0) + float(np.exp(weight - whole))
     probability = sure.pop((hypothesis.effect, hypothesis.scope))
-    nameless = {one.effect for one in posterior.hypotheses if one.nuisance}
+    nameless = {candidate.effect for candidate in posterior.hypotheses if candidate.nuisance}
     rivals: dict[str, float] = {}
     for (effect, _), chance in sure.items():
         if effect not in nameless:
@@ -332,31 +335,31 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
 
 def _joined(parts: Sequence[FoundCause]) -> FoundCause:
     """Return causes of one effect at several joints as one: as sure as at the joint where it is most."""
-    first = max(parts, key=lambda one: one.probability)
+    first = max(parts, key=lambda part: part.probability)
     return replace(
         first,
-        joints=tuple(joint for one in parts for joint in one.joints),
-        variants=tuple(variant for one in parts for variant in one.variants),
-        gain=sum(one.gain for one in parts),
+        joints=tuple(joint for part in parts for joint in part.joints),
+        variants=tuple(variant for part in parts for variant in part.variants),
+        gain=sum(part.gain for part in parts),
     )
 
 
 def _index(posterior: Posterior, hypothesis: Hypothesis) -> int:
-    return next(k for k, one in enumerate(posterior.hypotheses) if _place(one) == _place(hypothesis))
+    return next(k for k, candidate in enumerate(posterior.hypotheses) if _place(candidate) == _place(hypothesis))
 
 
 def _columns(structure: Sequence[Member]) -> list[int]:
     return [k for _, variant in structure for k in variant.columns]
 
 
-def _place(one: Hypothesis) -> tuple[str, str, str | None]:
-    return one.effect, one.scope, one.joint
+def _place(hypothesis: Hypothesis) -> tuple[str, str, str | None]:
+    return hypothesis.effect, hypothesis.scope, hypothesis.joint
 
 
 def _places(structure: Sequence[Member]) -> set[tuple[str, str, str | None]]:
     return {_place(member) for member, _ in structure}
 
 
-def _same_place(one: Hypothesis, other: Hypothesis) -> bool:
+def _same_place(first: Hypothesis, second: Hypothesis) -> bool:
     """Return whether both are one effect at one place, in any scope or shape."""
-    return one.effect == other.effect and overlap(one, other)
+    return first.effect == second.effect and overlap(first, second)

@@ -39,8 +39,10 @@ def left_open(
     """
     if unmatched:
         return IMPOSSIBLE_NUMBER
-    located = [one for one in differing if not any(one is each for each in explained)]
-    located = [one for one in located if not any(_of_friction(one, finding) for finding in findings)]
+    located = [disturbance for disturbance in differing if not any(disturbance is known for known in explained)]
+    located = [
+        disturbance for disturbance in located if not any(_of_friction(disturbance, finding) for finding in findings)
+    ]
     named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
     nameless = bool(located) and located[0] is differing[0] and not named
     excesses = (_largest(finding, explained, located) for finding in findings)
@@ -87,7 +89,7 @@ def verdict_of(findings: Sequence[document.Finding]) -> str:
 
 def _closes_for_sure(finding: document.Finding) -> bool:
     """Return whether a finding closes more than nothing; what differs between repeats is a gap, however little."""
-    return finding.share_interval95[0] > 0 or all(catalogue()[one.effect].disturbance for one in finding.members)
+    return finding.share_interval95[0] > 0 or all(catalogue()[member.effect].disturbance for member in finding.members)
 
 
 def _classes(finding: document.Finding) -> list[list[float]]:
@@ -100,9 +102,9 @@ def _classes(finding: document.Finding) -> list[list[float]]:
 
 def _spread(findings: Sequence[ChannelFinding], unknown: float) -> float:
     """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
-    levels = [(one.apart.plain, one.floor_within) for one in findings]
+    levels = [(finding.apart.plain, finding.floor_within) for finding in findings]
     known = [spread(plain, level, plain.halves[0]) for plain, level in levels if level is not None]
-    return max((unknown if one is None else one for one in known), default=unknown)
+    return max((unknown if value is None else value for value in known), default=unknown)
 
 
 def _turned(findings: Sequence[ChannelFinding], limits: Thresholds) -> dict[tuple[str, int], float]:
@@ -141,17 +143,17 @@ def _over(apart: Apart, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return before, after
 
 
-def _of_friction(one: Disturbance, finding: ChannelFinding) -> bool:
+def _of_friction(disturbance: Disturbance, finding: ChannelFinding) -> bool:
     """Return whether friction that differs from run to run makes as much at that place: an offset, or a drift."""
-    if one.channel != finding.name or one.kind not in (OFFSET, DRIFT):
+    if disturbance.channel != finding.name or disturbance.kind not in (OFFSET, DRIFT):
         return False
-    return bool(one.size < finding.steadied.made[finding.places.index(one.joint)])
+    return bool(disturbance.size < finding.steadied.made[finding.places.index(disturbance.joint)])
 
 
 def _excess(some: Sequence[Disturbance], finding: ChannelFinding, level: np.ndarray) -> np.ndarray:
     """Return (g,) the excess that some of what does not repeat makes in the equations of a channel."""
     squares = np.zeros(len(finding.places))
-    for one in some:
-        if one.channel == finding.name:
-            squares[finding.places.index(one.joint)] += one.size
+    for disturbance in some:
+        if disturbance.channel == finding.name:
+            squares[finding.places.index(disturbance.joint)] += disturbance.size
     return np.asarray(squares / level**2)

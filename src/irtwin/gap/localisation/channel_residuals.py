@@ -63,7 +63,7 @@ def channel_residual(case: Case, explained: Explained, torque: Torque) -> Channe
 
     def traces(runs: Sequence[Motion], values: Values) -> list[Trace]:
         of_runs = []
-        for run in track(runs, lambda one: f"{finding.name} that is left of {one.run}"):
+        for run in track(runs, lambda motion: f"{finding.name} that is left of {motion.run}"):
             of_runs += (power_traces if power else torque_traces)(explained.stack, [run], values, torque)
         return of_runs
 
@@ -108,7 +108,9 @@ def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] 
     `leaving`: the channel, and the place in it, whose excess leaves the gap open; it is named, sure or not.
     """
     channel, place = leaving or (None, None)
-    located = [(one, _places(one, seed, place if one.finding.name == channel else None)) for one in left]
+    located = [
+        (residual, _places(residual, seed, place if residual.finding.name == channel else None)) for residual in left
+    ]
 
     def order(pair: tuple[ChannelResidual, list[GapLocation]]) -> tuple[float, float]:
         gain = max((cause.gain for cause in pair[0].finding.causes), default=0.0)
@@ -120,29 +122,30 @@ def places(left: Sequence[ChannelResidual], seed: int, leaving: tuple[str, int] 
 def cause_curves(left: Sequence[ChannelResidual]) -> list[Followed]:
     """Return each cause's curve, on the residual that all the others leave."""
     lines = []
-    for one in left:
-        for cause, joints, added in zip(one.finding.causes, one.touched, one.added, strict=True):
-            alone = [_of(trace, part) for trace, part in zip(one.after, added, strict=True)]
+    for residual in left:
+        for cause, joints, added in zip(residual.finding.causes, residual.touched, residual.added, strict=True):
+            alone = [_of(trace, part) for trace, part in zip(residual.after, added, strict=True)]
             partial = [
-                replace(trace, residual=trace.residual + part) for trace, part in zip(one.after, added, strict=True)
+                replace(trace, residual=trace.residual + part)
+                for trace, part in zip(residual.after, added, strict=True)
             ]
-            for k, joint in enumerate(one.finding.places):
+            for k, joint in enumerate(residual.finding.places):
                 best = followed(alone, k, joint) if _among(joint, joints) else None
                 if best:
-                    lines.append(curve(one.finding.name, partial, k, joint, best[0], cause.effect, added))
+                    lines.append(curve(residual.finding.name, partial, k, joint, best[0], cause.effect, added))
     return lines
 
 
 def unnamed_curves(left: Sequence[ChannelResidual], located: Sequence[GapLocation], most: int) -> list[Followed]:
     """Return the residual against what it follows, at the foremost places on which no cause acts."""
     lines: list[Followed] = []
-    for one in left:
-        named = set(compress(one.finding.places, one.acting))
-        own = [place.joint for place in located if place.channel == one.finding.name and place.joint not in named]
+    for residual in left:
+        named = set(compress(residual.finding.places, residual.acting))
+        own = [place.joint for place in located if place.channel == residual.finding.name and place.joint not in named]
         for joint in list(dict.fromkeys(own))[:most]:
-            k = one.finding.places.index(joint)
-            if best := followed(one.before, k, joint):
-                lines.append(curve(one.finding.name, one.before, k, joint, best[0]))
+            k = residual.finding.places.index(joint)
+            if best := followed(residual.before, k, joint):
+                lines.append(curve(residual.finding.name, residual.before, k, joint, best[0]))
     return lines
 
 
@@ -163,7 +166,7 @@ def _places(left: ChannelResidual, seed: int, leaving: int | None) -> list[GapLo
     names = left.finding.places
     best = []
     about = f"what {left.finding.name} follows"
-    for k, joint in track(enumerate(names), lambda one: f"{about} at {one[1]}" if one[1] else about):
+    for k, joint in track(enumerate(names), lambda numbered: f"{about} at {numbered[1]}" if numbered[1] else about):
         best.append(followed(left.before, k, joint))
     located = locate(
         left.finding.name,
@@ -216,13 +219,13 @@ def drawn(
 ) -> Curves:
     """Return what a page draws: of what the twin left of each channel, where that lies, what is planned, friction."""
     maps = [
-        heat_map([joint for joint in one.finding.places if joint is not None], one.seen, one.level)
-        for one in left
-        if one.finding.name == "torque"
+        heat_map([joint for joint in residual.finding.places if joint is not None], residual.seen, residual.level)
+        for residual in left
+        if residual.finding.name == "torque"
     ]
     return Curves(
         follows=(*cause_curves(left), *unnamed_curves(left, located, _UNNAMED)),
-        runs=tuple(line for one in left for line in _per_run(one.finding)),
+        runs=tuple(line for residual in left for line in _per_run(residual.finding)),
         heat_map=next(iter(maps), None),
         experiment=planned,
         friction=friction or None,

@@ -38,11 +38,11 @@ def locate(
     more than that. Places that overlap (`loaded` with all others) share the excess; the rate is that at which a place
     is found.
     """
-    share, excess = (each[0] for each in _shares(seen, level, np.ones((1, len(seen.squares)))))
+    share, excess = (values[0] for values in _shares(seen, level, np.ones((1, len(seen.squares)))))
     units = len(seen.squares)
     weights = np.random.default_rng(seed).multinomial(units, np.full(units, 1 / units), _RESAMPLED)
     drawn = _shares(seen, level, weights.astype(float))
-    share_ends, excess_ends = (np.quantile(each, [0.025, 0.975], axis=0) for each in drawn)
+    share_ends, excess_ends = (np.quantile(values, [0.025, 0.975], axis=0) for values in drawn)
     concentration, q = _concentration(seen, share), _false_discovery(_p_values(seen, level, reference))
     acting = np.zeros(len(joints), dtype=bool) if acting is None else acting
     named = (share >= LEAST_SHARE) & (q <= FALSE_PLACES)
@@ -98,7 +98,7 @@ def _over(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 def _concentration(seen: Map, share: np.ndarray) -> np.ndarray:
     """Return (g, R) the shares (g, R) within each place over those of its samples."""
     counts = seen.counts.sum(axis=0)
-    samples, within = (_over(each, each[:, : seen.parts].sum(axis=1, keepdims=True)) for each in (counts, share))
+    samples, within = (_over(values, values[:, : seen.parts].sum(axis=1, keepdims=True)) for values in (counts, share))
     return _over(within, samples)
 
 
@@ -114,10 +114,10 @@ def _p_values(seen: Map, level: np.ndarray, reference: Map | None) -> np.ndarray
     return np.asarray(np.where(freedom > 0, p, np.nan))
 
 
-def _moments(one: Map, level: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _moments(seen: Map, level: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the mean over units of the logarithm of mean square over level, (g, R), its variance, and the freedom."""
-    known = one.counts >= FEWEST
-    ratio = one.squares / np.maximum(one.counts, 1) / np.where(np.isfinite(level), level, 1.0)
+    known = seen.counts >= FEWEST
+    ratio = seen.squares / np.maximum(seen.counts, 1) / np.where(np.isfinite(level), level, 1.0)
     logs = np.where(known, np.log(np.maximum(ratio, np.finfo(float).tiny)), 0.0)
     number = np.maximum(known.sum(axis=0), 1)
     mean, freedom = logs.sum(axis=0) / number, np.maximum(known.sum(axis=0) - 1, 0)

@@ -151,15 +151,15 @@ def shaken_products(
 
     def difference(motion: Motion) -> Rows:
         whole = partner[id(motion.whole or motion)]
-        one, other = equations(motion), again(whole.part(motion.start, motion.start + len(motion.time)))
+        first, second = equations(motion), again(whole.part(motion.start, motion.start + len(motion.time)))
         columns = [
-            [b - a for a, b in zip(one.dense(k, used), other.dense(k, used), strict=True)]
+            [b - a for a, b in zip(first.dense(k, used), second.dense(k, used), strict=True)]
             for k, used in enumerate(pattern)
         ]
         undecided = None
-        if one.undecided is not None and other.undecided is not None:
-            undecided = one.undecided | other.undecided
-        return Rows(columns, other.known - one.known, np.zeros_like(one.measured), undecided, one.slow)
+        if first.undecided is not None and second.undecided is not None:
+            undecided = first.undecided | second.undecided
+        return Rows(columns, second.known - first.known, np.zeros_like(first.measured), undecided, first.slow)
 
     whole = [np.zeros((size, size)) for size in np.tile(pattern.sum(axis=1) + 1, 2)]
     rows = np.zeros(len(whole))
@@ -170,7 +170,7 @@ def shaken_products(
             total += _products(factors)
     shaken = tuple(total / max(count, 1.0) for total, count in zip(whole, rows, strict=True))
     own = [np.append(np.arange(count), -1) for count in pattern[:, :twin].sum(axis=1)] * 2
-    return Shaking(shaken, tuple(each[np.ix_(some, some)] for each, some in zip(shaken, own, strict=True)))
+    return Shaking(shaken, tuple(products[np.ix_(some, some)] for products, some in zip(shaken, own, strict=True)))
 
 
 def _products(factors: Sequence[np.ndarray]) -> np.ndarray:

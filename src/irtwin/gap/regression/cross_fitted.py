@@ -31,7 +31,7 @@ class LeftOut:
         self._stack = stack
         self._all = twin_values(system, system.solution((), total))
         self._without: dict[str, np.ndarray] = {}
-        for run in track({block.run for block in system.blocks}, lambda one: f"the twin without {one}"):
+        for run in track({block.run for block in system.blocks}, lambda name: f"the twin without {name}"):
             groups = {int(g) for g, block in zip(system.group, system.blocks, strict=True) if block.run == run}
             own = moments[groups.pop()] if len(groups) == 1 and system.groups > 1 else None
             self._without[run] = twin_values(system, system.solution((), total, own))

@@ -105,11 +105,11 @@ def in_scope(candidates: Sequence[Hypothesis], *, both: bool) -> list[Hypothesis
     Such a shape is `of_change`, or acts in some observed runs only, beside reference runs (`both`).
     """
     inside = []
-    for one in candidates:
-        left_out = _never_changed if one.scope == CHANGED else _of_change
-        kept = tuple(v for v in one.variants if not left_out(v.effect, both))
+    for candidate in candidates:
+        left_out = _never_changed if candidate.scope == CHANGED else _of_change
+        kept = tuple(v for v in candidate.variants if not left_out(v.effect, both))
         if kept:
-            inside.append(replace(one, variants=kept))
+            inside.append(replace(candidate, variants=kept))
     return inside
 
 

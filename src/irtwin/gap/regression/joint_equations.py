@@ -95,7 +95,7 @@ def joint_equations(
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
     blocks = accumulate(motions, equations(), pattern, by_products=True)
-    alone = [one.of(slice(-1)) for one in blocks if one.rows[:-1].any()]
+    alone = [block.of(slice(-1)) for block in blocks if block.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     noise = shaken_products(shaken, equations(), equations(), pattern, len(terms))
     whole = System(

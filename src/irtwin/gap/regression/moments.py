@@ -95,12 +95,12 @@ class Products:
             return self.held.take(columns, axis=0).take(rows, axis=1).T
         return self.held.take(rows, axis=0).take(columns, axis=1)
 
-    def pairs(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def pairs(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return the product (N,) of each held column with another."""
         if not self.as_rows:
-            return np.asarray(self.held[one, other])
-        pieces = range(0, len(one), _AT_ONCE)
-        rows = ((self.held[:, side[k : k + _AT_ONCE]] for side in (one, other)) for k in pieces)
+            return np.asarray(self.held[first, second])
+        pieces = range(0, len(first), _AT_ONCE)
+        rows = ((self.held[:, side[k : k + _AT_ONCE]] for side in (first, second)) for k in pieces)
         return np.concatenate([np.zeros(0), *(np.einsum("rn,rn->n", *both) for both in rows)])
 
     def squares(self, weights: np.ndarray) -> float:
@@ -119,7 +119,7 @@ class Moments:
     def __init__(self, weighed: Sequence[tuple[Products, float]]):
         """Take products with their weights; what is wide is added first."""
         self.size = weighed[0][0].places.size
-        self.weighed = sorted(weighed, key=lambda one: not one[0].places.wide)
+        self.weighed = sorted(weighed, key=lambda pair: not pair[0].places.wide)
 
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the products (r, c) of some columns with others: of mostly more columns, each one's side by side."""

@@ -231,8 +231,8 @@ class System:
     def _held(self, equation: int, observed: bool, weights: np.ndarray) -> np.ndarray:
         """Return what (D + 1,) weights of all columns are of those that an equation holds, (k + 1,), unscaled."""
         places = self._places[observed][equation]
-        each = np.bincount(places.own, (weights * self._units)[places.every])
-        return np.asarray(each - weights[-1] * self._expected[equation])
+        weighed = np.bincount(places.own, (weights * self._units)[places.every])
+        return np.asarray(weighed - weights[-1] * self._expected[equation])
 
     def _among_all(self, equation: int, observed: bool, products: np.ndarray) -> np.ndarray:
         """Return products with what an equation holds, (k + 1,), as those with all columns, (D + 1,)."""
@@ -324,19 +324,19 @@ class System:
             [self.rows[group, kind] @ a_row[int(self.group_observed[group])][kind] for kind, group in self.parts]
         )
 
-    def products_of(self, one: np.ndarray, other: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    def products_of(self, first: np.ndarray, second: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """Return in each part the product of each column with another, (N,) indices: (P, N); weighted by `noise`."""
-        sums = np.zeros((len(self.kinds), self.groups, len(one)))
+        sums = np.zeros((len(self.kinds), self.groups, len(first)))
         weights = np.maximum(noise, self.quietest) ** -2.0
         kinds = [kind for kind, own in enumerate(self.kinds) for _ in weights[own]]
         for equation, (kind, weight) in enumerate(zip(kinds, weights, strict=True)):
             for observed in (False, True):
                 at = self._places[observed][equation].at
-                some = np.flatnonzero((at[one] >= 0) & (at[other] >= 0))
-                held = at[one[some]], at[other[some]]
+                some = np.flatnonzero((at[first] >= 0) & (at[second] >= 0))
+                held = at[first[some]], at[second[some]]
                 for group in np.flatnonzero(self.group_observed == observed):
                     sums[kind, group, some] += weight * self._products[group][equation].pairs(*held)
-        return sums.reshape(-1, len(one))
+        return sums.reshape(-1, len(first))
 
     def residual_rms(self, chosen: Sequence[int], noise: np.ndarray) -> np.ndarray:
         """Return each equation's residual RMS (g,) of the fit of the twin's terms and the chosen columns.

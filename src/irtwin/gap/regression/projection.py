@@ -28,7 +28,7 @@ class Projection:
     def __init__(self, system: System, noise: np.ndarray, variants: Sequence[Variant]):
         """Take the twin's terms off the columns of variants."""
         self.system, self._noise = system, noise
-        self._asked = np.unique([*(k for one in variants for k in one.columns), system.size])
+        self._asked = np.unique([*(k for variant in variants for k in variant.columns), system.size])
         self.parts = np.array([system.rows[group, kind].any() for kind, group in system.parts])  # (P,) with rows
         observed = system.group_observed[[group for _, group in system.parts]][self.parts]
         self._telling = np.flatnonzero(observed | (self._asked[0] < system.changed))  # of those with rows
@@ -58,22 +58,24 @@ class Projection:
     def _project(self, variants: Sequence[Variant]) -> None:
         """Work out the products among each variant's columns, those of one number at once."""
         sizes: dict[int, list[tuple[int, ...]]] = {}
-        for one in variants:
-            sizes.setdefault(len(one.columns), []).append(one.columns)
+        for variant in variants:
+            sizes.setdefault(len(variant.columns), []).append(variant.columns)
         if not sizes:
             return
-        each = [self.at(own) for own in sizes.values()]
-        beside = [np.column_stack([columns, np.full(len(columns), -1)]) for columns in each]
-        pairs = [np.broadcast_arrays(one[..., None], own[:, None]) for one, own in zip(each, beside, strict=True)]
-        flat = [self._asked[np.concatenate([one[side].ravel() for one in pairs])] for side in (0, 1)]
+        by_size = [self.at(own) for own in sizes.values()]
+        beside = [np.column_stack([columns, np.full(len(columns), -1)]) for columns in by_size]
+        pairs = [
+            np.broadcast_arrays(columns[..., None], own[:, None]) for columns, own in zip(by_size, beside, strict=True)
+        ]
+        flat = [self._asked[np.concatenate([pair[side].ravel() for pair in pairs])] for side in (0, 1)]
         products = self.system.products_of(flat[0], flat[1], self._noise)[self.parts]
-        ends = np.cumsum([one.size for one, _ in pairs])[:-1]
+        ends = np.cumsum([first.size for first, _ in pairs])[:-1]
         by_part = [
-            products_of.reshape(-1, *one.shape)
-            for products_of, (one, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
+            products_of.reshape(-1, *first.shape)
+            for products_of, (first, _) in zip(np.split(products, ends, axis=1), pairs, strict=True)
         ]
         whole = [left.sum(axis=0) for left in by_part]
-        imitated = [self.imitated[columns] for columns in each]
+        imitated = [self.imitated[columns] for columns in by_size]
         places = {int(part): place for place, part in enumerate(self._telling)}
         for part, inner in enumerate(self._inner):
             half = self.imitated @ (inner / -2)  # what is left is symmetric in it
@@ -82,13 +84,13 @@ class Projection:
             else:
                 half[-1] += self._measured[part]
             measured = half @ self.imitated[-1] + self.imitated @ half[-1]
-            for columns, own, left in zip(each, imitated, by_part, strict=True):
+            for columns, own, left in zip(by_size, imitated, by_part, strict=True):
                 among = _pairs(own, half[columns])
                 left[part, ..., :-1] -= among + among.swapaxes(1, 2)
                 left[part, ..., -1] -= measured[columns]
         for known, them, own, all_of, left in zip(sizes.values(), beside, imitated, whole, by_part, strict=True):
             after = all_of - _pairs(own, self._all[them])
-            squares = zip(*(np.trace(one, axis1=1, axis2=2) for one in (after, all_of)), strict=True)
+            squares = zip(*(np.trace(matrices, axis1=1, axis2=2) for matrices in (after, all_of)), strict=True)
             self._squares |= zip(known, squares, strict=True)
             self.products[them.shape[1] - 1] = dict(zip(known, range(len(known)), strict=True)), after, left
 
@@ -106,8 +108,8 @@ class Projection:
         if self._kept is not None and 2 * len(at) > len(self._asked):  # fewer are picked one by one
             tell, asked, terms = self._kept.shape
             return np.asarray((self._kept.reshape(tell * asked, terms) @ change).reshape(tell, asked)[:, at])
-        each = [self._across(place, at) @ change for place in range(len(self._telling))]
-        return np.array(each).reshape(len(each), len(at))
+        rows = [self._across(place, at) @ change for place in range(len(self._telling))]
+        return np.array(rows).reshape(len(rows), len(at))
 
     def visible(self, variants: Sequence[Variant]) -> np.ndarray:
         """Return (V, 2) what variants add, with coefficients as large as expected, beyond what the twin imitates.
@@ -115,7 +117,7 @@ class Projection:
         As a mean square in units of the noise, and as the part of its columns' squares.
         """
         rows = max(float(self.system.rows.sum(axis=0).max(initial=0.0)), 1.0)
-        left, every = np.array([self._squares[one.columns] for one in variants]).reshape(-1, 2).T
+        left, every = np.array([self._squares[variant.columns] for variant in variants]).reshape(-1, 2).T
         return np.column_stack([left / rows, left / np.maximum(every, 1e-300)])
 
     def at(self, columns: Sequence[int] | Sequence[Sequence[int]]) -> np.ndarray:
@@ -147,8 +149,8 @@ class Projection:
         self.prepare(chosen)
         at, rows = self.at(chosen), [self._rows[k] for k in chosen]
         whole = np.array([of_all for of_all, _ in rows]).reshape(-1, len(self._asked))
-        parts = tuple(each for _, each in rows)
-        measured = np.array([each[-1] for each in parts]).reshape(-1, len(self._inner)).T
+        parts = tuple(by_part for _, by_part in rows)
+        measured = np.array([part[-1] for part in parts]).reshape(-1, len(self._inner)).T
         factor = factored(whole[:, at]) if len(at) else None
         imitated = whole if factor is None else solved(factor, whole)  # (c, A)
         shaken = self._shaken(at, imitated[:, -1])
@@ -218,14 +220,14 @@ class Beside:
         each part that has rows beside the twin's terms alone (R, V, k, k + 1).
         """
         places: dict[int, list[int]] = {}
-        for place, one in enumerate(variants):
-            places.setdefault(len(one.columns), []).append(place)
+        for place, variant in enumerate(variants):
+            places.setdefault(len(variant.columns), []).append(place)
         if not places:
             return
-        each = [[variants[place].columns for place in which] for which in places.values()]
-        at = [self.projection.at(columns) for columns in each]
+        by_size = [[variants[place].columns for place in which] for which in places.values()]
+        at = [self.projection.at(columns) for columns in by_size]
         less = self._less_noise(at)
-        for which, columns, own_at, gained in zip(places.values(), each, at, less, strict=True):
+        for which, columns, own_at, gained in zip(places.values(), by_size, at, less, strict=True):
             known, of_all, of_parts = self.projection.products[len(columns[0])]
             own = [known[some] for some in columns]
             whole, parts = of_all[own], of_parts[:, own]
@@ -241,10 +243,10 @@ class Beside:
         Over all parts, then in each that has rows, (1 + R, V, k).
         """
         if self.shaken is None:
-            return [np.zeros((2, *one.shape)) for one in at]
-        gained = np.vstack(self.projection.less_noise(np.concatenate([one.ravel() for one in at]), self.shaken))
-        ends = np.cumsum([one.size for one in at])[:-1]
-        return [own.reshape(-1, *one.shape) for own, one in zip(np.split(gained, ends, axis=1), at, strict=True)]
+            return [np.zeros((2, *places.shape)) for places in at]
+        gained = np.vstack(self.projection.less_noise(np.concatenate([places.ravel() for places in at]), self.shaken))
+        ends = np.cumsum([places.size for places in at])[:-1]
+        return [own.reshape(-1, *places.shape) for own, places in zip(np.split(gained, ends, axis=1), at, strict=True)]
 
     def nearer(self, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return (V,) by how much nearer the twin is to what is known of it with columns times values (V, k).
@@ -257,7 +259,7 @@ class Beside:
         before = of_base[-1] - self.imitated[:, -1] @ chosen
         if self.shaken is not None:
             before = before - self.shaken.change
-        before, less = (self.projection.system.told_by_prior(one) for one in (before, less))
+        before, less = (self.projection.system.told_by_prior(off) for off in (before, less))
         return np.asarray(((2 * before - less) * less).sum(axis=1))
 
     def in_parts(self, columns: np.ndarray, products: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

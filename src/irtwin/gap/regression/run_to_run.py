@@ -46,8 +46,8 @@ class RunFriction:
     def deviations(self, run: str, spread: np.ndarray) -> np.ndarray:
         """Return a run's relative deviations (k,), drawn in towards none by how far they `spread` (k,)."""
         known = self.information[run] / self.noise * spread * spread[:, None]
-        said = spread * self.score[run] / self.noise
-        return np.asarray(spread * np.linalg.solve(known + np.eye(len(spread)), said))
+        score = spread * self.score[run] / self.noise
+        return np.asarray(spread * np.linalg.solve(known + np.eye(len(spread)), score))
 
     def likelihood(self, place: int, runs: Set[str]) -> np.ndarray:
         """Return the log likelihood of each share, of the deviations of some runs about their mean."""
@@ -88,7 +88,7 @@ class RunToRun:
         slow = (noise[:count] / noise[-count:]) ** 2
         frictions = tuple(_friction(alone, k, values, runs, float(slow[k])) for k in range(count))
         of_torque = frictions[: len(frictions) - system.beside_power]
-        kinds = dict.fromkeys(kind for one in of_torque if one is not None for kind in one.kinds)
+        kinds = dict.fromkeys(kind for friction in of_torque if friction is not None for kind in friction.kinds)
         told = any(len(side) > 1 for side in sides)
         return cls({kind: _share(kind, of_torque, sides) for kind in kinds} if told else {}, frictions)
 
@@ -112,20 +112,20 @@ class RunToRun:
 
     def mean_squares(self, alike: Sequence[Sequence[str]], rows: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return what it makes of each equation between runs that are `alike`, of `rows` (g,) each: (g,) a row."""
-        found = np.zeros(len(self.frictions))
+        means = np.zeros(len(self.frictions))
         for equation, friction in enumerate(self.frictions):
             if friction is None:
                 continue
             squares = count = 0.0
             for some in alike:
                 known = [run for run in some if run in friction.information]
-                each = [friction.deviations(run, self._spread(friction)) for run in known]
-                for run, own in zip(known, each, strict=True):
-                    less = own - np.mean(each, axis=0)
+                deviations = [friction.deviations(run, self._spread(friction)) for run in known]
+                for run, own in zip(known, deviations, strict=True):
+                    less = own - np.mean(deviations, axis=0)
                     squares += float(less @ friction.information[run] @ less)
                     count += float(rows[run][equation]) * (1 - 1 / len(known))
-            found[equation] = squares / count if count else 0.0
-        return found
+            means[equation] = squares / count if count else 0.0
+        return means
 
     def _spread(self, friction: RunFriction) -> np.ndarray:
         return np.array([self.shares.get(kind, 0.0) for kind in friction.kinds])
@@ -137,8 +137,8 @@ def _whitened(
     """Return a run's factors times the inverse root of their covariance, which their columns of a `size` (k,) make."""
     columns = [factor[:, places] * size for factor in factors]
     counting = [(count * own).T for count, own in zip(counts, columns, strict=True)]
-    products = np.sum([one @ own for one, own in zip(counting, columns, strict=True)], axis=0)
-    across = np.sum([one @ factor for one, factor in zip(counting, factors, strict=True)], axis=0)
+    products = np.sum([counted @ own for counted, own in zip(counting, columns, strict=True)], axis=0)
+    across = np.sum([counted @ factor for counted, factor in zip(counting, factors, strict=True)], axis=0)
     less = _root(products) @ across
     return [factor - own @ less for factor, own in zip(factors, columns, strict=True)]
 
@@ -165,7 +165,7 @@ def _friction(system: System, equation: int, values: np.ndarray, runs: Set[str],
     places = np.flatnonzero(differs)
     if not len(places):
         return None
-    own, known, said = inside[places], dict[str, list[np.ndarray]](), dict[str, list[np.ndarray]]()
+    own, known, scores = inside[places], dict[str, list[np.ndarray]](), dict[str, list[np.ndarray]]()
     for block in system.blocks:
         factor = block.factors[equation]
         if block.run in runs and len(factor):
@@ -173,24 +173,24 @@ def _friction(system: System, equation: int, values: np.ndarray, runs: Set[str],
             columns = factor[:, places] * values[own]
             counting = (_counting(block, equation, slow) * columns).T
             known.setdefault(block.run, []).append(counting @ columns)
-            said.setdefault(block.run, []).append(counting @ left)
-    noise = _disagreement(known, said)
+            scores.setdefault(block.run, []).append(counting @ left)
+    noise = _disagreement(known, scores)
     kinds = tuple(str(system.terms[k][0].differs_by_run) for k in own)
     if not noise:
         return None
-    information, score = ({run: np.sum(each, axis=0) for run, each in of.items()} for of in (known, said))
+    information, score = ({run: np.sum(blocks, axis=0) for run, blocks in of.items()} for of in (known, scores))
     return RunFriction(places, kinds, values[own], information, score, noise, slow)
 
 
-def _disagreement(known: Mapping[str, Sequence[np.ndarray]], said: Mapping[str, Sequence[np.ndarray]]) -> float:
+def _disagreement(known: Mapping[str, Sequence[np.ndarray]], scores: Mapping[str, Sequence[np.ndarray]]) -> float:
     """Return by how much the blocks of a run disagree, of their information and score, a mean square; 0: unknown."""
     squares, more = 0.0, 0
-    for run, each in known.items():
-        whole = np.linalg.lstsq(np.sum(each, axis=0), np.sum(said[run], axis=0), rcond=_KNOWN)[0]
-        for products, score in zip(each, said[run], strict=True):
+    for run, matrices in known.items():
+        whole = np.linalg.lstsq(np.sum(matrices, axis=0), np.sum(scores[run], axis=0), rcond=_KNOWN)[0]
+        for products, score in zip(matrices, scores[run], strict=True):
             missed = score - products @ whole
             squares += float(missed @ np.linalg.pinv(products, rcond=_KNOWN, hermitian=True) @ missed)
-        more += (len(each) - 1) * len(whole)
+        more += (len(matrices) - 1) * len(whole)
     return squares / more if more else 0.0
 
 

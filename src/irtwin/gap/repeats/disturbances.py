@@ -65,8 +65,12 @@ def disturbances(case: Case) -> list[Disturbance]:
         series, load = _of_power(by_power, runs)
         meter = 0.0 if power_noise is None else float(power_noise[0])
         channels.append(_Channel("power", None, "W", series, by_power, meter, load))
-    differing = [one for each in channels for one in each.disturbances(len(channels), case.thresholds.matters)]
-    return sorted(differing, key=lambda one: -one.share)
+    differing = [
+        disturbance
+        for channel in channels
+        for disturbance in channel.disturbances(len(channels), case.thresholds.matters)
+    ]
+    return sorted(differing, key=lambda disturbance: -disturbance.share)
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ class _Channel:
     def disturbances(self, tests: int, limits: Matters) -> list[Disturbance]:
         """Return what matters beside what else differs, and the noise; the channel is one of `tests`."""
         peaks, left = lines(self.series, tests)
-        parts = [_in_band(one.left(), pair) for one, pair in zip(left, self.pairs, strict=True)]
+        parts = [_in_band(own.left(), pair) for own, pair in zip(left, self.pairs, strict=True)]
         rest = float(np.mean(parts)) / 2
         located: list[Located] = []
         if (load := self.load) is not None:
@@ -93,8 +97,8 @@ class _Channel:
             kind = LINE if line.purity > 0.5 else BAND
             located.append((kind, self._wave(line), line.size, line.p, line))
         located += self._slow(left, tests)
-        spread = float(np.mean([np.var(one.values) for one in self.series])) / 2
-        whole = max(spread, rest + sum(one[2] for one in located))
+        spread = float(np.mean([np.var(difference.values) for difference in self.series])) / 2
+        whole = max(spread, rest + sum(place[2] for place in located))
         return [
             Disturbance(self.name, self.joint, kind, quantities, size, float(min(size / whole, 1.0)), p, shape)
             for kind, quantities, size, p, shape in located
@@ -109,18 +113,18 @@ class _Channel:
 
     def _slow(self, series: Sequence[EvenSeries], tests: int) -> list[Located]:
         """Return the drift and the offset between runs; what drifts is held against the offset that it began with."""
-        drift = self._most(DRIFT, f"{self.unit}/s", [slow(one)[1] for one in series], tests)
-        flat = [from_start(one) for one in series] if drift else series
-        return drift + self._most(OFFSET, self.unit, [slow(one)[0] for one in flat], tests)
+        drift = self._most(DRIFT, f"{self.unit}/s", [slow(difference)[1] for difference in series], tests)
+        flat = [from_start(difference) for difference in series] if drift else series
+        return drift + self._most(OFFSET, self.unit, [slow(difference)[0] for difference in flat], tests)
 
-    def _most(self, kind: str, unit: str, each: Sequence[np.ndarray], tests: int) -> list[Located]:
+    def _most(self, kind: str, unit: str, values: Sequence[np.ndarray], tests: int) -> list[Located]:
         """Return the largest of some values that say more than they cost, one for either kind, channel and pair."""
-        cost = 2 * tests * sum(len(one.values) for one in self.series)
-        sure = [one for one in each if one[2] * cost <= 1]
+        cost = 2 * tests * sum(len(difference.values) for difference in self.series)
+        sure = [estimate for estimate in values if estimate[2] * cost <= 1]
         if not sure:
             return []
-        value, deviation, p, _ = max(sure, key=lambda one: one[3]).tolist()
-        size = float(sum(one[3] for one in sure)) / len(each)
+        value, deviation, p, _ = max(sure, key=lambda estimate: estimate[3]).tolist()
+        size = float(sum(estimate[3] for estimate in sure)) / len(values)
         return [(kind, (quantity(kind, self.joint, value, unit, deviation),), size, p, None)]
 
 
@@ -151,11 +155,11 @@ def _of_power(pairs: Sequence[Pair], runs: Mapping[str, Run]) -> tuple[list[Even
     own = {name: _of_run(runs[name], motion, by_torque) for name, motion in motions.items()}
     watched = [_watched(pair, own) for pair in pairs]
     load = switching(watched, own)
-    series = [one.difference for one in watched]
+    series = [pair.difference for pair in watched]
     if load is not None:
         apart = [pair.of(*(load.states[name] for name in _names(pair))) for pair in pairs]
-        series = [one.with_columns(column) for one, column in zip(series, apart, strict=True)]
-    return [creep(one, each.squares).tamed() for one, each in zip(series, watched, strict=True)], load
+        series = [difference.with_columns(column) for difference, column in zip(series, apart, strict=True)]
+    return [creep(difference, pair.squares).tamed() for difference, pair in zip(series, watched, strict=True)], load
 
 
 def _watched(pair: Pair, runs: Mapping[str, EvenSeries]) -> Watched:

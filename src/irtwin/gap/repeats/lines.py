@@ -58,16 +58,16 @@ def lines(series: Sequence[EvenSeries], tests: int) -> tuple[list[Line], list[Ev
     told: list[Line] = []
     grid = _grid(series)
     while len(grid) > 4 * _AROUND and len(told) < _MOST:
-        power = np.array([_power(one, grid) for one in series])
-        noise = np.array([_noise(each, grid) for each in power])
+        power = np.array([_power(difference, grid) for difference in series])
+        noise = np.array([_noise(row, grid) for row in power])
         stands = (power / noise).sum(axis=0)
         best = int(np.argmax(stands))
         p = float(min(1.0, scipy.special.gammaincc(len(series), stands[best]) * len(grid) / _FINE * tests))
-        if not p * sum(len(one.values) for one in series) <= len(series):
+        if not p * sum(len(difference.values) for difference in series) <= len(series):
             break
         near = np.abs(np.arange(len(grid)) - best) <= _FINE * _NEAR
         line, series = _line(series, grid, best, noise[:, best])
-        rest = sum(float(_power(one, grid)[near].sum()) for one in series)
+        rest = sum(float(_power(difference, grid)[near].sum()) for difference in series)
         purity = 1 - min(rest / float(power[:, near].sum()), 1.0)
         told.append(Line(*line, purity, p))
     return told, series
@@ -75,27 +75,27 @@ def lines(series: Sequence[EvenSeries], tests: int) -> tuple[list[Line], list[Ev
 
 def _grid(series: Sequence[EvenSeries]) -> np.ndarray:
     """Return the frequencies to try, (F,) Hz: even, so that those of a run cut short are told apart too."""
-    seconds = [one.seconds for one in series]
+    seconds = [difference.seconds for difference in series]
     step = 1 / (_FINE * max(seconds))
-    highest = _HIGHEST * min(one.rate for one in series) / 2
+    highest = _HIGHEST * min(difference.rate for difference in series) / 2
     return np.asarray(step * np.arange(np.ceil(_PERIODS / min(seconds) / step), np.floor(highest / step) + 1))
 
 
-def _power(one: EvenSeries, grid: np.ndarray) -> np.ndarray:
+def _power(series: EvenSeries, grid: np.ndarray) -> np.ndarray:
     """Return the power that what is left of a series has at even frequencies, (F,): of white noise its mean square.
 
     Nothing, where the columns beside it leave less than `_FREE` of a wave.
     """
-    window = np.hanning(len(one.values) + 2)[1:-1]
-    turn = 2j * np.pi / one.rate
+    window = np.hanning(len(series.values) + 2)[1:-1]
+    turn = 2j * np.pi / series.rate
     ratio, start = np.exp(-turn * (grid[1] - grid[0])), np.exp(turn * grid[0])
 
     def transform(columns: np.ndarray) -> np.ndarray:
         sums = scipy.signal.czt(columns, len(grid), ratio, start, axis=0)
         return np.asarray(np.abs(sums) ** 2)
 
-    taken = transform(one.basis()).sum(axis=1) / len(window)
-    power = transform(window[:, None] * one.left()[:, None])[:, 0] / float(window @ window)
+    taken = transform(series.basis()).sum(axis=1) / len(window)
+    power = transform(window[:, None] * series.left()[:, None])[:, 0] / float(window @ window)
     return np.where(taken < 1 - _FREE, power, 0.0)
 
 
@@ -119,19 +119,19 @@ def _line(
     """Place a line between the points of the grid; return its frequency and amplitude, and the series beside it."""
 
     def beside(frequency: float) -> list[EvenSeries]:
-        return [one.with_columns(*waves(one.time, frequency)) for one in series]
+        return [difference.with_columns(*waves(difference.time, frequency)) for difference in series]
 
     def missed(frequency: float) -> float:
-        return float(sum(np.sum(one.left() ** 2) / level for one, level in zip(beside(frequency), noise, strict=True)))
+        return float(sum(np.sum(own.left() ** 2) / level for own, level in zip(beside(frequency), noise, strict=True)))
 
     step = grid[1] - grid[0]
     ends = (grid[best] - step, grid[best] + step)
     least = scipy.optimize.minimize_scalar(missed, bounds=ends, method="bounded", options={"xatol": 1e-3 * step})
     frequency = float(least.x)
     more = beside(frequency)
-    heights = np.array([float(np.linalg.norm(one.coefficients()[-2:])) for one in more])
+    heights = np.array([float(np.linalg.norm(difference.coefficients()[-2:])) for difference in more])
     amplitude = float(np.sqrt(np.mean(heights**2) / 2))  # of one run: a difference has two, of any phases
-    samples, seconds = np.array([(len(one.values), one.seconds) for one in series]).T
+    samples, seconds = np.array([(len(difference.values), difference.seconds) for difference in series]).T
     signal = max(float(np.sum(heights**2 * samples / 4 / noise)), 1.0)
     error = float(np.sqrt(1.5 / signal) / (np.pi * seconds.mean()))
     return (frequency, error, amplitude, _ends(heights, np.sqrt(4 * noise / samples))), more

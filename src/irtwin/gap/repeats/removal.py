@@ -56,13 +56,17 @@ def removed(
     taken: list[Removed] = []
     if plain is not None:
         values = twin_values(plain, plain.solution((), Summed(plain.moments(plain.noise_before))))
-        steady = [one for one in disturbances if one.kind == LINE and one.channel == "torque"]
+        steady = [
+            disturbance for disturbance in disturbances if disturbance.kind == LINE and disturbance.channel == "torque"
+        ]
         if steady:
             left = {motion.run: torque_residual(stack, motion, values) for motion in case.with_torque}
-            for joint in dict.fromkeys(one.joint for one in steady):
-                own = [one for one in steady if one.joint == joint]
+            for joint in dict.fromkeys(line.joint for line in steady):
+                own = [line for line in steady if line.joint == joint]
                 taken += _waves(case, effects[LINE], own, left)
-    taken += [_load(case, effects[SWITCHING], one) for one in disturbances if one.kind == SWITCHING]
+    taken += [
+        _load(case, effects[SWITCHING], disturbance) for disturbance in disturbances if disturbance.kind == SWITCHING
+    ]
     return _without(case, taken), taken
 
 
@@ -71,28 +75,28 @@ def _waves(
 ) -> list[Removed]:
     """Return the waves of one joint's lines, fitted to what the twin leaves of each run, where it leaves anything."""
     joint = case.robot.index(str(disturbances[0].joint))
-    fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [one.shape.frequency for one in disturbances])
+    fits = {m.run: _Fit(m, left[m.run][:, joint], joint, [line.shape.frequency for line in disturbances])
             for m in case.with_torque if np.isfinite(left[m.run][:, joint]).any()}  # fmt: skip
     if not (seen := [fit for run, fit in fits.items() if run in case.observed]):
         return []
     taken = []
-    for k, one in enumerate(disturbances):
-        fitted = replace(effect, f=one.shape.frequency, joints=(str(one.joint),))  # type: ignore[call-arg]
-        amplitude = _amplitude(one, [fit.amplitude(k) for fit in seen])
+    for k, line in enumerate(disturbances):
+        fitted = replace(effect, f=line.shape.frequency, joints=(str(line.joint),))  # type: ignore[call-arg]
+        amplitude = _amplitude(line, [fit.amplitude(k) for fit in seen])
         explained, before = np.sum([fit.squares(k) for fit in seen], axis=0)
         gain = min(float(explained) / max(float(before), 1e-300), 1.0)
-        taken.append(Removed(one, fitted, amplitude, {run: fit.wave(k) for run, fit in fits.items()}, gain))
+        taken.append(Removed(line, fitted, amplitude, {run: fit.wave(k) for run, fit in fits.items()}, gain))
     return taken
 
 
-def _amplitude(one: Disturbance, each: Sequence[tuple[float, float]]) -> tuple[Quantity, ...]:
+def _amplitude(line: Disturbance, of_runs: Sequence[tuple[float, float]]) -> tuple[Quantity, ...]:
     """Return the line's frequency, and its amplitude over the runs where the filter lets it through."""
-    amplitudes, deviations = np.array(each).T
+    amplitudes, deviations = np.array(of_runs).T
     if not np.isfinite(amplitudes).all():
-        return one.quantities
-    frequency, known = one.quantities
+        return line.quantities
+    frequency, known = line.quantities
     value = float(np.sqrt(np.mean(amplitudes**2)))
-    deviation = float(np.sqrt(np.sum(deviations**2))) / len(each)
+    deviation = float(np.sqrt(np.sum(deviations**2))) / len(of_runs)
     return frequency, quantity(known.name, known.joint, value, known.unit, deviation, lambda end: max(end, 0.0))
 
 
@@ -101,9 +105,9 @@ class _Fit:
 
     def __init__(self, motion: Motion, left: np.ndarray, joint: int, frequencies: Sequence[float]):
         """Fit waves of some frequencies, Hz, to what was left (N,), NaN where undecided."""
-        seen = [as_filtered(motion, np.column_stack(waves(motion.time, one))) for one in frequencies]
-        self._passed = [float(np.mean(one**2)) > _NO_MORE for one in seen]  # else the filter takes the wave away
-        self._waves = [one * passed for one, passed in zip(seen, self._passed, strict=True)]
+        seen = [as_filtered(motion, np.column_stack(waves(motion.time, frequency))) for frequency in frequencies]
+        self._passed = [float(np.mean(wave**2)) > _NO_MORE for wave in seen]  # else the filter takes the wave away
+        self._waves = [wave * passed for wave, passed in zip(seen, self._passed, strict=True)]
         known = np.isfinite(left)
         columns = np.column_stack([following(motion, joint), *self._waves])[known]
         values = np.linalg.lstsq(columns, left[known], rcond=1e-8)[0]
@@ -128,15 +132,15 @@ class _Fit:
         return float(np.sum(self.wave(k)[self._known] ** 2)), self._before
 
 
-def _load(case: Case, effect: Effect, one: Disturbance) -> Removed:
+def _load(case: Case, effect: Effect, disturbance: Disturbance) -> Removed:
     """Return the load that switches, as the filter leaves it in each run."""
-    load = one.shape
+    load = disturbance.shape
     parts = {
         motion.run: as_filtered(motion, load.level * load.states[motion.run])
         for motion in case.with_power
         if motion.run in load.states
     }
-    return Removed(one, effect, one.quantities, parts, float(load.explained))
+    return Removed(disturbance, effect, disturbance.quantities, parts, float(load.explained))
 
 
 def _without(case: Case, taken: Sequence[Removed]) -> Case:
@@ -148,13 +152,13 @@ def _without(case: Case, taken: Sequence[Removed]) -> Case:
 
 def _less(case: Case, motion: Motion, taken: Sequence[Removed]) -> Motion:
     torque, power = motion.torque, motion.power
-    for one in taken:
-        part = one.parts.get(motion.run)
+    for removal in taken:
+        part = removal.parts.get(motion.run)
         if part is None:
             continue
-        if one.disturbance.joint is None:
+        if removal.disturbance.joint is None:
             power = None if power is None else power - part
         elif torque is not None:
             torque = torque.copy()
-            torque[:, case.robot.index(one.disturbance.joint)] -= part
+            torque[:, case.robot.index(removal.disturbance.joint)] -= part
     return replace(motion, torque=torque, power=power)

@@ -69,8 +69,8 @@ def creep(series: EvenSeries, squares: np.ndarray | None) -> EvenSeries:
 def _loads(squares: np.ndarray | None, count: int) -> list[np.ndarray]:
     """Return what may warm: nothing of the motion, or any joint's winding as well, (N, 1 + n) columns."""
     own = np.ones((count, 1))
-    each = [] if squares is None else [np.column_stack([own, squares / np.maximum(squares.mean(axis=0), 1e-300)])]
-    return [own, *each]
+    heated = [] if squares is None else [np.column_stack([own, squares / np.maximum(squares.mean(axis=0), 1e-300)])]
+    return [own, *heated]
 
 
 def _a_second(drift: np.ndarray, time: np.ndarray) -> np.ndarray:

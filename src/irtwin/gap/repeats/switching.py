@@ -62,7 +62,7 @@ class Switching:
     @property
     def periods(self) -> list[float]:
         """The times from one switching on to the next, s."""
-        on = [[time for time, step in each if step > 0] for each in self.edges.values()]
+        on = [[time for time, step in edges if step > 0] for edges in self.edges.values()]
         return [float(value) for times in on for value in np.diff(times)]
 
 
@@ -79,8 +79,10 @@ def switching(pairs: Sequence[Watched], runs: Mapping[str, EvenSeries]) -> Switc
 
 def _worth(load: Switching, pairs: Sequence[Watched], runs: Mapping[str, EvenSeries]) -> float:
     """Return what a load saves in the description of the runs, beside how they drift, less what its course costs."""
-    none = {name: np.zeros(len(one.time)) for name, one in runs.items()}
-    before, after = ([one for pair in pairs for one in _left_of(pair, states, runs)] for states in (none, load.states))
+    none = {name: np.zeros(len(series.time)) for name, series in runs.items()}
+    before, after = (
+        [difference for pair in pairs for difference in _left_of(pair, states, runs)] for states in (none, load.states)
+    )
     return saved(before, after) - load.cost
 
 
@@ -109,7 +111,7 @@ def _followed(
     edges = {name: _edges(runs[name].time, state) for name, state in states.items()}
     if level <= 0 or sum(map(len, edges.values())) < 2:
         return None
-    bins = {name: len(one.time) // _bin(one) for name, one in runs.items()}
+    bins = {name: len(series.time) // _bin(series) for name, series in runs.items()}
     return Switching(level, deviation, states, edges, bins, _explained(pairs, states, runs))
 
 
@@ -131,17 +133,17 @@ def _on(
     What they `differ` by says that one has it and not the other; their sum, of what is `left` of each, whether both do.
     """
     first, second = pair.names
-    one, two = runs[first], runs[second]
-    own = np.interp(pair.difference.time, one.time, left[first])
-    other = np.interp(pair.difference.time - pair.shift, two.time, left[second])
-    said = [(differ, _BOTH[:, 0] - _BOTH[:, 1]), (own + other, _BOTH.sum(axis=1))]
-    size = _bin(one)
+    first_series, second_series = runs[first], runs[second]
+    own = np.interp(pair.difference.time, first_series.time, left[first])
+    other = np.interp(pair.difference.time - pair.shift, second_series.time, left[second])
+    measured = [(differ, _BOTH[:, 0] - _BOTH[:, 1]), (own + other, _BOTH.sum(axis=1))]
+    size = _bin(first_series)
     count = len(differ) // size
     if count < 2:
         return {}
     pays = np.zeros((count, len(_BOTH)))
-    for each, expected in said:
-        values = np.mean(each[: count * size].reshape(count, size), axis=1)
+    for signal, expected in measured:
+        values = np.mean(signal[: count * size].reshape(count, size), axis=1)
         off = (values[:, None] - level * expected) ** 2
         best = np.sqrt(off.min(axis=1))
         variance = float(np.mean(best**2)) * correlation_samples(values - level * expected[off.argmin(axis=1)])
@@ -149,15 +151,15 @@ def _on(
     course = _likeliest(pays, np.log(count))
     time = pair.difference.time[: count * size : size]
     states = {}
-    for k, (name, at) in enumerate(((first, one.time), (second, two.time + pair.shift))):
+    for k, (name, at) in enumerate(((first, first_series.time), (second, second_series.time + pair.shift))):
         place = np.clip(np.searchsorted(time, at, side="right") - 1, 0, count - 1)
         states[name] = _BOTH[course, k][place]
     return states
 
 
-def _bin(one: EvenSeries) -> int:
+def _bin(series: EvenSeries) -> int:
     """Return the samples of a bin."""
-    return max(1, round(_BIN * one.rate), -(-len(one.time) // _MOST_BINS))
+    return max(1, round(_BIN * series.rate), -(-len(series.time) // _MOST_BINS))
 
 
 def _likeliest(pays: np.ndarray, cost: float) -> np.ndarray:
@@ -217,7 +219,7 @@ def _explained(pairs: Sequence[Watched], states: Mapping[str, np.ndarray], runs:
         second = np.diff(pair.difference.values, 2)  # of white noise, of six times its mean square
         white = len(pair.difference.time) * (SPREAD * float(np.median(np.abs(second)))) ** 2 / 6
         loaded = pair.difference.with_columns(_apart(pair, states, runs))
-        left += [float(np.sum(one.left() ** 2)) - white for one in (pair.difference, loaded)]
+        left += [float(np.sum(difference.left() ** 2)) - white for difference in (pair.difference, loaded)]
     return float(1 - max(left[1], 0.0) / left[0]) if left[0] > 0 else 0.0
 
 
@@ -252,7 +254,7 @@ def _saved(before: np.ndarray, after: np.ndarray) -> float:
 
 def _two_levels(runs: Mapping[str, EvenSeries]) -> dict[str, np.ndarray]:
     """Return where each run's power is on the upper of two levels, (N,) of 0 and 1, beside what the motion takes."""
-    states = {name: np.zeros(len(one.time)) for name, one in runs.items()}
+    states = {name: np.zeros(len(series.time)) for name, series in runs.items()}
     for _ in range(_ROUNDS):
         left = _left(runs, states)
         middle = _middle(np.concatenate(list(left.values())))

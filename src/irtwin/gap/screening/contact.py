@@ -37,21 +37,21 @@ def contact(robot: Robot, left: Sequence[RunResidual], noise: np.ndarray) -> Ext
     """
     if len(robot.joints) < _FEWEST_JOINTS:
         return None
-    observed = track([one for one in left if one.observed], lambda one: f"contacts in {one.motion.run}")
-    runs = [_Run(one, ExternalContact().columns(robot, one.motion), noise) for one in observed]
+    observed = track([run for run in left if run.observed], lambda current: f"contacts in {current.motion.run}")
+    runs = [_Run(run, ExternalContact().columns(robot, run.motion), noise) for run in observed]
     leader = _leader(runs)
     if leader is None:
         return None
     first, clock = leader
     _, force = first.judged(*first.samples(clock))
-    members = [one for one in runs if one is first or one.explained(*one.samples(clock), force) > 0]
-    return ExternalContact(*_placed(members, clock), runs=tuple(sorted(one.name for one in members)))
+    members = [run for run in runs if run is first or run.explained(*run.samples(clock), force) > 0]
+    return ExternalContact(*_placed(members, clock), runs=tuple(sorted(run.name for run in members)))
 
 
 def _leader(runs: Sequence[_Run]) -> tuple[_Run, Clock] | None:
     """Return the run with the largest sudden gain, and its window."""
     best, leader = 0.0, None
-    for run in track(runs, lambda one: f"windows of {one.name}"):
+    for run in track(runs, lambda current: f"windows of {current.name}"):
         gain = np.where(run.gain > run.throughout, run.gain, 0.0)
         if len(gain) and gain.max() > best:
             best, leader = float(gain.max()), (run, run.clock(int(np.argmax(gain))))
@@ -68,7 +68,7 @@ def _placed(members: Sequence[_Run], clock: Clock) -> Clock:
                 moved[end] += k * step
                 if moved[1] - moved[0] >= _LENGTHS[0]:
                     tried.append((moved[0], moved[1]))
-            sums = [sum(float(run.judged(*run.samples(one))[0].sum()) for run in members) for one in tried]
+            sums = [sum(float(run.judged(*run.samples(window))[0].sum()) for run in members) for window in tried]
             clock = tried[int(np.argmax(sums))]
     return clock
 

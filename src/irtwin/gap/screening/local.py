@@ -23,8 +23,8 @@ _SLOW = (0.03, 0.15)  # of the joint's largest speed: over so much, friction tha
 
 def local_effects(robot: Robot, effects: Sequence[LocalEffect], left: Sequence[RunResidual]) -> Iterator[LocalEffect]:
     """Yield each effect at each joint that moves, in the places that explain most of what is left in observed runs."""
-    observed = [one for one in left if one.observed]
-    for k, joint in track(enumerate(robot.joints), lambda one: f"places of {one[1].name}"):
+    observed = [run for run in left if run.observed]
+    for k, joint in track(enumerate(robot.joints), lambda numbered: f"places of {numbered[1].name}"):
         passed = _Passed.of(observed, k) if observed else None
         if passed is None:
             continue
@@ -54,8 +54,8 @@ class _Passed:
     def of(cls, left: Sequence[RunResidual], joint: int) -> _Passed | None:
         """Sum the joint's residual; None where it does not move, or nothing is left."""
         q, dq, ddq, residual = (
-            np.concatenate([values[:, joint] for values in each])
-            for each in zip(*((m.motion.q, m.motion.dq, m.motion.ddq, m.residual) for m in left), strict=True)
+            np.concatenate([values[:, joint] for values in arrays])
+            for arrays in zip(*((m.motion.q, m.motion.dq, m.motion.ddq, m.residual) for m in left), strict=True)
         )
         moving = np.isfinite(residual) & (sharp_sign(dq) != 0)
         if not moving.any() or np.ptp(q[moving]) == 0:

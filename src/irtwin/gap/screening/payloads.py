@@ -70,7 +70,7 @@ class _Parts:
         full[:base, :base], full[:base, base:-1], full[-1, -1] = np.eye(base), onto, 1.0
         products = []
         every = zip(runs, of_runs.moments(noise), strict=True)
-        for _, moments in track(every, lambda one: f"payloads in {one[0]}"):
+        for _, moments in track(every, lambda pair: f"payloads in {pair[0]}"):
             kept = np.append(np.arange(base), moments.size - 1)
             products.append(full.T @ moments.among(kept, kept) @ full)
         return cls(runs, np.array(products), of_runs.group_observed, base, system.prior())
@@ -107,7 +107,7 @@ class _Fold:
         factor = factored(total[:base, :base], parts.prior)
         self._twin = solved(factor, total[:base, -1])
         self._beside = products[:, :base, base:-1]
-        self._imitated = np.stack([solved(factor, one) for one in self._beside])
+        self._imitated = np.stack([solved(factor, block) for block in self._beside])
         self._own = products[:, base:-1, base:-1]
         self._right = products[:, base:-1, -1] - np.einsum("rak,a->rk", self._beside, self._twin)
 

@@ -29,7 +29,7 @@ def remainders(
 ) -> list[RunResidual]:
     """Return what the twin with its coefficients, `values`, leaves of each run; and a `load` (10,) in some, if any."""
     left = []
-    for motion in track(case.with_torque, lambda one: f"what is left of {one.run}"):
+    for motion in track(case.with_torque, lambda current: f"what is left of {current.run}"):
         step = decimation(motion.rate, motion.cutoff) if motion.cutoff else 1
         residual = torque_residual(stack, motion, values)
         if load is not None and load[0].acts_in(motion):

@@ -21,7 +21,7 @@ def known_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[Effect]:
 
     Within less than a period a ripple is any curve over the angle: also that of a hose, which stiffens.
     """
-    angles = [one.motion.q for one in left if one.observed]
+    angles = [run.motion.q for run in left if run.observed]
     turns = np.ptp(np.concatenate(angles), axis=0) / (2 * np.pi) if angles else np.zeros(len(robot.joints))
     ripples = []
     for ripple in TorqueRipple().candidates(robot):
@@ -39,8 +39,8 @@ def fast_ripples(robot: Robot, left: Sequence[RunResidual]) -> list[TorqueRipple
     as finely as the joint turns far.
     """
     ripples = []
-    for joint, name in track(enumerate(robot.joint_names), lambda one: f"ripples of {one[1]}"):
-        parts = [(one.motion.q[:, joint], one.residual[:, joint]) for one in left if one.observed]
+    for joint, name in track(enumerate(robot.joint_names), lambda numbered: f"ripples of {numbered[1]}"):
+        parts = [(run.motion.q[:, joint], run.residual[:, joint]) for run in left if run.observed]
         angle, residual = (np.concatenate([part[k] for part in parts] or [np.zeros(0)]) for k in range(2))
         kept = np.isfinite(residual)
         order = _clearest(angle[kept], residual[kept])

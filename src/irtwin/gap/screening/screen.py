@@ -41,9 +41,9 @@ class Screened:
     def shapes(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects to try: those that a screening places, in that place only."""
         loads = self.waited()
-        touched = any(isinstance(one, ExternalContact) for one in loads)
+        touched = any(isinstance(load, ExternalContact) for load in loads)
         placed = (LocalEffect, TorqueRipple, *([ExternalContact] if touched else []))
-        return [*(one for one in effects if not isinstance(one, placed)), *loads, *self.placed]
+        return [*(effect for effect in effects if not isinstance(effect, placed)), *loads, *self.placed]
 
 
 def screen(case: Case, stack: Stack, system: System) -> Screened:
@@ -88,7 +88,7 @@ def each_beside_the_other(
             break
         touch = contact(case.robot, left, _rms(left, noise))
         tried |= {payload: None, touch: None}
-    return tuple(one for one in tried if one is not None)
+    return tuple(effect for effect in tried if effect is not None)
 
 
 def _apart_from(system: System, touch: ExternalContact | None) -> System:
@@ -115,7 +115,7 @@ def _beside(case: Case, stack: Stack, system: System, noise: np.ndarray, payload
 
 def _rms(left: list[RunResidual], noise: np.ndarray) -> np.ndarray:
     """Return the RMS (n,) of what is left of each joint; `noise` where nothing is known, as the joint never moves."""
-    residual = np.concatenate([one.residual for one in left])
+    residual = np.concatenate([run.residual for run in left])
     known = np.isfinite(residual)
     mean = np.where(known, residual, 0.0) ** 2 / np.maximum(known.sum(axis=0), 1)
     return np.where(known.any(axis=0), np.sqrt(mean.sum(axis=0)), noise)

@@ -80,4 +80,6 @@ def _is_declaration(triple: Triple) -> bool:
 
 def _in_order(gone: set[Triple], came: set[Triple]) -> list[tuple[str, Triple]]:
     both = [*(("-", triple) for triple in gone), *(("+", triple) for triple in came)]
-    return sorted(both, key=lambda one: (str(one[1].subject), str(one[1].predicate), one[0] != "-", str(one[1])))
+    return sorted(
+        both, key=lambda change: (str(change[1].subject), str(change[1].predicate), change[0] != "-", str(change[1]))
+    )

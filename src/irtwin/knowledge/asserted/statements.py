@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -10,15 +11,17 @@ from functools import partial
 from typing import Any
 
 from pyoxigraph import BlankNode, Literal, NamedNode, Quad, Store, Triple
-from sqlalchemy import Column, Engine, select
+from sqlalchemy import Column, Engine, Float, select
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
+from irtwin.knowledge.asserted import terms
 from irtwin.knowledge.explain.mapping import maps_of, says
 from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap
 from irtwin.knowledge.mapping.terms import values_in
 from irtwin.knowledge.owl_rl.closure import say
+from irtwin.knowledge.store import ontology
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import (
     GRAPH,
@@ -34,7 +37,10 @@ from irtwin.storage.asserted import FILLED, AssertedFact, key_text, row_of, valu
 from irtwin.storage.row_rules import check_row
 from irtwin.storage.rows import values
 from irtwin.storage.schema import Base, RobotRow
+from irtwin.storage.tariff import FILE
 
+_ONTOLOGY = NamedNode(GRAPH_ONTOLOGY)
+_NUMBER: Column[Any] = Column("number", Float)
 _NUMBERS = frozenset(f"{XSD}{name}" for name in ("double", "float", "decimal", "integer", "int", "long"))
 _MADE_BY = {
     GRAPH_ACTIVITY: "a provider worked it out; change what it worked on",
@@ -76,12 +82,17 @@ def read(
     now = datetime.now(UTC)
     for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
         gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
-        said = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
-        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **said)
+        common = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
+        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **common)
         cell = _cell(graph, subject, predicate)
         if cell is not None:
             _fill(assertion, graph, session, cell, (subject, predicate), new, fact)
             continue
+        if predicate == ontology.LIMIT_VALUE and (subject, predicate) in ontology.limits(graph.resources):
+            _set_limit(assertion, graph, session, (subject, predicate), new, fact)
+            continue
+        if subject == ontology.ELECTRICITY:
+            _check_tariff(graph, predicate)
         for quad in gone:
             _withdraw(assertion, graph, session, quad)
         for quad in new:
@@ -111,12 +122,36 @@ def individuals(graph: KnowledgeGraph, engine: Engine, facts: Iterable[AssertedF
 
 
 def map_facts(graph: KnowledgeGraph, session: Session) -> None:
-    """Bring the statements that no row follows into the graph: those that are kept, and no other."""
+    """Bring the statements that no row follows into the graph: those that are kept, and no other.
+
+    What is said of a limit stands in the ontology's graph in place of what its module says.
+    """
+    free = select(AssertedFact).where(AssertedFact.place.is_(None)).order_by(AssertedFact.time)
+    facts = list(session.scalars(free))
     kept = Store()  # which gives literals back as the graph does
-    kept.extend(map(quad_of, session.scalars(select(AssertedFact).where(AssertedFact.place.is_(None)))))
+    kept.extend(quad_of(fact) for fact in facts if fact.graph != GRAPH_ONTOLOGY)
     names = {GRAPH_ASSERTED, *(quad.graph_name.value for quad in kept)}
     there = {quad for name in names for quad in graph.store.quads_in(name)}
+    if graph.has_ontology:
+        limits = _limits(graph, facts)
+        of_limits = (Quad(*row) for row in graph.store.said_of({limit for limit, _ in limits}))
+        there |= {
+            quad for quad in of_limits if (quad.subject, quad.predicate) in limits and quad.graph_name == _ONTOLOGY
+        }
+        kept.extend(limits.values())
     graph.change(there - set(kept), set(kept) - there)
+
+
+def _limits(graph: KnowledgeGraph, facts: Iterable[AssertedFact]) -> dict[tuple[NamedNode, NamedNode], Quad]:
+    """Return value and source of each limit: by the last fact about it, else by its module."""
+    limits = ontology.limits(graph.resources)
+    for fact in facts:
+        limit = NamedNode(fact.subject)
+        if fact.graph == GRAPH_ONTOLOGY and (limit, ontology.LIMIT_VALUE) in limits:
+            said_by = Literal(f"{fact.author}, {fact.time:%Y-%m-%d}, in place of {fact.replaced}")
+            limits[limit, ontology.LIMIT_VALUE] = quad_of(fact)
+            limits[limit, ontology.SOURCE] = Quad(limit, ontology.SOURCE, said_by, _ONTOLOGY)
+    return limits
 
 
 def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
@@ -150,16 +185,13 @@ def _fill(
     cell: _Cell,
     about: tuple[NamedNode, NamedNode],
     new: set[Quad],
-    said: Callable[..., AssertedFact],
+    make_fact: Callable[..., AssertedFact],
 ) -> None:
     """Read what a row is to say in place of what it says."""
-    what = say(about, graph.base)
-    if len({quad.object for quad in new}) > 1:
-        raise InputError(f"{what}: has one value, not {len(new)}; nothing changed")
-    value = next(iter(new)).object if new else None
-    fact = said(
+    statement = say(about, graph.base)
+    fact = make_fact(
         fact_id=secrets.token_hex(12),
-        value=_text(cell.column, value, what),
+        value=_text(cell.column, new, statement),
         kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
         graph=cell.graph.value,
         place=f"{cell.column.table.name}.{cell.column.name}",
@@ -167,13 +199,13 @@ def _fill(
     )
     row = row_of(session, fact)
     if row is None:
-        raise InputError(f"{what}: the database has no such {cell.column.table.name}; nothing changed")
+        raise InputError(f"{statement}: the database has no such {cell.column.table.name}; nothing changed")
     if fact.value is None and not cell.column.nullable:
-        raise InputError(f"{what}: needs a value; say another one in the same update; nothing changed")
+        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
     try:
         check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
     except ValueError as error:
-        raise InputError(f"{what}: {error}; nothing changed") from None
+        raise InputError(f"{statement}: {error}; nothing changed") from None
     fact.replaced = written(getattr(row, cell.column.name))
     if fact.value == fact.replaced:
         return
@@ -183,18 +215,60 @@ def _fill(
         assertion.added.add(quad_of(fact))
 
 
-def _text(column: Column[Any], value: object, what: str) -> str | None:
-    """Return a value as facts write it, in the column's own form. InputError where the column can hold no such."""
-    if value is None:
+def _set_limit(
+    assertion: Assertion,
+    graph: KnowledgeGraph,
+    session: Session,
+    about: tuple[NamedNode, NamedNode],
+    new: set[Quad],
+    make_fact: Callable[..., AssertedFact],
+) -> None:
+    """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said."""
+    statement, shipped = say(about, graph.base), ontology.limits(graph.resources)[about]
+    value = _text(_NUMBER, new, statement)
+    if value is not None and not math.isfinite(float(value)):
+        raise InputError(f"{statement}: cannot be {value}; nothing changed")
+    of_limit = select(AssertedFact.fact_id).where(AssertedFact.subject == about[0].value)
+    known = session.scalars(of_limit.where(AssertedFact.graph == GRAPH_ONTOLOGY)).all()
+    if value is None and not known:
+        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
+    now = next((quad for quad in graph.store.said(*about) if quad.graph_name == _ONTOLOGY), shipped)
+    before = _float(now)
+    assertion.removed.add(now)
+    if value is None or float(value) == _float(shipped):
+        assertion.withdrawn += known
+        assertion.added.add(shipped)
+        return
+    more = {"value": value, "kind": f"{XSD}double", "graph": GRAPH_ONTOLOGY, "replaced": written(before)}
+    fact = make_fact(fact_id=secrets.token_hex(12), **more)
+    assertion.added.add(quad_of(fact))
+    if float(value) != before:
+        assertion.facts.append(fact)
+
+
+def _float(quad: Quad) -> float:
+    return float(quad.object.value)  # type: ignore[union-attr]
+
+
+def _text(column: Column[Any], new: set[Quad], statement: str) -> str | None:
+    """Return the one value that is new as facts write it, in the column's own form; None without any.
+
+    InputError where there are several, or the column can hold no such.
+    """
+    values = {quad.object for quad in new}
+    if len(values) > 1:
+        raise InputError(f"{statement}: has one value, not {len(values)}; nothing changed")
+    if not values:
         return None
+    (value,) = values
     is_number = column.type.python_type is not str
     datatype = value.datatype.value if isinstance(value, Literal) else ""
     if not isinstance(value, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
-        raise InputError(f"{what}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
+        raise InputError(f"{statement}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
     try:
         return written(value_of(column, value.value))
     except ValueError:
-        raise InputError(f"{what}: cannot be {value.value!r}; nothing changed") from None
+        raise InputError(f"{statement}: cannot be {value.value!r}; nothing changed") from None
 
 
 def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
@@ -204,13 +278,22 @@ def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str |
     return robot_id if robot_id and session.get(RobotRow, robot_id) is not None else None
 
 
+def _check_tariff(graph: KnowledgeGraph, predicate: NamedNode) -> None:
+    """Raise InputError where `plant.toml` says a property of the tariff: the ontology's graph does, and no module."""
+    quads = {quad for quad in graph.store.said(ontology.ELECTRICITY, predicate) if quad.graph_name == _ONTOLOGY}
+    modules = ontology.of_modules(graph.resources)
+    if quads and not any(quad.subject == ontology.ELECTRICITY and quad.predicate == predicate for quad in modules):
+        statement = say((ontology.ELECTRICITY, predicate), graph.base)
+        raise InputError(f"{statement}: stands in the workspace's {FILE}; change it there; nothing changed")
+
+
 def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
     about = select(AssertedFact).where(AssertedFact.subject == getattr(quad.subject, "value", ""))
     free = session.scalars(about.where(AssertedFact.place.is_(None)))
     ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
     name = getattr(quad.graph_name, "value", "")
     if not ids and name.startswith(GRAPH):
-        why = next((said for below, said in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
+        why = next((reason for below, reason in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
         raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
     assertion.withdrawn += ids
     assertion.removed.add(quad)
@@ -218,12 +301,13 @@ def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, qua
 
 def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
     """Raise InputError where a statement is one that irtwin makes itself."""
-    what, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
+    statement, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
     if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{what}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+        raise InputError(f"{statement}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
+    terms.check(graph.resources, quad, statement)
     if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
         raise InputError(
-            f"{what}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
+            f"{statement}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
         )
 
 

@@ -12,16 +12,16 @@ from pyoxigraph import BlankNode, Literal, NamedNode, QueryTriples, Store, Tripl
 from irtwin.errors import InputError
 from irtwin.knowledge.engines import HERMIT
 from irtwin.knowledge.explain import provenance
-from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.explanation import LEFT_OUT, Explanation
 from irtwin.knowledge.explain.mapping import says
-from irtwin.knowledge.explain.rules import premises
+from irtwin.knowledge.explain.rules import MOST_TAKEN, premises
 from irtwin.knowledge.owl_rl.closure import Closure, Statement, say
 from irtwin.knowledge.parts import Ontology
 from irtwin.knowledge.reasoning import around, engine_of, not_closed
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
-from irtwin.knowledge.store.ontology import ELECTRICITY
+from irtwin.knowledge.store.ontology import ELECTRICITY, LIMIT_VALUE, SOURCE
 from irtwin.knowledge.store.rdf_input import read_turtle
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import (
@@ -83,9 +83,9 @@ class Explainer:
 
     def triple(self, triple: Triple) -> Explanation:
         """Explain a triple that the graph holds."""
-        what = self._say(triple)
+        statement = self._say(triple)
         if triple in self._told:
-            return Explanation(what, _ABOVE)
+            return Explanation(statement, _ABOVE)
         self._told.add(triple)
         graphs = sorted(self._graph.graphs_with(triple))
         stated = [name for name in graphs if not name.startswith(GRAPH_INFERRED)]
@@ -94,20 +94,21 @@ class Explainer:
         for rule in all_rules(self._graph.resources):
             grounds = premises(self._graph, rule, triple) if rule.graph in graphs else None
             if grounds is not None:
+                facts, are_all = grounds
                 by = f'the rule "{rule.label}", in {rule.language}'
-                return Explanation(what, by, tuple(map(self.triple, grounds)), rule.comment or None)
+                return Explanation(statement, by, self._each(facts, are_all), rule.comment or None)
         return self._inferred(tuple(triple))
 
     def individual(self, iri: str) -> Explanation:
         """Explain an individual: the activities that made it, what they used, and the file that it is."""
-        what = shorten(iri, self._graph.base)
+        name = shorten(iri, self._graph.base)
         if iri in self._told:
-            return Explanation(what, _ABOVE)
+            return Explanation(name, _ABOVE)
         self._told.add(iri)
         makers = provenance.makers(self._graph, iri)
         used = [thing for maker in makers for thing in provenance.used_by(self._graph, maker["activity"])]
         return Explanation(
-            what,
+            name,
             " and ".join(map(_maker, makers)) or self._known_from(iri),
             (*map(self.individual, dict.fromkeys(used)), *self._runs_recorded_as(iri)),
             **provenance.file_of(self._graph, iri),
@@ -118,35 +119,44 @@ class Explainer:
         for run in provenance.recorded_of(self._graph, series):
             if run in self._told:
                 continue
-            what, file = shorten(run, self._graph.base), provenance.file_of(self._graph, run)
-            yield Explanation(what, self._known_from(run), **file)
+            name, file = shorten(run, self._graph.base), provenance.file_of(self._graph, run)
+            yield Explanation(name, self._known_from(run), **file)
 
     def _known_from(self, run: str) -> str:
         return _PLANNED if provenance.is_planned(self._graph, run) else _RECORDED
 
     def _stated(self, triple: Triple, name: str) -> Explanation:
-        what = self._say(triple)
+        statement = self._say(triple)
         if name.startswith(GRAPH_ACTIVITY):
             activity = self._graph.iri(f"activity/{name.removeprefix(GRAPH_ACTIVITY)}")
             used = tuple(map(self.individual, provenance.used_by(self._graph, activity)))
-            return Explanation(what, _maker(provenance.activity(self._graph, activity)), used)
+            return Explanation(statement, _maker(provenance.activity(self._graph, activity)), used)
         fact = provenance.asserted(self._graph, triple)
         if fact is not None:
-            return Explanation(what, fact)
+            return Explanation(statement, fact)
         if name.startswith(GRAPH_SOURCE):
             near = self._file_near(triple)
             maker = says(triple, self._graph.resources.of("mappings"), self._graph.base) or "a mapping"
+            if parts := provenance.parts_of_total(self._graph, triple, MOST_TAKEN + 1):
+                return Explanation(statement, maker, self._each(parts[:MOST_TAKEN], len(parts) <= MOST_TAKEN))
             subject = triple.subject.value if isinstance(triple.subject, NamedNode) else None
             behind = provenance.behind(self._graph, subject) if not near and subject is not None else []
-            return Explanation(what, maker, tuple(map(self.individual, behind)), **near)
+            return Explanation(statement, maker, tuple(map(self.individual, behind)), **near)
         if name == GRAPH_ONTOLOGY:
             module = _module(triple, self._graph.resources.of("ontology"))
-            if module is None and triple.subject == ELECTRICITY:
-                return Explanation(what, "the plant's tariff", file=FILE)
             unnamed = triple.subject if isinstance(triple.subject, BlankNode) else None
-            leading = [it for it in Ontology.of(self._graph).triples if unnamed and it.object == unnamed]
-            return Explanation(what, "the ontology", tuple(map(self.triple, leading)), file=module)
-        return Explanation(what, f"what was written into {shorten(name)}")
+            if module is None and triple.subject == ELECTRICITY:
+                return Explanation(statement, "the plant's tariff", file=FILE)
+            if module is None and unnamed is None and triple.predicate == SOURCE:
+                values = self._graph.store.said(triple.subject, LIMIT_VALUE)
+                return Explanation(statement, "who set the limit", tuple(self.triple(quad.triple) for quad in values))
+            leading = [axiom for axiom in Ontology.of(self._graph).triples if unnamed and axiom.object == unnamed]
+            return Explanation(statement, "the ontology", tuple(map(self.triple, leading)), file=module)
+        return Explanation(statement, f"what was written into {shorten(name)}")
+
+    def _each(self, facts: list[Triple], are_all: bool) -> tuple[Explanation, ...]:
+        rest = () if are_all else (Explanation(f"more than {MOST_TAKEN} that were summed or compared", LEFT_OUT),)
+        return (*map(self.triple, facts), *rest)
 
     def _inferred(self, statement: Statement) -> Explanation:
         """Explain what OWL 2 RL inferred; steps that are the rules' own way to walk a list are left out."""
@@ -216,14 +226,14 @@ class Explainer:
 
 def _without_helpers(closure: Closure, statements: Iterable[Statement]) -> list[Statement]:
     """Return the statements, and for those that rules make for themselves what they were made of."""
-    found: dict[Statement, None] = {}
+    kept: dict[Statement, None] = {}
     for statement in statements:
         if closure.is_helper(statement):
             derivation = closure.why(statement)
-            found |= dict.fromkeys(_without_helpers(closure, derivation.premises) if derivation else ())
+            kept |= dict.fromkeys(_without_helpers(closure, derivation.premises) if derivation else ())
         else:
-            found[statement] = None
-    return list(found)
+            kept[statement] = None
+    return list(kept)
 
 
 def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
@@ -242,7 +252,10 @@ def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
     equal += "".join(f" FILTER(isBlank(?_{place}))" for place in unnamed)  # SPARQL has no way to say which
     limit = "" if unnamed else f"LIMIT {MOST_TRIPLES + 1}"
     matching = list(cast(QueryTriples, graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} {limit}")))
-    return [it for it in matching if all(str(tuple(it)[place]) == term for place, term in unnamed.items())] or matching
+    named_so = [
+        triple for triple in matching if all(str(tuple(triple)[place]) == term for place, term in unnamed.items())
+    ]
+    return named_so or matching
 
 
 def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:
@@ -273,10 +286,10 @@ def _module(triple: Triple, files: Files) -> str | None:
     if isinstance(triple.subject, BlankNode):
         return None
     object = None if isinstance(triple.object, BlankNode) else triple.object
-    said = (
+    matches = (
         (name, module.quads_for_pattern(triple.subject, triple.predicate, object)) for name, module in _modules(files)
     )
-    return next((name for name, quads in said if any(quads)), None)
+    return next((name for name, quads in matches if any(quads)), None)
 
 
 @lru_cache(maxsize=16)

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+LEFT_OUT = "left out"  # says of what there is too much of
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -37,7 +39,7 @@ def to_json(explanation: Explanation) -> dict[str, Any]:
     }
     known = {name: value for name, value in plain.items() if value is not None}
     if explanation.because:
-        known["because"] = [to_json(each) for each in explanation.because]
+        known["because"] = [to_json(premise) for premise in explanation.because]
     return known
 
 
@@ -54,7 +56,7 @@ def _lines(explanation: Explanation, margin: str) -> Iterator[str]:
         yield f"{inner}file {explanation.file}{folder}{checksum}"
     if explanation.place:
         yield f"{inner}at {explanation.place}"
-    for each in explanation.because:
-        first, *rest = _lines(each, inner + "  ")
+    for premise in explanation.because:
+        first, *rest = _lines(premise, inner + "  ")
         yield f"{inner}- {first.lstrip()}"
         yield from rest

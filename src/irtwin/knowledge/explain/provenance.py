@@ -50,6 +50,39 @@ ORDER BY ?file"""
 _RUNS_OF_TOTAL = """
 SELECT DISTINCT ?run WHERE { ?thing irt:total_of ?robot . ?run irt:run_of ?robot ; irt:File ?file } ORDER BY ?run"""
 
+_PARTS_OF_TOTAL = """
+CONSTRUCT { ?part ?property ?value }
+WHERE {
+  { SELECT DISTINCT ?part ?property ?value WHERE {
+    {
+      $total irt:worked_out_of ?property .
+      ?part irt:run_of ?robot ; ?property ?value .
+      OPTIONAL { $thing irt:Day ?day }
+      OPTIONAL { ?part irt:Start_Time ?start }
+      FILTER(EXISTS { $thing irt:total_of ?robot } || EXISTS { $thing a irt:Fleet_Day_Total })
+      FILTER(IF(BOUND(?day), STRSTARTS(STR(?start), ?day) && EXISTS { ?part irt:Energy_Consumption ?energy }, true))
+      FILTER(!BOUND(?day) && ?property IN (irt:Run_Time, irt:Idle_Share, irt:Modelled_Energy, irt:Payload)
+        || NOT EXISTS { ?part irt:Energy_From "mechanical" })
+      FILTER NOT EXISTS { ?part a irt:Run_Without_Consumption }
+      FILTER NOT EXISTS { $thing irt:total_of_Effect|irt:total_of_Joint ?part_of_it }
+    } UNION {
+      $total irt:worked_out_of ?property .
+      $thing irt:total_of ?robot ; irt:total_of_Effect ?effect .
+      ?run irt:run_of ?robot ; irt:Energy_Consumption ?energy .
+      ?part irt:share_of_Run ?run ; irt:of_Effect ?effect ; ?property ?value .
+      OPTIONAL { $thing irt:total_of_Joint ?joint }
+      FILTER(IF(BOUND(?joint), EXISTS { ?part irt:of_Joint ?joint }, NOT EXISTS { ?part irt:of_Joint ?some }))
+    } UNION {
+      $total irt:worked_out_of ?property .
+      $thing irt:total_of ?robot .
+      ?run irt:run_of ?robot ; irt:Energy_Consumption ?energy .
+      ?part a irt:Joint_Energy ; irt:of_Run ?run ; irt:of_Joint ?joint ; ?property ?value .
+      FILTER NOT EXISTS { $thing irt:total_of_Effect ?effect }
+      FILTER($total = irt:Total_Joint_Energy || EXISTS { $thing irt:total_of_Joint ?joint })
+    }
+  } ORDER BY ?part ?property LIMIT $most }
+}"""
+
 _NEXT = """
 SELECT DISTINCT ?next
 WHERE {
@@ -132,6 +165,15 @@ def behind(graph: KnowledgeGraph, thing: str) -> list[str]:
         if in_files := [node for node in nodes if file_of(graph, node)]:
             return in_files
     return []
+
+
+def parts_of_total(graph: KnowledgeGraph, triple: Triple, most: int) -> list[Triple]:
+    """Return what runs, or parts of them, say that a total is worked out of, at most so many; else nothing."""
+    given = {"$total": triple.predicate, "$thing": triple.subject, "$most": most}
+    text = _PARTS_OF_TOTAL
+    for name, value in given.items():
+        text = text.replace(name, str(value))
+    return sorted(graph.construct(text), key=str) if isinstance(triple.subject, NamedNode) else []
 
 
 def asserted(graph: KnowledgeGraph, triple: Triple) -> str | None:

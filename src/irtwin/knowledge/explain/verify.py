@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from irtwin.input_file import checksum
-from irtwin.knowledge.explain.explanation import Explanation
+from irtwin.knowledge.explain.explanation import LEFT_OUT, Explanation
 from irtwin.storage.files import inside
 
 WHOLE, CHANGED, MISSING, UNKNOWN = "whole", "changed", "missing", "cannot be checked"
@@ -23,25 +23,34 @@ class Verdict:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the file is not what it was."""
-        return self.state in (CHANGED, MISSING)
+        """Whether the file is not what it was, or nobody looked at it."""
+        return self.state in (CHANGED, MISSING, LEFT_OUT)
 
     def __str__(self) -> str:
         return f"{self.state}: {self.file}{f' ({self.why})' if self.why else ''}"
 
 
-def verify(explanations: Iterable[Explanation], workspace: Path) -> list[Verdict]:
+def verify(explanations: Collection[Explanation], workspace: Path) -> list[Verdict]:
     """Return what became of each file that explanations name, in their order; each once."""
     files = dict.fromkeys(
-        (each.folder, each.file, each.checksum) for one in explanations for each in _all(one) if each.file
+        (part.folder, part.file, part.checksum)
+        for explanation in explanations
+        for part in _all(explanation)
+        if part.file
     )
-    return [_verdict(workspace, folder, file, known) for folder, file, known in files]
+    left_out = [
+        Verdict(part.what, LEFT_OUT)
+        for explanation in explanations
+        for part in _all(explanation)
+        if part.by == LEFT_OUT
+    ]
+    return [*(_verdict(workspace, folder, file, known) for folder, file, known in files), *left_out]
 
 
 def _all(explanation: Explanation) -> Iterator[Explanation]:
     yield explanation
-    for each in explanation.because:
-        yield from _all(each)
+    for premise in explanation.because:
+        yield from _all(premise)
 
 
 def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) -> Verdict:
@@ -50,8 +59,8 @@ def _verdict(workspace: Path, folder: str | None, file: str, known: str | None) 
     base = workspace if folder is None else Path(folder)
     path = inside(workspace, file) if folder is None else base / file
     if not base.is_dir():
-        what = "the workspace" if folder is None else "its data set"
-        return Verdict(str(path), UNKNOWN, f"{what} is not at {base}; take it in again from where it is")
+        holder = "the workspace" if folder is None else "its data set"
+        return Verdict(str(path), UNKNOWN, f"{holder} is not at {base}; take it in again from where it is")
     if not path.exists():
         return Verdict(str(path), MISSING)
     if not (path.is_file() or path.is_dir()):

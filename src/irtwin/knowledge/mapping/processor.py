@@ -86,7 +86,11 @@ class RowMapper:
         A column that a row lacks is NULL: it makes no quad. ValueError where no document names the table.
         """
         if table not in self._of_table:
-            reads = (one for one in self._statements if one.table[-1].find([table], folded=True) is not None)
+            reads = (
+                statement
+                for statement in self._statements
+                if statement.table[-1].find([table], folded=True) is not None
+            )
             self._of_table[table] = list(reads)
         statements = self._of_table[table]
         if not statements:

@@ -57,12 +57,12 @@ class FactsClosure(Closure):
             if predicate in by_object:
                 ends.setdefault((predicate, object), []).append((subject, object))
         for key in ends.keys() & table.keys():
-            of_end = {SUBJECT: {one for one, _ in ends[key]}, OBJECT: {other for _, other in ends[key]}}
+            of_end = {SUBJECT: {end for end, _ in ends[key]}, OBJECT: {end for _, end in ends[key]}}
             for s, p, o in table[key]:
                 if o not in of_end:
-                    yield from [(one, p, o) for one in of_end[s]]
+                    yield from [(end, p, o) for end in of_end[s]]
                 elif s not in of_end:
-                    yield from [(s, p, one) for one in of_end[o]]
+                    yield from [(s, p, end) for end in of_end[o]]
                 else:
                     at, to = -1 - s, -1 - o
                     yield from [(pair[at], p, pair[to]) for pair in ends[key]]
@@ -90,11 +90,11 @@ class FactsClosure(Closure):
 
     def _refuse_equal(self, fresh: list[Fact]) -> None:
         """Raise Equality where two terms are the same, or are to be as a property has one value."""
-        same, one = self._program.same, self._one
+        same, single = self._program.same, self._one
         if any(predicate == same and subject != object for subject, predicate, object in fresh):
             raise Equality
         for of_what, value in self._schema.values_of_single(fresh):
-            if one.setdefault(of_what, value) != value:
+            if single.setdefault(of_what, value) != value:
                 raise Equality
 
     def _refuse_clashes(self, fresh: list[Fact], new: Facts) -> None:
@@ -102,4 +102,6 @@ class FactsClosure(Closure):
             for culprits in join(self.facts, new):
                 raise contradiction(rule.name, ", ".join(map(self._name, culprits)))
         values = self.terms.values
-        self._refuse_other_datatypes(Facts([it for it in fresh if it[0] in values and it[1] == self._program.type]))
+        self._refuse_other_datatypes(
+            Facts([fact for fact in fresh if fact[0] in values and fact[1] == self._program.type])
+        )

@@ -60,10 +60,10 @@ def _closed(triples: Iterable[Triple]) -> set[Triple]:
     for error in graph.objects(None, _ERRORS.error):
         if not str(error).startswith(_ILL_TYPED):
             raise Contradiction(f"statements contradict each other, owlrl finds: {error}")
-    said = (statement for statement in graph if not {*statement} & {_ERRORS.error, _ERRORS.ErrorMessage})
+    statements = (statement for statement in graph if not {*statement} & {_ERRORS.error, _ERRORS.ErrorMessage})
     return {
         Triple(*map(from_rdflib, statement))
-        for statement in said
+        for statement in statements
         if isinstance(statement[1], rdflib.URIRef) and not isinstance(statement[0], rdflib.Literal)
     }
 

@@ -116,7 +116,7 @@ class Closure:
         terms, hidden, helpers = self.terms, self.terms.hidden, self.helpers()
         reflexive = {terms.number(NamedNode(iri)) for iri in _REFLEXIVE}
         kept: set[Triple] = set()
-        for fact in {fact for fact, found in self.known.items() if found > after} - self._given - _truisms():
+        for fact in {fact for fact, in_round in self.known.items() if in_round > after} - self._given - _truisms():
             subject, predicate, object = fact
             if subject == object and predicate in reflexive:
                 continue
@@ -178,13 +178,18 @@ class Closure:
     def _equal(self, fresh: list[Fact]) -> list[Fact]:
         """Return what follows of new equalities by symmetry and transitivity, by joining groups of equals."""
         same, equal = self._program.same, list[Fact]()
-        for one, predicate, other in fresh:
-            if predicate != same or one == other:
+        for first, predicate, second in fresh:
+            if predicate != same or first == second:
                 continue
-            ones, others = (self._groups.setdefault(number, {number}) for number in (one, other))
+            ones, others = (self._groups.setdefault(number, {number}) for number in (first, second))
             if ones is others:
                 continue
-            steps = ([(other, one)], ((it, other) for it in ones), product(ones, others), product(others, ones))
+            steps = (
+                [(second, first)],
+                ((member, second) for member in ones),
+                product(ones, others),
+                product(others, ones),
+            )
             for step in steps:  # each from what the ones before it found
                 self._rounds += 1
                 equal += self._unknown((left, same, right) for left, right in step if left != right)
@@ -251,7 +256,7 @@ class Closure:
     def _refuse_ill_typed(self) -> None:
         ill_typed = set(map(self.terms.number, self.terms.ill_typed))
         for literal in self.terms.ill_typed:
-            use, given = self._use(self.terms.number(literal)), (it for it in self._given if it[2] in ill_typed)
+            use, given = self._use(self.terms.number(literal)), (fact for fact in self._given if fact[2] in ill_typed)
             raise not_of(use, literal.datatype.value, self._grounds(given))
 
     def _refuse_contradictions(self) -> None:
@@ -332,9 +337,9 @@ def say(statement: Iterable[Node], base: str = ID) -> str:
     return " ".join(show(term, base) for term in statement)
 
 
-def contradiction(rule: str, what: str, given: Iterable[Triple] = ()) -> Contradiction:
+def contradiction(rule: str, terms: str, given: Iterable[Triple] = ()) -> Contradiction:
     """Return the error of a rule that finds a contradiction, and the terms it finds it of."""
-    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {what}", given)
+    return Contradiction(f"statements contradict each other (OWL 2 RL rule {rule}): {terms}", given)
 
 
 def not_of(use: str, datatype: str, given: Iterable[Triple] = ()) -> Contradiction:

@@ -69,7 +69,7 @@ class Program:
         body = [pattern for rule in self.rules for pattern in rule.body]
         properties = {predicate for _, predicate, _ in body if not predicate.startswith(("?", "rl:"))} - {"rdf:type"}
         classes = {kind for _, predicate, kind in body if predicate == "rdf:type" and not kind.startswith("?")}
-        return ({_node(it).value for it in properties}, {_node(it).value for it in classes})
+        return ({_node(name).value for name in properties}, {_node(name).value for name in classes})
 
     def is_of_models(self, pattern: Pattern) -> bool:
         """Whether a pattern fits what an ontology says of its classes and properties, and nothing else."""

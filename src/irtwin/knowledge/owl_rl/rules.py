@@ -53,7 +53,7 @@ def _rule(match: re.Match[str]) -> DatalogRule:
         head=_patterns(head or ""),
         culprits=tuple((culprits or "").split()),
         body=_patterns(body),
-        unequal=tuple((one, other) for one, other in pairs),
+        unequal=tuple((first, second) for first, second in pairs),
     )
 
 

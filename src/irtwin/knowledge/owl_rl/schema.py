@@ -76,7 +76,7 @@ class Schema:
                 for key, conclusions in filter(None, concluded):
                     self.table.setdefault(key, []).extend(conclusions)
                 return
-        values = [[tuple(self._value(term, bound) for term in one) for one in patterns] for bound in bindings]
+        values = [[tuple(self._value(term, bound) for term in of_fact) for of_fact in patterns] for bound in bindings]
         self._ask(pattern[2] for of_one in values for pattern in of_one)
         single = [self._one_value(rule, patterns, of_one) for of_one in values]
         if None not in single:

@@ -141,7 +141,7 @@ def read_question(file: Path) -> NamedQuery:
 def columns_of(text: str) -> tuple[str, ...]:
     """Return what a query selects; no data are needed for that."""
     answer = Store().query(text, base_iri=ID, prefixes=PREFIXES)
-    return tuple(it.value for it in answer.variables) if isinstance(answer, QuerySolutions) else ()
+    return tuple(variable.value for variable in answer.variables) if isinstance(answer, QuerySolutions) else ()
 
 
 def _text(question: str, resources: Resources) -> str:

@@ -91,7 +91,7 @@ def _imps(rule: Rule, model: _Model) -> Iterator[str]:
     """
     parts = conjunction(rule.construct)
     joined = joined_to(rdflib.Variable("this"), parts.patterns)
-    rows = model.values([it for it in parts.patterns if it not in joined])
+    rows = model.values([pattern for pattern in parts.patterns if pattern not in joined])
     own = _without_repeats(joined, [*parts.comparisons, *parts.template])
     if not rows or len(rows) > MOST_VALUES:
         raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
@@ -122,7 +122,7 @@ def _bound(patterns: Iterable[Pattern], row: dict[str, Any]) -> list[Pattern]:
     def value(term: Any) -> Any:
         return row.get(str(term), term) if isinstance(term, rdflib.Variable) else term
 
-    return [(value(one), value(two), value(three)) for one, two, three in patterns]
+    return [(value(subject), value(predicate), value(object)) for subject, predicate, object in patterns]
 
 
 class _Imp:
@@ -151,7 +151,7 @@ class _Imp:
     def head(self, pattern: Pattern) -> str:
         """Return the atom of what a rule concludes: a class or link of individuals that it knows."""
         subject, predicate, object = pattern
-        variables = {str(it) for it in (subject, object) if isinstance(it, rdflib.Variable)}
+        variables = {str(term) for term in (subject, object) if isinstance(term, rdflib.Variable)}
         is_link = predicate == RDF.type or self._model.is_a(predicate, OWL.ObjectProperty)
         if not (is_link and variables <= self._variables):
             raise NoConjunction("it concludes values, or what has no name before")
@@ -230,7 +230,7 @@ def _is_type(predicate: Any) -> bool:
     """Whether a predicate is rdf:type, or that of a class or one below it, as SHACL's targets are written."""
     if isinstance(predicate, SequencePath):
         first, *rest = predicate.args
-        return first == RDF.type and all(isinstance(it, MulPath) and it.path == RDFS.subClassOf for it in rest)
+        return first == RDF.type and all(isinstance(step, MulPath) and step.path == RDFS.subClassOf for step in rest)
     return bool(predicate == RDF.type)
 
 

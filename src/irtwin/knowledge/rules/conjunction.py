@@ -59,8 +59,8 @@ def _conjuncts(node: Any) -> tuple[list[Pattern], list[Comparison]]:
     if node.name == "BGP":
         return list(node.triples), []
     if node.name == "Join":
-        (one, of_one), (other, of_other) = _conjuncts(node.p1), _conjuncts(node.p2)
-        return one + other, of_one + of_other
+        (first, of_first), (second, of_second) = _conjuncts(node.p1), _conjuncts(node.p2)
+        return first + second, of_first + of_second
     if node.name == "Filter":
         patterns, comparisons = _conjuncts(node.p)
         return patterns, comparisons + list(_comparisons(node.expr))
@@ -69,8 +69,8 @@ def _conjuncts(node: Any) -> tuple[list[Pattern], list[Comparison]]:
 
 def _comparisons(expression: Any) -> Iterator[Comparison]:
     if getattr(expression, "name", "") == "ConditionalAndExpression":
-        for each in (expression.expr, *expression.other):
-            yield from _comparisons(each)
+        for part in (expression.expr, *expression.other):
+            yield from _comparisons(part)
         return
     if getattr(expression, "name", "") != "RelationalExpression":
         word = getattr(expression, "name", "such a FILTER")
@@ -92,4 +92,4 @@ def joined_to(start: rdflib.Variable, patterns: list[Pattern]) -> list[Pattern]:
             variables = {term for term in pattern if isinstance(term, rdflib.Variable)}
             if variables & reached:
                 reached |= variables
-    return [it for it in patterns if any(term in reached for term in it)]
+    return [pattern for pattern in patterns if any(term in reached for term in pattern)]

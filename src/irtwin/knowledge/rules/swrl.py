@@ -32,12 +32,12 @@ def rules_of(triples: Iterable[Triple], source: str) -> Iterator[Rule]:
 
     Class atoms name a class, or a restriction to values; built-ins compare, add, subtract, multiply or divide.
     """
-    said = BySubject(triples, NAMESPACE)
-    for node in said.having(RDF + "type", NAMESPACE + "Imp"):
-        label, comment = said.text(node, RDFS + "label"), said.text(node, RDFS + "comment")
+    statements = BySubject(triples, NAMESPACE)
+    for node in statements.having(RDF + "type", NAMESPACE + "Imp"):
+        label, comment = statements.text(node, RDFS + "label"), statements.text(node, RDFS + "comment")
         if not label:
             raise InputError(f"{source}: a swrl:Imp has no rdfs:label; give it one, for messages to name it")
-        construct = _Imp(said, f"{source}: the rule {label!r}").construct(node)
+        construct = _Imp(statements, f"{source}: the rule {label!r}").construct(node)
         name = node.value if isinstance(node, NamedNode) else label
         yield Rule(name, label, comment, (Decimal(0), Decimal(0)), construct, SWRL)
 
@@ -45,8 +45,8 @@ def rules_of(triples: Iterable[Triple], source: str) -> Iterator[Rule]:
 class _Imp:
     """One rule in the making: the triples of its file, and what its variables are called."""
 
-    def __init__(self, said: BySubject, where: str):
-        self._said, self._where = said, where
+    def __init__(self, statements: BySubject, where: str):
+        self._said, self._where = statements, where
         self._names: dict[str, str] = {}
 
     def construct(self, rule: Node) -> str:
@@ -67,7 +67,7 @@ class _Imp:
     def _name_focus(self, body: list[Node]) -> None:
         """Call the individual that the rule begins with `$this`, as SHACL does."""
         firsts = (self._said.value(atom, "argument1") for atom in body)
-        focus = next((it for it in firsts if self._is_variable(it)), None)
+        focus = next((argument for argument in firsts if self._is_variable(argument)), None)
         if isinstance(focus, NamedNode | BlankNode):
             self._names[focus.value] = "this"
 
@@ -116,7 +116,7 @@ class _Imp:
     def _built_in(self, atom: Node) -> str:
         iri = getattr(self._said.value(atom, "builtin"), "value", "")
         name = iri.removeprefix(BUILT_INS)
-        arguments = [self._term(each) for each in self._said.items(self._said.value(atom, "arguments"))]
+        arguments = [self._term(argument) for argument in self._said.items(self._said.value(atom, "arguments"))]
         if name in _COMPARED and len(arguments) == 2:
             return f"FILTER({arguments[0]} {_COMPARED[name]} {arguments[1]})"
         if name in _RECKONED and len(arguments) > 2:
@@ -140,8 +140,8 @@ class _Imp:
             return False
         return self._said.value(term, RDF + "type") == NamedNode(NAMESPACE + "Variable")
 
-    def _fault(self, what: str) -> InputError:
-        return InputError(f"{self._where} {what}")
+    def _fault(self, problem: str) -> InputError:
+        return InputError(f"{self._where} {problem}")
 
 
 def _turn(line: str) -> int:

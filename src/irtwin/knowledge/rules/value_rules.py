@@ -33,36 +33,38 @@ def values_as_rules(triples: Iterable[Triple]) -> set[Triple]:
     axiom of other expressions besides stays as it is.
     """
     kept = set(triples)
-    said = BySubject(kept, OWL)
+    statements = BySubject(kept, OWL)
     for axiom in [triple for triple in kept if triple.predicate in (_BELOW, _SAME)]:
-        if isinstance(axiom.subject, NamedNode) and _individuals(said, axiom.object):
+        if isinstance(axiom.subject, NamedNode) and _individuals(statements, axiom.object):
             try:
-                rules = _rules(said, axiom.subject, axiom)
+                rules = _rules(statements, axiom.subject, axiom)
             except _NoRule:
                 continue
-            kept -= {axiom, *_expression(said, axiom.object)}
+            kept -= {axiom, *_expression(statements, axiom.object)}
             kept |= rules
     return kept
 
 
-def _individuals(said: BySubject, expression: Node) -> bool:
+def _individuals(statements: BySubject, expression: Node) -> bool:
     """Whether a class expression has an individual for a value, however deep."""
     if not isinstance(expression, BlankNode):
         return False
-    return isinstance(said.value(expression, "hasValue"), NamedNode) or any(
-        _individuals(said, part) for part in _parts(said, expression)
+    return isinstance(statements.value(expression, "hasValue"), NamedNode) or any(
+        _individuals(statements, part) for part in _parts(statements, expression)
     )
 
 
-def _parts(said: BySubject, expression: Node) -> list[Node]:
-    return [part for name in ("intersectionOf", "unionOf") for part in said.items(said.value(expression, name))]
+def _parts(statements: BySubject, expression: Node) -> list[Node]:
+    return [
+        part for name in ("intersectionOf", "unionOf") for part in statements.items(statements.value(expression, name))
+    ]
 
 
-def _rules(said: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
+def _rules(statements: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
     is_class = (TYPE, of_class)
-    label = f"definition of {said.text(of_class, RDFS + 'label') or shorten(of_class.value)}"
+    label = f"definition of {statements.text(of_class, RDFS + 'label') or shorten(of_class.value)}"
     made = set[Triple]()
-    alternatives = _alternatives(said, axiom.object)
+    alternatives = _alternatives(statements, axiom.object)
     if len(alternatives) == 1:
         for predicate, value in alternatives[0]:
             if predicate != TYPE:
@@ -75,28 +77,28 @@ def _rules(said: BySubject, of_class: NamedNode, axiom: Triple) -> set[Triple]:
     return made
 
 
-def _alternatives(said: BySubject, expression: Node) -> list[list[Atom]]:
+def _alternatives(statements: BySubject, expression: Node) -> list[list[Atom]]:
     """Return what a class expression asks of a member: the atoms of one of the lists."""
     if isinstance(expression, NamedNode):
         return [[(TYPE, expression)]]
-    of_property, value = said.value(expression, "onProperty"), said.value(expression, "hasValue")
+    of_property, value = statements.value(expression, "onProperty"), statements.value(expression, "hasValue")
     if isinstance(of_property, NamedNode) and isinstance(value, NamedNode):
         return [[(of_property, value)]]
-    if one_of := said.items(said.value(expression, "unionOf")):
-        return [atoms for part in one_of for atoms in _alternatives(said, part)]
-    if all_of := said.items(said.value(expression, "intersectionOf")):
-        chosen = product(*(_alternatives(said, part) for part in all_of))
-        return [[atom for atoms in each for atom in atoms] for each in chosen]
+    if one_of := statements.items(statements.value(expression, "unionOf")):
+        return [atoms for part in one_of for atoms in _alternatives(statements, part)]
+    if all_of := statements.items(statements.value(expression, "intersectionOf")):
+        chosen = product(*(_alternatives(statements, part) for part in all_of))
+        return [[atom for atoms in choice for atom in atoms] for choice in chosen]
     raise _NoRule
 
 
-def _expression(said: BySubject, expression: Node) -> Iterator[Triple]:
+def _expression(statements: BySubject, expression: Node) -> Iterator[Triple]:
     """Yield the triples that write a class expression, its lists among them."""
     if isinstance(expression, BlankNode):
-        for name, values in said.said_of(expression):
+        for name, values in statements.said_of(expression):
             for value in values:
                 yield Triple(expression, NamedNode(name), value)
-                yield from _expression(said, value)
+                yield from _expression(statements, value)
 
 
 def _imp(label: str, body: list[Atom], head: Atom) -> set[Triple]:

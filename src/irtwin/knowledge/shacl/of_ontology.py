@@ -46,11 +46,11 @@ def with_ontology(by_hand: Iterable[Triple], ontology: Iterable[Triple]) -> set[
 class _Ontology:
     """What an ontology says of its properties and classes."""
 
-    def __init__(self, said: Shapes, by_hand: Shapes):
-        self._said, self._by_hand = said, by_hand
-        self._classes = {one for one in said.having(TYPE.value, OWL + "Class") if self._is_own(one)}
+    def __init__(self, statements: Shapes, by_hand: Shapes):
+        self._said, self._by_hand = statements, by_hand
+        self._classes = {kind for kind in statements.having(TYPE.value, OWL + "Class") if self._is_own(kind)}
         self.catalogues = {
-            one.value: individuals for one in self._classes if (individuals := self._individuals(one.value))
+            kind.value: individuals for kind in self._classes if (individuals := self._individuals(kind.value))
         }
 
     def domains(self) -> Iterator[str]:
@@ -67,10 +67,10 @@ class _Ontology:
         """Yield that the values of a property are said to be of its range, where no shape by hand asks for more."""
         for name in self._properties("range"):
             classes = self._classes_of(name, "range")
-            of_classes = classes and {NamedNode(one) for one in classes} <= self._classes
+            of_classes = classes and {NamedNode(kind) for kind in classes} <= self._classes
             if not of_classes or self._is_asked_by_hand(name):
                 continue  # values that are literals, or asked for in better words
-            members = [each for one in classes for each in self.catalogues.get(one, ())]
+            members = [member for kind in classes for member in self.catalogues.get(kind, ())]
             message = f"{shorten(name)} leads to {self._named(classes)}{' of the ontology' if members else ''}"
             of_range, value = _name("range", name), _name("value", name)
             yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
@@ -98,7 +98,7 @@ class _Ontology:
             yield _shape("catalogue", (name,), message, f"sh:targetClass <{name}> ; {_one_of((name,), individuals)}")
 
     def _properties(self, end: str) -> list[str]:
-        return sorted(one.value for one in self._said.having(RDFS + end) if self._is_own(one))
+        return sorted(node.value for node in self._said.having(RDFS + end) if self._is_own(node))
 
     def _is_functional(self, name: str) -> bool:
         return NamedNode(OWL + "FunctionalProperty") in self._said.values(NamedNode(name), TYPE.value)
@@ -115,7 +115,7 @@ class _Ontology:
         if isinstance(cell_or_class, NamedNode):
             return (cell_or_class.value,)
         members = self._said.items(self._said.value(cell_or_class, OWL + "unionOf"))
-        return tuple(one.value for one in members if isinstance(one, NamedNode))
+        return tuple(member.value for member in members if isinstance(member, NamedNode))
 
     def _is_asked_by_hand(self, name: str) -> bool:
         """Whether shapes by hand ask for the class of a property's values, of all that may have the property."""
@@ -127,27 +127,28 @@ class _Ontology:
             for target in self._by_hand.values(shape, "targetClass")
         }
         subjects = self._classes_of(name, "domain")
-        return bool(subjects) and all(asked & self._above(NamedNode(one)) for one in subjects)
+        return bool(subjects) and all(asked & self._above(NamedNode(subject)) for subject in subjects)
 
-    def _above(self, one: Node) -> set[Node]:
+    def _above(self, kind: Node) -> set[Node]:
         """Return a class with those that it is below of."""
-        above, todo = set[Node](), [one]
+        above, todo = set[Node](), [kind]
         while todo:
-            each = todo.pop()
-            if each not in above:
-                above.add(each)
-                todo += self._said.values(each, SUB_CLASS_OF.value)
+            node = todo.pop()
+            if node not in above:
+                above.add(node)
+                todo += self._said.values(node, SUB_CLASS_OF.value)
         return above
 
     def _individuals(self, name: str) -> list[str]:
         """Return the individuals that the ontology says of a class; of classes below as well where it says any."""
         if not self._said.having(TYPE.value, name):
             return []
-        below = [one for one in self._classes if NamedNode(name) in self._above(one)]
-        return sorted({str(each.value) for one in below for each in self._said.having(TYPE.value, one.value)})  # type: ignore[union-attr]
+        below = [kind for kind in self._classes if NamedNode(name) in self._above(kind)]
+        individuals = (node for kind in below for node in self._said.having(TYPE.value, kind.value))
+        return sorted({str(individual.value) for individual in individuals})  # type: ignore[union-attr]
 
     def _named(self, classes: Classes) -> str:
-        return " or ".join(f"{_article(self._label(one))} {self._label(one)} ({shorten(one)})" for one in classes)
+        return " or ".join(f"{_article(self._label(kind))} {self._label(kind)} ({shorten(kind)})" for kind in classes)
 
     def _label(self, name: str) -> str:
         return self._said.text(NamedNode(name), RDFS + "label") or shorten(name)
@@ -166,13 +167,13 @@ def _of_classes(classes: Classes) -> str:
     if len(classes) == 1:
         return f"sh:class <{classes[0]}>"
     union = _name("union", *classes)
-    return f"sh:class {union} . " + " . ".join(f"<{one}> rdfs:subClassOf {union}" for one in classes)
+    return f"sh:class {union} . " + " . ".join(f"<{kind}> rdfs:subClassOf {union}" for kind in classes)
 
 
 def _one_of(classes: Classes, members: Sequence[str]) -> str:
     """Return that a value is one of some individuals, which a list with a name holds."""
     members_of = _name("members", *classes)
-    first, *others = (f"<{one}>" for one in members)
+    first, *others = (f"<{member}>" for member in members)
     return f"sh:in {members_of} . {members_of} rdf:first {first} ; rdf:rest ( {' '.join(others)} )"
 
 

@@ -35,14 +35,18 @@ class Shapes(BySubject):
 
     def prefixes(self, node: Node) -> dict[str, str]:
         """Return the prefixes that a query's sh:prefixes declare, with their namespaces."""
-        declared = (it for ontology in self.values(node, "prefixes") for it in self.values(ontology, "declare"))
-        return {self.text(it, "prefix"): self.text(it, "namespace") for it in declared}
+        declared = (
+            declaration
+            for ontology in self.values(node, "prefixes")
+            for declaration in self.values(ontology, "declare")
+        )
+        return {self.text(declaration, "prefix"): self.text(declaration, "namespace") for declaration in declared}
 
     def is_deactivated(self, node: Node) -> bool:
         """Whether a shape or rule is switched off."""
         off = self.value(node, "deactivated")
         return isinstance(off, Literal) and off.value in ("true", "1")
 
-    def fault(self, node: Node, what: str) -> InputError:
+    def fault(self, node: Node, problem: str) -> InputError:
         """Return the error of a shape that cannot be understood."""
-        return InputError(f"{self.source}: {shorten(getattr(node, 'value', str(node)))}: {what}")
+        return InputError(f"{self.source}: {shorten(getattr(node, 'value', str(node)))}: {problem}")

@@ -47,8 +47,8 @@ class _Writer:
     def __init__(self, shapes: Shapes, classes: Iterable[Triple]):
         self._shapes = shapes
         self._below: dict[Node, set[Node]] = {}
-        for one in classes:
-            self._below.setdefault(one.object, set()).add(one.subject)
+        for triple in classes:
+            self._below.setdefault(triple.object, set()).add(triple.subject)
         self._numbers = count()
 
     def queries(self) -> Iterator[str]:
@@ -81,7 +81,7 @@ class _Writer:
             new = self._below.get(todo.pop(), set()) - kinds
             kinds |= new
             todo += new
-        if all(isinstance(one, NamedNode) for one in kinds):
+        if all(isinstance(node, NamedNode) for node in kinds):
             names = sorted(map(str, kinds))
             if variable == _KIND:  # its individuals are looked up
                 return f"VALUES {variable} {{ {' '.join(names)} }}"
@@ -102,8 +102,8 @@ class _Writer:
         if name == "node":
             return " && ".join(self._conditions(value, node)) or "true"
         if name == "or":
-            either = [" && ".join(self._conditions(one, node)) or "true" for one in self._shapes.items(value)]
-            return f"({' || '.join(f'COALESCE({one}, false)' for one in either) or 'false'})"
+            either = [" && ".join(self._conditions(shape, node)) or "true" for shape in self._shapes.items(value)]
+            return f"({' || '.join(f'COALESCE({condition}, false)' for condition in either) or 'false'})"
         if name == "class":
             kind = self._name()
             return f"EXISTS {{ {node} a {kind} {self._of_kind(kind, value)} }}"
@@ -127,21 +127,21 @@ class _Writer:
             if name in _SAYS_NOTHING:
                 continue
             for value in values:
-                one, other = self._name(), self._name()
+                variable, other = self._name(), self._name()
                 if short == "minCount" and value == _integer(1):
-                    yield f"EXISTS {{ {node} {path} {one} }}"
+                    yield f"EXISTS {{ {node} {path} {variable} }}"
                 elif short == "maxCount" and value == _integer(0):
-                    yield f"NOT EXISTS {{ {node} {path} {one} }}"
+                    yield f"NOT EXISTS {{ {node} {path} {variable} }}"
                 elif short == "maxCount" and value == _integer(1):
-                    several = f"{node} {path} {one} , {other} FILTER(!sameTerm({one}, {other}))"
+                    several = f"{node} {path} {variable} , {other} FILTER(!sameTerm({variable}, {other}))"
                     yield f"NOT EXISTS {{ {several} }}"
                 elif short in _BESIDE:
-                    keeps = f"{one} {_BESIDE[short]} {other}"
-                    both = f"{node} {path} {one} ; {value} {other}"
+                    keeps = f"{variable} {_BESIDE[short]} {other}"
+                    both = f"{node} {path} {variable} ; {value} {other}"
                     yield f"NOT EXISTS {{ {both} FILTER(!COALESCE({keeps}, false)) }}"
                 else:
-                    keeps = self._condition(short, value, one)
-                    yield f"NOT EXISTS {{ {node} {path} {one} FILTER(!COALESCE({keeps}, false)) }}"
+                    keeps = self._condition(short, value, variable)
+                    yield f"NOT EXISTS {{ {node} {path} {variable} FILTER(!COALESCE({keeps}, false)) }}"
 
     def _select(self, constraint: Node) -> str:
         """Return a constraint's query; an empty one, which suspects all, where its prefixes are not the usual ones."""
@@ -166,7 +166,7 @@ class _Writer:
         return f"{datatype}(STR({node})) = {node}"
 
     def _is_in(self, node: str, items: list[Node]) -> str:
-        if not all(isinstance(one, NamedNode) or _is_plain(one) for one in items):
+        if not all(isinstance(item, NamedNode) or _is_plain(item) for item in items):
             raise _Unknown("in")  # numbers are equal to others that are written otherwise
         return f"{node} IN ({', '.join(map(str, items))})"
 

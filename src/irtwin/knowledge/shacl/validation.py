@@ -118,7 +118,7 @@ def _results(ontology: Ontology, regions: list[Region]) -> Results:
         return
     report = _report(ontology, frozenset(region.asserted))
     if report is not None:
-        yield from ((one, report.cbd(one)) for one in _about(report, region.nodes or ontology.terms))
+        yield from ((result, report.cbd(result)) for result in _about(report, region.nodes or ontology.terms))
 
 
 def _about(report: rdflib.Graph, nodes: Iterable[object]) -> list[rdflib.term.Node]:
@@ -136,7 +136,7 @@ def _empty() -> rdflib.Graph:
 
 def _robots(graph: KnowledgeGraph, ontology: Ontology, report: rdflib.Graph) -> dict[str, str]:
     """Return the robots of a report's nodes, by their IRIs, where these are one robot's alone: in the same part."""
-    focused = {NamedNode(str(it)) for it in report.objects(None, SH.focusNode) if isinstance(it, rdflib.URIRef)}
+    focused = {NamedNode(str(node)) for node in report.objects(None, SH.focusNode) if isinstance(node, rdflib.URIRef)}
     robots: dict[str, str] = {}
     for region in parts.some(graph, ontology, focused - ontology.terms, asserted=True):
         assert region is not None  # for no term of the ontology was asked

@@ -71,7 +71,7 @@ def backup(place: Workspace, graph: KnowledgeGraph, archive: Path) -> None:
                     connection.execute(select(func.count()).select_from(Base.metadata.sorted_tables[0]))
                     contents = dict(_linked(place.folder, held))
                     own = (*place.resources.files, *place.resources.left_aside)
-                    contents |= {f"{it.kind}/{it.name}": it.path for it in own if it.is_of_workspace}
+                    contents |= {f"{file.kind}/{file.name}": file.path for file in own if file.is_of_workspace}
                 contents |= _dump_rows(connection, held)
                 named = named_files(connection)
         lost = [file for file in named if file.path not in contents]
@@ -139,10 +139,10 @@ def _put_in_place(held: Path, folder: Path) -> None:
     held.rename(folder)
 
 
-def _incomplete(place: Path, lost: Sequence[NamedFile], what: str, then: str) -> str:
+def _incomplete(place: Path, lost: Sequence[NamedFile], flaw: str, then: str) -> str:
     robots = ", ".join(sorted({file.robot_id for file in lost}))
     return (
-        f"{place}: {lost[0].path}{f' and {len(lost) - 1} more files' if len(lost) > 1 else ''} {what}; {then}: run the "
+        f"{place}: {lost[0].path}{f' and {len(lost) - 1} more files' if len(lost) > 1 else ''} {flaw}; {then}: run the "
         f"data set of {robots} again, or take the robot out by `irtwin workspace drop`"
     )
 

@@ -15,7 +15,9 @@ _NAMED_AT_ONCE = 5_000  # IRIs in a query
 
 def has_blank_node(statements: Iterable[Quad | Triple]) -> bool:
     """Whether a subject or an object is a blank node."""
-    return any(isinstance(term, BlankNode) for one in statements for term in (one.subject, one.object))
+    return any(
+        isinstance(term, BlankNode) for statement in statements for term in (statement.subject, statement.object)
+    )
 
 
 def named_by_content(triples: Iterable[Triple], content: bytes) -> Iterator[Triple]:
@@ -32,8 +34,10 @@ def named_by_content(triples: Iterable[Triple], content: bytes) -> Iterator[Trip
 
     may_be_blank = (BlankNode, Triple)
     return (
-        cast(Triple, named(it)) if isinstance(it.subject, may_be_blank) or isinstance(it.object, may_be_blank) else it
-        for it in triples
+        cast(Triple, named(triple))
+        if isinstance(triple.subject, may_be_blank) or isinstance(triple.object, may_be_blank)
+        else triple
+        for triple in triples
     )
 
 

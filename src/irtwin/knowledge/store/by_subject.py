@@ -35,7 +35,7 @@ class BySubject:
         """Return the subjects that have a property, by its whole IRI; with that value, an IRI, if one is given."""
         wanted = None if value is None else NamedNode(value)
         subjects = self._having.get(name, {})
-        return [one for one in subjects if wanted is None or wanted in self._objects[one][name]]
+        return [subject for subject in subjects if wanted is None or wanted in self._objects[subject][name]]
 
     def said_of(self, node: Node | None) -> list[tuple[str, list[Node]]]:
         """Return all properties of a node, by their whole IRIs, with their values."""

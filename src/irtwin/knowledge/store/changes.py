@@ -78,7 +78,7 @@ def _into_place(store: Store, quad: Quad) -> bool:
     if quad.predicate not in INTO_PLACES:
         return False
     types = store.quads_for_pattern(quad.object, TYPE, None, None)  # type: ignore[arg-type]
-    return any(it.object in PLACES and is_asserted(it) for it in types)
+    return any(kind.object in PLACES and is_asserted(kind) for kind in types)
 
 
 def _note(reader: str, node: object) -> Quad:

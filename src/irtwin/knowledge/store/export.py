@@ -84,7 +84,10 @@ def _declarations(triples: Iterable[Triple]) -> set[Triple]:
 def _labels(triples: Iterable[Triple], base: str) -> set[Triple]:
     """Label each individual that has no label by its IRI below the base: "joint energy KUKA.palletising, joint_a1"."""
     labelled = {triple.subject for triple in triples if triple.predicate == _LABEL}
-    return {Triple(one, _LABEL, Literal(_label(one.value, base))) for one in _of_type(triples, _INDIVIDUAL) - labelled}
+    return {
+        Triple(individual, _LABEL, Literal(_label(individual.value, base)))
+        for individual in _of_type(triples, _INDIVIDUAL) - labelled
+    }
 
 
 def _label(iri: str, base: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -67,6 +67,7 @@ class KnowledgeGraph:
         self._base = base
         self._says_first = False  # whether the next change has it say first that it is behind
         self.read: dict[str, Any] = {}
+        self.seen: str | None = None  # what names the state of the files that a view of a folder shows
         self.answers = answers_of(self.store)
 
     @classmethod
@@ -255,7 +256,7 @@ class KnowledgeGraph:
         PREFIX. InputError where the text is no such query, asks another server, or has too many answers.
         """
         given = (bindings or {}).items()
-        text = bound(text, {name: self.iri(one) if isinstance(one, str) else one for name, one in given})
+        text = bound(text, {name: self.iri(value) if isinstance(value, str) else value for name, value in given})
         answers = self.answers
         kept = answers.get(text)
         if kept is None:
@@ -280,15 +281,16 @@ class KnowledgeGraph:
         named_graphs: Sequence[str] = (),
         faults: dict[str, None] | None = None,
         base: str | None = None,
+        services: Collection[str] = (),
     ) -> QuerySolutions | QueryBoolean | QueryTriples:
-        """Answer a query row by row as they are found; InputError where it is none or asks another server.
+        """Answer a query row by row as they are found; InputError where it is none or asks a server not of `services`.
 
         Graphs that are given are the query's dataset, as in the SPARQL 1.1 Protocol; else all of them are.
         `faults` is told why functions had no answer, while the rows are found. Relative IRIs are below `base`,
         else below the graph's.
         """
         base = base or self.base
-        refuse_service(text, base, self.store.embedded is None)
+        refuse_service(text, base, self.store.embedded is None, services)
         whole = not (default_graphs or named_graphs)
         try:
             return self.store.query(

@@ -8,7 +8,7 @@ has to agree with Oxigraph's; see `docs/decisions/security.md`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from string import ascii_lowercase
 
@@ -24,12 +24,17 @@ _CODE_POINT = re.compile(r"\\u([0-9A-Fa-f]{4})|\\U([0-9A-Fa-f]{8})")
 _ABSENT = "CLEAR GRAPH <urn:x-irtwin:absent> ;"  # fails on an empty store before anything after it is done
 
 
-def refuse_service(text: str, base: str | None, code_points_first: bool = False) -> None:
-    """Raise InputError where a query asks another server, or may.
+def refuse_service(
+    text: str, base: str | None, code_points_first: bool = False, services: Collection[str] = ()
+) -> None:
+    """Raise InputError where a query asks another server than `services`, or may.
 
+    One of those is written as it stands there, `SERVICE <IRI>`: by no prefix, variable or escape.
     `code_points_first` is for servers, which may take `\\u0053` for a letter anywhere. Oxigraph does so in strings and
     IRIs alone.
     """
+    for service in services:
+        text = _as_graph(text, service)
     why = "SERVICE asks another server, which is not allowed here: ask this graph alone (where SERVICE is no clause"
     _refuse(text, ("service",), parse_query, base, code_points_first, why)
 
@@ -89,6 +94,12 @@ def is_update(text: str, base: str | None) -> bool:
     except SyntaxError:
         return False
     return True
+
+
+def _as_graph(text: str, service: str) -> str:
+    """Return the text with GRAPH for SERVICE before an IRI: it may stand wherever that may, and asks nobody."""
+    clause = rf"(?i:service)(?:[ \t\r\n]+(?i:silent))?(?=[ \t\r\n]*<{re.escape(service)}>)"
+    return re.sub(clause, "GRAPH", text, flags=re.ASCII)
 
 
 def _misspelt(text: str, word: str) -> str | None:

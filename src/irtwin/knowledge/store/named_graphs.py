@@ -40,7 +40,7 @@ def is_of_many(name: str) -> bool:
 
 def is_below(name: str, below: tuple[str, ...]) -> bool:
     """Whether one of some names stands for a graph."""
-    return any(name.startswith(one) if is_of_many(one) else name == one for one in below)
+    return any(name.startswith(graph) if is_of_many(graph) else name == graph for graph in below)
 
 
 def names_in(store: Store | SparqlServer) -> list[str]:

@@ -17,12 +17,28 @@ from irtwin.resources import Resources
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
 ELECTRICITY = NamedNode(f"{TARIFF}electricity")
+LIMIT_VALUE, SOURCE = NamedNode(term("Limit_Value")), NamedNode(f"{DCTERMS}source")
 
 
 def quads(resources: Resources, workspace: Path | None) -> Iterator[Quad]:
     """Yield what the ontology's graph says."""
     more = chain(_tariff(workspace), [version(resources, workspace)])
-    return chain(_read_modules(*_modules(resources)), in_graph(more, GRAPH_ONTOLOGY))
+    return chain(of_modules(resources), in_graph(more, GRAPH_ONTOLOGY))
+
+
+def of_modules(resources: Resources) -> tuple[Quad, ...]:
+    """Return what the modules say, without the tariff."""
+    return _read_modules(*_modules(resources))
+
+
+def limits(resources: Resources) -> dict[tuple[NamedNode, NamedNode], Quad]:
+    """Return what the modules say of the value and source of each limit, by limit and property."""
+    about = {
+        (quad.subject, quad.predicate): quad
+        for quad in of_modules(resources)
+        if quad.predicate in (LIMIT_VALUE, SOURCE) and isinstance(quad.subject, NamedNode)
+    }
+    return {(subject, name): quad for (subject, name), quad in about.items() if (subject, LIMIT_VALUE) in about}
 
 
 def version(resources: Resources, workspace: Path | None) -> Triple:
@@ -51,7 +67,7 @@ def _tariff(workspace: Path | None) -> Iterator[Triple]:
     for name, value in known.items():
         yield Triple(ELECTRICITY, NamedNode(name), Literal(value))
     if known:
-        yield Triple(ELECTRICITY, NamedNode(f"{DCTERMS}source"), Literal(FILE))
+        yield Triple(ELECTRICITY, SOURCE, Literal(FILE))
 
 
 @lru_cache(maxsize=1)  # a run puts them into two graphs

@@ -34,9 +34,13 @@ class KeptAnswers:
                 self._answers[(text, *beside)] = kept
             return kept
 
+    def can_keep(self, text: str) -> bool:
+        """Whether a query's text alone says what is answered."""
+        return bool(self._most) and not _NOT_KEPT.search(text)
+
     def keep(self, answer: Any, text: str, *beside: Hashable) -> None:
-        """Keep an answer, if the query's text alone says what it is."""
-        if not self._most or _NOT_KEPT.search(text):
+        """Keep an answer, if it can be."""
+        if not self.can_keep(text):
             return
         with self._lock:
             self._answers[(text, *beside)] = answer

@@ -112,6 +112,7 @@ class Snapshot:
         view, graph = _whole(self._source, opened)
         self._view.close()
         self._view, self.graph = view, graph
+        graph.seen = repr(self._seen)
 
 
 def _links(source: Path, held: ExitStack, copied: tuple[str, ...] = ()) -> Path | None:

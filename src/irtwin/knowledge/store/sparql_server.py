@@ -120,11 +120,11 @@ class SparqlServer:
     def holding(self, triples: Iterable[Triple]) -> Iterator[Quad]:
         """Yield the quads of named graphs that say one of the triples; a blank node is any, as a server has its own."""
         every = list(triples)
-        blank = [one for one in every if any(isinstance(term, BlankNode) for term in one)]
-        wanted = [one for one in every if one not in blank]
-        for one in blank:
-            for row in cast(QuerySolutions, self.query(f"SELECT DISTINCT ?g {{ GRAPH ?g {{ {one} }} }}")):
-                yield Quad(one.subject, one.predicate, one.object, row["g"])
+        blank = [triple for triple in every if any(isinstance(term, BlankNode) for term in triple)]
+        wanted = [triple for triple in every if triple not in blank]
+        for triple in blank:
+            for row in cast(QuerySolutions, self.query(f"SELECT DISTINCT ?g {{ GRAPH ?g {{ {triple} }} }}")):
+                yield Quad(triple.subject, triple.predicate, triple.object, row["g"])
         for start in range(0, len(wanted), _AT_ONCE):
             values = " ".join(f"({t.subject} {t.predicate} {t.object})" for t in wanted[start : start + _AT_ONCE])
             query = f"SELECT ?s ?p ?o ?g {{ VALUES (?s ?p ?o) {{ {values} }} GRAPH ?g {{ ?s ?p ?o }} }}"

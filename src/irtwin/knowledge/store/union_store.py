@@ -100,8 +100,10 @@ class UnionStore:
         """Yield the quads of named graphs that say one of the triples."""
         if isinstance(self._store, SparqlServer):
             return self._store.holding(triples)
-        found = (self._store.quads_for_pattern(it.subject, it.predicate, it.object, None) for it in triples)
-        return (quad for quads in found for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
+        matches = (
+            self._store.quads_for_pattern(triple.subject, triple.predicate, triple.object, None) for triple in triples
+        )
+        return (quad for quads in matches for quad in quads if not isinstance(quad.graph_name, DefaultGraph))
 
     def load(self, quads: Iterator[Quad], below: tuple[str, ...]) -> None:
         """Put quads into graphs of an embedded store that are not there yet; take them out again where that fails."""

@@ -79,10 +79,10 @@ def flows(rows: Sequence[Row]) -> Flows | None:
     sources = {(name, _BUS): value for name, value in ((_SUPPLY, total - back), (_BACK, back)) if value > 0}
     places, effects = (_sums(taken, end) for end in (0, 1))
     links = (sources, {(_BUS, place): value for place, value in places.items()}, taken)
-    columns = _sums(sources, 0), {_BUS: total}, places, dict(sorted(effects.items(), key=lambda one: -one[1]))
+    columns = _sums(sources, 0), {_BUS: total}, places, dict(sorted(effects.items(), key=lambda item: -item[1]))
     nodes = _placed(columns, total, colours)
     ends = zip(links, nodes, nodes[1:], strict=False)
-    ribbons = [one for some, starts, stops in ends for one in _ribbons(some, starts, stops, intervals)]
+    ribbons = [ribbon for some, starts, stops in ends for ribbon in _ribbons(some, starts, stops, intervals)]
     return Flows(tuple(node for column in nodes for node in column.values()), tuple(ribbons))
 
 
@@ -125,8 +125,8 @@ def _ribbons(links: Links, starts: Mapping[str, Node], ends: Mapping[str, Node],
     scale = sum(node.height for node in starts.values()) / sum(links.values())
     ribbons = []
     for start, end in ((start, end) for start in starts for end in ends if (start, end) in links):
-        height, one, other = links[start, end] * scale, starts[start], ends[end]
-        left, right = one.y + used[start, True], other.y + used[end, False]
+        height, source, target = links[start, end] * scale, starts[start], ends[end]
+        left, right = source.y + used[start, True], target.y + used[end, False]
         used[start, True] += height
         used[end, False] += height
         words, unsure = f"{start} to {end}: {wording.energy(links[start, end])}", False
@@ -134,8 +134,8 @@ def _ribbons(links: Links, starts: Mapping[str, Node], ends: Mapping[str, Node],
         if lower is not None and upper is not None:
             words += f", between {wording.energy(lower)} and {wording.energy(upper)}"
             unsure = is_unsure(links[start, end], lower, upper)
-        colour = one.colour if other.colour == _PLAIN else other.colour
-        ribbons.append(Ribbon(_path(one.x + Flows.bar, left, other.x, right, height), words, colour, unsure))
+        colour = source.colour if target.colour == _PLAIN else target.colour
+        ribbons.append(Ribbon(_path(source.x + Flows.bar, left, target.x, right, height), words, colour, unsure))
     return ribbons
 
 

@@ -80,16 +80,19 @@ def made(answers: Answers) -> list[str]:
     """Return in words what a piece of each product took, and a cycle; electrical and mechanical energy apart."""
     sentences = []
     for row in answers["made"].rows:
-        what = {"measured": "measured", "modelled": "by the twin"}.get(
+        source = {"measured": "measured", "modelled": "by the twin"}.get(
             row["energy_from"], "of mechanical work, by the twin"
         )
         product = row["product"]
-        for one, many, joules in (("piece", row["pieces"], row["pieces_j"]), ("cycle", row["cycles"], row["cycles_j"])):
+        for unit, many, joules in (
+            ("piece", row["pieces"], row["pieces_j"]),
+            ("cycle", row["cycles"], row["cycles_j"]),
+        ):
             if many:
-                each = product if product and one == "piece" else f"{one} of {product}" if product else one
+                subject = product if product and unit == "piece" else f"{unit} of {product}" if product else unit
                 sentences.append(
-                    f"Each {each} took {wording.energy(joules / many)}, {what}: the mean of {wording.decimals(many)} "
-                    f"{one}{'s' * (many != 1)}, waiting within the runs included."
+                    f"Each {subject} took {wording.energy(joules / many)}, {source}: the mean of "
+                    f"{wording.decimals(many)} {unit}{'s' * (many != 1)}, waiting within the runs included."
                 )
     return sentences
 

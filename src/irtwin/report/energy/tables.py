@@ -75,13 +75,13 @@ def conclusions(rows: Sequence[Row], explain: Explain | None = None) -> list[Row
     """
     gathered: list[Row] = []
     for iri, group in groupby(rows, key=lambda row: row["conclusion"]):
-        found = list(group)
-        first, fact = found[0], [found[0][name] for name in ("about", "property", "object")]
+        members = list(group)
+        first, fact = members[0], [members[0][name] for name in ("about", "property", "object")]
         gathered.append({
             "label": first["label"] or wording.local_name(iri).replace("_", " "),
             "definition": first["definition"],
-            "about": list(dict.fromkeys(map(_about, found))),
-            "by": list(dict.fromkeys(_reasoner(row["concluded_by"]) for row in found)),
+            "about": list(dict.fromkeys(map(_about, members))),
+            "by": list(dict.fromkeys(_reasoner(row["concluded_by"]) for row in members)),
             "known": None if explain is None or first["object"] is None else explain(*fact),
         })  # fmt: skip
     return gathered

@@ -23,8 +23,8 @@ OtherNumber = tuple[str, str | None, float, float, str]
 class ToldFinding:
     """A finding as it is told: `members`, for each of its causes, the cause and what the data cannot tell from it.
 
-    against: what it is held against: "twin", "reference" or "simulated" runs, or "both" of these. share, interval: of
-    its channel's gap that closes, `of` what it is a share.
+    against: what it is held against: "twin", "reference" or "simulated" runs. share, interval: of its channel's gap
+    that closes, `of` what it is a share.
     """
 
     family: str
@@ -49,8 +49,8 @@ class ToldFinding:
         """What is said of the family; of a guess, no more than that it is one."""
         if not self.likely:
             return f"perhaps {self.place}"
-        said = _CLAIMS[self.against]
-        return f"{self.place} {said.replace('differs', 'differ') if self.family == 'bodies' else said}"
+        claim = _CLAIMS[self.against]
+        return f"{self.place} {claim.replace('differs', 'differ') if self.family == 'bodies' else claim}"
 
     @property
     def likely(self) -> bool:
@@ -91,7 +91,6 @@ _CLAIMS = {
     "twin": "differs from the twin’s",
     "reference": "changed since the reference runs",
     "simulated": "differs from the simulator’s",
-    "both": "changed since the reference runs, and differs from the simulator’s",
 }
 
 
@@ -113,18 +112,18 @@ def sentence(
     because: str | None = None,
     differ: str = "",
     has_floor: bool = True,
-    misses: str | None = None,
+    agrees: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `misses`: by how much a simulator does, where it is held against one.
+    `has_floor`: whether a noise floor is known; `agrees`: how far a simulator does, where it is held against one.
     """
     if verdict == "no_gap":
-        if misses is not None:
+        if agrees is not None:
             beside = f" Beyond this, {counted(findings)}." if findings else ""
-            return f"There is no gap: the simulator agrees with the robot, to {misses}.{beside}"
+            return f"There is no gap: the simulator agrees with the robot, {agrees}.{beside}"
         if not findings and not has_floor:
             return (
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."
@@ -133,8 +132,8 @@ def sentence(
             return "There is no gap: away from reversals the twin explains the data down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
-    rest = [one for one in findings if one not in told]
-    words, guessed = "; ".join(one.sentence for one in told), not any(one.likely for one in told)
+    rest = [finding for finding in findings if finding not in told]
+    words, guessed = "; ".join(finding.sentence for finding in told), not any(finding.likely for finding in told)
     beside = f" Beyond this, {counted(rest)}." if rest else ""
     if verdict == "unexplained" and because != "unsure":
         part = "" if not told else f" Part of it is {words}." if guessed else f" Part of it is closed: {words}."
@@ -144,7 +143,7 @@ def sentence(
     elif guessed:
         words = f"several effects explain the gap{where}, and none of them is sure: {words}"
     if closes is None:
-        closes = "".join(_closes(one, len(told)) for one in told[:1])
+        closes = "".join(_closes(finding, len(told)) for finding in told[:1])
     differing = f" Besides, runs of one motion differ by {differ}, which no effect explains." if differ else ""
     unsure = " How much of the gap that makes is not sure." if verdict == "unexplained" and not guessed else ""
     return f"{words[:1].upper()}{words[1:]}.{unsure}{closes}{differing}{beside}"
@@ -152,8 +151,9 @@ def sentence(
 
 def _told(findings: Sequence[ToldFinding]) -> list[ToldFinding]:
     """Return the findings that are named, in their order: of those that matter the likely ones, then guesses."""
-    those = sorted((one for one in findings if one.matters), key=lambda one: not one.likely)[:_NAMED]
-    return [one for one in findings if one in those]
+    mattering = (finding for finding in findings if finding.matters)
+    those = sorted(mattering, key=lambda finding: not finding.likely)[:_NAMED]
+    return [finding for finding in findings if finding in those]
 
 
 def _left(because: str | None, where: str, differ: str) -> str:
@@ -165,12 +165,12 @@ def _left(because: str | None, where: str, differ: str) -> str:
     return f"There is a gap{where}, and no effect in the catalogue closes it."
 
 
-def _closes(one: ToldFinding, count: int) -> str:
+def _closes(finding: ToldFinding, count: int) -> str:
     """Say what the first of so many findings closes by itself."""
-    what = "That" if count == 1 else "The first of these"
-    of = "gap in" if one.of.startswith("the gap") else "mean square of"
-    share = f"{wording.part(one.share)} of the {of} {one.channel} on held-out runs"
-    return f" {what} closes {share} {within(one.interval)}."
+    subject = "That" if count == 1 else "The first of these"
+    of = "gap in" if finding.of.startswith("the gap") else "mean square of"
+    share = f"{wording.part(finding.share)} of the {of} {finding.channel} on held-out runs"
+    return f" {subject} closes {share} {within(finding.interval)}."
 
 
 def other_numbers(differing: Sequence[OtherNumber]) -> str:
@@ -182,8 +182,8 @@ def other_numbers(differing: Sequence[OtherNumber]) -> str:
     """
     words = {name: f"{word} ({name})" for effect in catalogue().values() for name, word in effect.in_mjcf.items()}
 
-    def apart(one: OtherNumber) -> float:
-        _, _, model, robot, _ = one
+    def apart(number: OtherNumber) -> float:
+        _, _, model, robot, _ = number
         return abs(math.log(robot / model)) if robot / (model or math.inf) > 0 else math.inf
 
     told = [
@@ -218,8 +218,8 @@ def folded(count: int, channel: str, share: float) -> str:
 def counted(findings: Sequence[ToldFinding]) -> str:
     """Count findings, by channel, with what they close together; empty where there are none."""
     of_channel: dict[str, list[float]] = {}
-    for one in findings:
-        of_channel.setdefault(one.channel, []).append(one.share)
+    for finding in findings:
+        of_channel.setdefault(finding.channel, []).append(finding.share)
     return wording.listed([folded(len(shares), channel, sum(shares)) for channel, shares in of_channel.items()])
 
 

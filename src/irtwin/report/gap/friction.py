@@ -16,17 +16,17 @@ _BANDED = "33"  # how opaque a band is, in hexadecimal
 def figures(curves: Sequence[FrictionCurve]) -> dict[str, Figure]:
     """Return a figure of each joint's friction, on one side or on two, by the joint's name."""
     joints = dict.fromkeys(curve.joint for curve in reversed(curves))  # the sides that follow hold all of them
-    return {joint: _figure([one for one in curves if one.joint == joint]) for joint in reversed(joints)}
+    return {joint: _figure([curve for curve in curves if curve.joint == joint]) for joint in reversed(joints)}
 
 
 def table(curves: Sequence[FrictionCurve], names: Mapping[str, str]) -> tuple[ParameterLine, ...]:
     """Return a line for each number of friction and side, with a cell a joint; `names`: of effects, by their ids."""
     cells: dict[tuple[str, str, str, str], dict[str, ParameterCell]] = {}
     for curve in curves:
-        for one in curve.numbers:
-            value, interval = wording.interval(one.value, one.lower, one.upper)
-            cell = ParameterCell(value, interval, is_unsure(one.value, one.lower, one.upper))
-            cells.setdefault((one.effect, one.name, one.unit, curve.role), {})[curve.joint] = cell
+        for number in curve.numbers:
+            value, interval = wording.interval(number.value, number.lower, number.upper)
+            cell = ParameterCell(value, interval, is_unsure(number.value, number.lower, number.upper))
+            cells.setdefault((number.effect, number.name, number.unit, curve.role), {})[curve.joint] = cell
     effects = list(dict.fromkeys(effect for effect, *_ in cells))
     several = len({curve.role for curve in curves}) > 1
     lines = []

@@ -10,7 +10,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
 from irtwin.knowledge.vocabulary import EFFECT
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import closes, differing, misses, where
+from irtwin.report.gap.verdict import agrees, closes, differing, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -25,48 +25,52 @@ _MEANINGS = """SELECT ?effect ?name ?meaning {
 
 def line(diagnosis: Document, against: str | None) -> str:
     """Return in one line what the page says first; `against`: role of the runs compared with, if any."""
-    told = [_told(one, against, diagnosis.causes) for one in diagnosis.findings]
+    told = [_told(finding, against, diagnosis.causes) for finding in diagnosis.findings]
     place = next(iter(diagnosis.locations), None)
     shrink = diagnosis.shrink
     closed = shrink.closed_fraction
-    tracking, torque = (None if one is None else one.before for one in (shrink.position_rmse, shrink.torque_rmse))
+    tracking, torque = (None if error is None else error.before for error in (shrink.position_rmse, shrink.torque_rmse))
     sentence = findings.sentence(
         diagnosis.verdict,
         told,
         "" if place is None else where(place.channel, place.joint, place.regime and _words(place.regime), place.share),
-        None if closed is None else closes(closed.value, closed.interval95, tracking is not None),
+        None if closed is None else closes(closed.value, closed.interval95, against, played=tracking is not None),
         diagnosis.unexplained_because,
         differing(
-            [(one.kind, one.channel, one.joint) for one in diagnosis.not_repeating or () if not one.explained_by]
+            [
+                (disturbance.kind, disturbance.channel, disturbance.joint)
+                for disturbance in diagnosis.not_repeating or ()
+                if not disturbance.explained_by
+            ]
         ),
         shrink.noise_floor_from is not None,
-        misses(against, tracking, torque),
+        agrees(against, tracking, torque),
     )
     numbers = findings.other_numbers([
-        (one.name, one.joint, one.simulator, one.robot, one.unit)
+        (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit)
         for cause in diagnosis.mattering
-        for one in cause.parameters
-        if cause.likely and one.simulator is not None and one.robot is not None
+        for parameter in cause.parameters
+        if cause.likely and parameter.simulator is not None and parameter.robot is not None
     ])  # fmt: skip
     look = findings.look_at(diagnosis.verdict, diagnosis.odd_stretches or ())
     return f"{diagnosis.verdict}: {numbers}{sentence}{look}".replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _told(one: Finding, against: str | None, causes: Sequence[Cause]) -> findings.ToldFinding:
+def _told(finding: Finding, against: str | None, causes: Sequence[Cause]) -> findings.ToldFinding:
     runs = {cause.id: f" in {listed(cause.evidence.runs)}" for cause in causes if cause.evidence.runs}
-    members = [[member for member in one.members if member.cause == cause] for cause in one.causes]
+    members = [[member for member in finding.members if member.cause == cause] for cause in finding.causes]
     return findings.ToldFinding(
-        family=one.family,
-        joints=one.joints,
-        against="twin" if one.scope == "missing" else against or "reference",
-        channel=one.channel,
-        confidence=one.confidence,
-        share=one.share,
-        interval=one.share_interval95,
-        of=one.share_of,
-        matters=one.matters,
+        family=finding.family,
+        joints=finding.joints,
+        against="twin" if finding.scope == "missing" else against or "reference",
+        channel=finding.channel,
+        confidence=finding.confidence,
+        share=finding.share,
+        interval=finding.share_interval95,
+        of=finding.share_of,
+        matters=finding.matters,
         members=tuple(
-            tuple((_words(each.effect) + runs.get(each.cause, ""), each.confidence) for each in some)
+            tuple((_words(member.effect) + runs.get(member.cause, ""), member.confidence) for member in some)
             for some in members
         ),
     )
@@ -104,11 +108,12 @@ def runs(curves: Curves) -> AnswerTable:
     """Return the tracking error of each run that was played, over its joints and at the flange."""
     columns = ("run", "tracking error, rad", "with the causes", "flange, m", "with the causes, m")
     of_run: dict[str, list[RunError]] = {}
-    for one in curves.runs:
-        if one.joint is None and one.of:
-            of_run.setdefault(one.run, []).append(one)
+    for error in curves.runs:
+        if error.joint is None and error.of:
+            of_run.setdefault(error.run, []).append(error)
     rows = [
-        (run, *(_short(value) for one in errors for value in (one.before, one.after))) for run, errors in of_run.items()
+        (run, *(_short(value) for error in errors for value in (error.before, error.after)))
+        for run, errors in of_run.items()
     ]
     return _table(columns, rows)
 
@@ -133,17 +138,17 @@ def filtered(diagnosis: Document) -> list[str]:
 def _differing_friction(diagnosis: Document) -> list[str]:
     spread = diagnosis.friction_spread
     shares = (("dry", spread.dry), ("viscous", spread.viscous)) if spread else ()
-    said = [f"{name} by {100 * share:.2g} %" for name, share in shares if share and share >= _WORTH_SAYING]
-    return [f"Friction differs from run to run, {listed(said)} (one standard deviation): noise."] if said else []
+    told = [f"{name} by {100 * share:.2g} %" for name, share in shares if share and share >= _WORTH_SAYING]
+    return [f"Friction differs from run to run, {listed(told)} (one standard deviation): noise."] if told else []
 
 
-def causes(diagnosis: Document) -> AnswerTable:
+def causes(diagnosis: Document, against: str | None) -> AnswerTable:
     """Return each cause that matters with its confidence and its parameters, these with their 95 % intervals.
 
-    Beside a simulator's model the value is the change from its number to the robot's.
+    Beside a simulator, `against` as of `line`, the value is the change from its number to the robot's.
     """
     rows = tuple(_rows_of_causes(diagnosis))
-    beside = diagnosis.simulator is not None
+    beside = against == "simulated"
     value = ("simulator", "robot", "change") if beside else ("value",)
     columns = ("cause", "joints", "sure, %", "parameter", *value, "95 % from", "to", "unit")
     return AnswerTable(columns, tuple({**row, "change": row["value"]} if beside else row for row in rows))
@@ -160,16 +165,18 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
         nothing = dict.fromkeys(("parameter", "simulator", "robot", "value", "95 % from", "to", "unit"))
         if not cause.parameters:
             yield first | nothing
-        for one in cause.parameters:
-            lower, upper = one.interval95 or (None, None)
+        for parameter in cause.parameters:
+            lower, upper = parameter.interval95 or (None, None)
             yield first | {
-                "parameter": f"{one.name} of {one.joint}" if one.joint and len(cause.joints) > 1 else one.name,
-                "simulator": _short(one.simulator),
-                "robot": _short(one.robot),
-                "value": _short(one.value),
+                "parameter": f"{parameter.name} of {parameter.joint}"
+                if parameter.joint and len(cause.joints) > 1
+                else parameter.name,
+                "simulator": _short(parameter.simulator),
+                "robot": _short(parameter.robot),
+                "value": _short(parameter.value),
                 "95 % from": _short(lower),
                 "to": _short(upper),
-                "unit": "" if one.unit == "1" else one.unit,
+                "unit": "" if parameter.unit == "1" else parameter.unit,
             }
             first = dict.fromkeys(first)  # said once
 
@@ -177,7 +184,9 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 def meanings(diagnosis: Document) -> list[str]:
     """Return what each parameter of the causes that matter means, in the ontology's words, as far as it has any."""
     parameters = {  # each once, and of a vector's parts ("f_x") the whole
-        (cause.effect, one.name.partition("_")[0]): None for cause in diagnosis.mattering for one in cause.parameters
+        (cause.effect, parameter.name.partition("_")[0]): None
+        for cause in diagnosis.mattering
+        for parameter in cause.parameters
     }
     if not parameters:
         return []
@@ -202,7 +211,7 @@ def not_held(causes: Sequence[Cause], diagnosis: Document) -> list[str]:
 
 def _kept(cause: Cause, diagnosis: Document) -> str:
     """Return what a model leaves of its tracking error that has all numbers of the robot but a cause's."""
-    by = "irtwin.simulator.callback" if any(one.name == _CALLED_BACK for one in cause.parameters) else "it"
+    by = "irtwin.simulator.callback" if any(parameter.name == _CALLED_BACK for parameter in cause.parameters) else "it"
     for change in diagnosis.shrink.by_cause:
         if change.cause == cause.id and change.channel == "position":
             left, all_ = (1e3 * pooled(some) for some in (change.rmse_when_left_out, change.rmse_with_all))

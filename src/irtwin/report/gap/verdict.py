@@ -21,25 +21,27 @@ def sentence(answers: Answers) -> str:
     place, closed = answers["locations"].first, answers["closed"].first
     ends = None if closed is None or closed["lower"] is None else (closed["lower"], closed["upper"])
     played = judged["tracking_error"] is not None
-    likely = {one["cause"] for one in answers["causes"].rows if one["told"] and one["confidence"] >= LIKELY}
+    likely = {cause["cause"] for cause in answers["causes"].rows if cause["told"] and cause["confidence"] >= LIKELY}
     numbers = findings.other_numbers([
-        (one["name"], one["joint"], one["simulator"], one["robot"], one["unit"])
-        for one in answers["cause_parameters"].rows
-        if one["simulator"] is not None and one["cause"] in likely
+        (number["name"], number["joint"], number["simulator"], number["robot"], number["unit"])
+        for number in answers["cause_parameters"].rows
+        if number["simulator"] is not None and number["cause"] in likely
     ])  # fmt: skip
-    said = findings.sentence(
+    words = findings.sentence(
         wording.local_name(judged["verdict"]),
         told(answers),
         "" if place is None else where(place["channel"], place["joint"], place["regime"], place["share"]),
-        None if closed is None else closes(closed["closed"], ends, played),
+        None if closed is None else closes(closed["closed"], ends, _against(judged), played=played),
         judged["reason"] and wording.local_name(judged["reason"]),
         differing([
-            (one["kind"], one["channel"], one["joint"]) for one in answers["disturbances"].rows if not one["cause"]
+            (disturbance["kind"], disturbance["channel"], disturbance["joint"])
+            for disturbance in answers["disturbances"].rows
+            if not disturbance["cause"]
         ]),
         judged["floor_from"] is not None,
-        misses(_against(judged), judged["tracking_error"], judged["torque_error"]),
+        agrees(_against(judged), judged["tracking_error"], judged["torque_error"]),
     )  # fmt: skip
-    return numbers + said + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
+    return numbers + words + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
 
 def _odd_stretches(answers: Answers) -> list[OddStretch]:
@@ -58,12 +60,12 @@ def told(answers: Answers) -> list[ToldFinding]:
 def _finding(row: Row, answers: Answers) -> ToldFinding:
     name = row["finding"]
     members: dict[str, list[tuple[str, float]]] = {}
-    for one in answers["finding_members"].rows:
-        if one["finding"] == name:
-            members.setdefault(one["cause"], []).append((effect_name(one), one["confidence"]))
+    for member in answers["finding_members"].rows:
+        if member["finding"] == name:
+            members.setdefault(member["cause"], []).append((effect_name(member), member["confidence"]))
     return ToldFinding(
         family=row["family_label"] or wording.local_name(row["family"]),
-        joints=tuple(one["joint"] for one in answers["finding_joints"].rows if one["finding"] == name),
+        joints=tuple(joint["joint"] for joint in answers["finding_joints"].rows if joint["finding"] == name),
         against="twin" if row["scope"] == "missing" else _against(answers["diagnosis"].rows[0]),
         channel=row["channel"],
         confidence=row["confidence"],
@@ -77,9 +79,7 @@ def _finding(row: Row, answers: Answers) -> ToldFinding:
 
 def _against(diagnosis: Row) -> str:
     """Return which runs lack what changed: simulated runs never had it, reference runs did not have it yet."""
-    if not diagnosis["against_simulator"]:
-        return "reference"
-    return "both" if diagnosis["referenced"] else "simulated"
+    return "simulated" if diagnosis["against_simulator"] else "reference"
 
 
 def where(channel: str, joint: str | None, regime: str | None = None, share: float = 0.0) -> str:
@@ -98,20 +98,23 @@ def differing(unexplained: Sequence[tuple[str, str, str | None]]) -> str:
     return words if not more else f"{words}, and by {more} thing{'s' if more > 1 else ''} more"
 
 
-def closes(share: float, interval: Sequence[float] | None, played: bool) -> str:
-    """Say how much of a gap closes; `played`: of a simulator's tracking error."""
+def closes(share: float, interval: Sequence[float] | None, against: str | None, *, played: bool) -> str:
+    """Say how much of a gap closes, `against` the role of what runs are held against; `played`: of tracking error."""
     within = "" if interval is None else f" {findings.within(interval)}"
     if played:
-        what = f"{wording.part(share)} of the mean square of its tracking error"
-        return f" The robot’s numbers in the simulator close {what} on held-out runs{within}."
-    return f" Adding this to the twin closes {wording.part(share)} of the gap on held-out runs{within}."
+        closed = f"{wording.part(share)} of the mean square of its tracking error"
+        return f" The robot’s numbers in the simulator close {closed} on held-out runs{within}."
+    adding, gap = ("simulator", "its gap to the robot") if against == "simulated" else ("twin", "the gap")
+    return f" Adding this to the {adding} closes {wording.part(share)} of {gap} on held-out runs{within}."
 
 
-def misses(against: str | None, tracking: float | None, torque: float | None) -> str | None:
-    """Say by how much a simulator misses the robot, where that is what the robot is held against.
+def agrees(against: str | None, tracking: float | None, torque: float | None) -> str | None:
+    """Say how far a simulator agrees with the robot, where that is what the robot is held against.
 
-    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else.
+    `tracking`, rad: where it was told the robot's commands; `torque`, N m: else, what the twin leaves of both sides.
     """
     if tracking is not None:
-        return f"{1e3 * tracking:.3g} mrad RMS"
-    return None if torque is None or against != "simulated" else f"{torque:.3g} N m RMS"
+        return f"to {1e3 * tracking:.3g} mrad RMS"
+    if torque is None or against != "simulated":
+        return None
+    return f"beside the {torque:.3g} N m RMS that no effect explains"

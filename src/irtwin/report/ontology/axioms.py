@@ -36,7 +36,7 @@ def axioms(store: Store) -> Iterator[tuple[str, str, list[Word]]]:
             if not isinstance(quad.subject, NamedNode) or _is_link(store, name, quad.object):
                 continue
             if name == "follows from":
-                words = list(_between((_words(store, it) for it in _list(store, quad.object)), "then"))
+                words = list(_between((_words(store, member) for member in _list(store, quad.object)), "then"))
             else:
                 words = _words(store, quad.object)
             yield quad.subject.value, name, words
@@ -55,27 +55,28 @@ def _words(store: Store, node: Node, *, inner: bool = False) -> list[Word]:
         return [f'"{node.value}"' if node.datatype.value == XSD + "string" else node.value]
     if not isinstance(node, BlankNode):
         return ["…"]
-    said = _said(store, node)
+    objects = _said(store, node)
     for operator, word in _JOINED.items():
-        if operator in said:
-            words = list(_between((_words(store, it, inner=True) for it in _list(store, said[operator])), word))
+        if operator in objects:
+            members = _list(store, objects[operator])
+            words = list(_between((_words(store, member, inner=True) for member in members), word))
             return ["(", *words, ")"] if inner else words
-    if OWL + "complementOf" in said:
-        return ["not", *_words(store, said[OWL + "complementOf"], inner=True)]
-    return _restriction(store, said)
+    if OWL + "complementOf" in objects:
+        return ["not", *_words(store, objects[OWL + "complementOf"], inner=True)]
+    return _restriction(store, objects)
 
 
-def _restriction(store: Store, said: dict[str, Node]) -> list[Word]:
+def _restriction(store: Store, objects: dict[str, Node]) -> list[Word]:
     """Return a restriction's words; those of what it has no words for are dots."""
-    if OWL + "inverseOf" in said:
-        return ["inverse of", *_words(store, said[OWL + "inverseOf"])]
-    property = _words(store, said[OWL + "onProperty"]) if OWL + "onProperty" in said else []
-    for kind in said.keys() & _RESTRICTED.keys():
-        return [*property, _RESTRICTED[kind], *_words(store, said[kind], inner=True)]
-    for kind in said.keys() & _COUNTED.keys():
-        of = said.get(OWL + "onClass", said.get(OWL + "onDataRange"))
+    if OWL + "inverseOf" in objects:
+        return ["inverse of", *_words(store, objects[OWL + "inverseOf"])]
+    property = _words(store, objects[OWL + "onProperty"]) if OWL + "onProperty" in objects else []
+    for kind in objects.keys() & _RESTRICTED.keys():
+        return [*property, _RESTRICTED[kind], *_words(store, objects[kind], inner=True)]
+    for kind in objects.keys() & _COUNTED.keys():
+        of = objects.get(OWL + "onClass", objects.get(OWL + "onDataRange"))
         counted = ["of", *_words(store, of, inner=True)] if of else []
-        return [_COUNTED[kind], *_words(store, said[kind]), *property, *counted]
+        return [_COUNTED[kind], *_words(store, objects[kind]), *property, *counted]
     return ["…"]
 
 
@@ -92,6 +93,6 @@ def _said(store: Store, node: Node) -> dict[str, Node]:
 
 def _list(store: Store, node: Node) -> Iterator[Node]:
     while isinstance(node, BlankNode):
-        said = _said(store, node)
-        yield said[RDF + "first"]
-        node = said[RDF + "rest"]
+        objects = _said(store, node)
+        yield objects[RDF + "first"]
+        node = objects[RDF + "rest"]

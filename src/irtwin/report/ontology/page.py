@@ -99,7 +99,7 @@ def _module_iri(file: Resource) -> str:
     if not file.is_extension or file.replaces:
         return ONTOLOGY if name == "irtwin" else f"{ONTOLOGY}/{name}"
     ontologies = (quad.subject for quad in parse(path=str(file.path)) if quad.object == NamedNode(f"{OWL}Ontology"))
-    return next((it.value for it in ontologies if isinstance(it, NamedNode)), f"urn:module:{name}")
+    return next((node.value for node in ontologies if isinstance(node, NamedNode)), f"urn:module:{name}")
 
 
 def _stem(file: Resource) -> str:
@@ -187,7 +187,7 @@ def _nodes(
         inside = [parent for parent in term.links["subclass of"] if parent in names]
         outside = [parent for parent in term.links["subclass of"] if parent not in names]
         if (inside[0] if inside else None) == above:
-            beside = [known[it].label if it in known and known[it].own else short(it) for it in outside]
+            beside = [known[iri].label if iri in known and known[iri].own else short(iri) for iri in outside]
             below = list(_nodes(classes, term.iri, known))
             yield {"label": term.label, "anchor": term.anchor, "beside": beside, "below": below}
 

@@ -53,7 +53,10 @@ def page(known: Resources, graph: KnowledgeGraph | None = None) -> str:
         environment(shipped())
         .get_template("ontology/questions.html.jinja")
         .render(
-            themes={theme: [one for one in competencies_found if one.asked.theme == theme] for theme in THEMES},
+            themes={
+                theme: [competency for competency in competencies_found if competency.asked.theme == theme]
+                for theme in THEMES
+            },
             asked_by=ASKED_BY,
             count=len(competencies_found),
             answered=graph is not None,

@@ -14,16 +14,16 @@ def actions(answers: Answers, asked: Selection = ALL) -> tuple[Row, ...]:
     return tuple(row for row in answers["actions"].rows if row["robot"] in robots)
 
 
-def actions_sheet(found: tuple[Row, ...]) -> Sheet:
+def actions_sheet(rows: tuple[Row, ...]) -> Sheet:
     """Return the actions as a table."""
     columns = (
         "robot", "action", "place", "state", "done_on", "by", "saving_a_year_kWh", "saving_a_run_kWh", "runs_before",
         "runs_after", "compared_for_each", "baseline_adjusted_kWh", "saved_kWh", "lower_kWh", "upper_kWh", "iri",
     )  # fmt: skip
-    return Sheet(columns, [_cells(row) for row in found])
+    return Sheet(columns, [_cells(row) for row in rows])
 
 
 def _cells(row: Row) -> tuple[str | int | float | None, ...]:
-    said = (row["name"], row["what"], row["place"], row["state"], row["done_on"], row["by"], kwh(row["year_j"]))
+    head = (row["name"], row["what"], row["place"], row["state"], row["done_on"], row["by"], kwh(row["year_j"]))
     energies = (kwh(row[name]) for name in ("adjusted_j", "saved_j", "lower_j", "upper_j"))
-    return *said, kwh(row["run_j"]), row["before"], row["after"], row["unit"], *energies, row["action"]
+    return *head, kwh(row["run_j"]), row["before"], row["after"], row["unit"], *energies, row["action"]

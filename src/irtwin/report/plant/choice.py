@@ -46,8 +46,8 @@ class Selection:
         tests += [f'STR(?within) < "{self.last}~"'] if self.last else []
         only = f"WHERE {{\n  ?run irt:Start_Time ?within FILTER({' && '.join(tests)})"
         return {
-            name: replace(one, text=one.text.replace("WHERE {", only, 1)) if name in _OF_DAYS else one
-            for name, one in questions.items()
+            name: replace(question, text=question.text.replace("WHERE {", only, 1)) if name in _OF_DAYS else question
+            for name, question in questions.items()
         }
 
 

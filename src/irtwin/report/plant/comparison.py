@@ -105,7 +105,8 @@ def to_sheet(compared: Comparison) -> Sheet:
     rows += [("by the twin", pair) for pair in compared.joints]
     columns = ("known_from", "quantity", "unit", "before", "after", "difference", "difference_percent")
     return Sheet(
-        columns, [(of, one.name, one.unit, one.before, one.after, one.difference, one.percent) for of, one in rows]
+        columns,
+        [(of, pair.name, pair.unit, pair.before, pair.after, pair.difference, pair.percent) for of, pair in rows],
     )
 
 

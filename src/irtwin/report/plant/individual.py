@@ -66,8 +66,8 @@ def individual(iri: str, answers: Answers, base: str = ID) -> ShownIndividual:
     return ShownIndividual(
         iri=iri,
         name=str(named["name"]) if named else wording.local_name(iri),
-        types=[one for one in properties if one.iri == TYPE],
-        said=[one for one in properties if one.iri != TYPE],
+        types=[shown for shown in properties if shown.iri == TYPE],
+        said=[shown for shown in properties if shown.iri != TYPE],
         incoming=_incoming(answers["incoming"].rows, base),
         whole=len(answers["said"].rows) < MOST[0] and len(answers["incoming"].rows) < MOST[1],
     )
@@ -81,7 +81,7 @@ def _said(rows: Iterable[Row], base: str) -> list[ShownProperty]:
         graphs[key].add(row["graph"])
         kept.setdefault(key, row)
     return _by_property(
-        (row, Value(_text(row, base), key[1] if key[2] else None, tuple(_by(one, base) for one in sorted(graphs[key]))))
+        (row, Value(_text(row, base), key[1] if key[2] else None, tuple(_by(iri, base) for iri in sorted(graphs[key]))))
         for key, row in sorted(kept.items(), key=lambda pair: pair[0])
     )
 
@@ -100,7 +100,7 @@ def _by_property(values: Iterable[tuple[Row, Value]]) -> list[ShownProperty]:
     for row, value in values:
         iri = row["property"]
         properties.setdefault(iri, ShownProperty(iri, row["property_label"] or shorten(iri))).values.append(value)
-    return sorted(properties.values(), key=lambda one: (one.label.lower(), one.iri))
+    return sorted(properties.values(), key=lambda shown: (shown.label.lower(), shown.iri))
 
 
 def _text(row: Row, base: str) -> str:

@@ -77,13 +77,13 @@ def overview(answers: Answers, asked: Selection = ALL) -> Overview:
     energies = answers["energy"].rows
     groups = tuple(_groups(answers, asked))
     daily = by_day(answers["days"].rows)
-    plants = ((one, days(added_up(of for (_, name), of in daily.items() if name == one.name), PLANT_TREND))
-              for one in KINDS.values())  # fmt: skip
+    plants = ((energy, days(added_up(of for (_, name), of in daily.items() if name == energy.name), PLANT_TREND))
+              for energy in KINDS.values())  # fmt: skip
     electrical = [group for group in groups if group.kind is not None and group.kind.electrical]
     rows = [row for row in energies if kind(row["energy_from"]).electrical]
     return Overview(
         groups=groups,
-        trends=tuple((one, trend) for one, trend in plants if trend is not None),
+        trends=tuple((energy, trend) for energy, trend in plants if trend is not None),
         robots=len({line["robot"] for group in groups for line in group.lines}),
         electrical_j=_sum(group.total("energy_j") for group in electrical),
         cost=_sum(group.total("cost") for group in electrical),

@@ -65,7 +65,9 @@ def compile_templates(base: str) -> None:
 def _templates(base: str) -> jinja2.Environment:
     loader = jinja2.FileSystemLoader(FOLDER.parent)  # pages of the plant have rooms of their own
     templates = environment(resources.shipped()).overlay(loader=loader)
-    of_base = {one.__name__: partial(one, base=base) for one in (links.page_of, links.individual, links.tail)}
+    of_base = {
+        function.__name__: partial(function, base=base) for function in (links.page_of, links.individual, links.tail)
+    }
     own = {"kwh": kwh, "spaced": _spaced, "pages": pages, "on_page": on_page}
     templates.filters = templates.filters | of_base | own
     return templates

@@ -48,7 +48,7 @@ def of_robot(answers: Answers, zone: ZoneInfo) -> dict[str, Any]:
     energies = sorted(
         answers["energy"].rows, key=lambda row: (not kind(row["energy_from"]).electrical, row["energy_from"])
     )
-    daily = {of: found for (_, of), found in by_day(answers["days"].rows).items()}
+    daily = {of: by_date for (_, of), by_date in by_day(answers["days"].rows).items()}
     standing = answers["standstill"].first
     return {
         "energies": [

@@ -69,7 +69,7 @@ class BagFile:
             yield connection.topic, time, parse(content, connection.msgtype)
 
     def _wanted(self) -> list[Connection]:
-        return [one for one in self._reader.connections if one.msgtype in (JOINT_STATE, *NUMBERS)]
+        return [connection for connection in self._reader.connections if connection.msgtype in (JOINT_STATE, *NUMBERS)]
 
     def _check_type(self, connection: Connection) -> None:
         if self._of_ros1 and connection.digest != self._types.generate_msgdef(connection.msgtype)[1]:

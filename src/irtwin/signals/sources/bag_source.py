@@ -61,9 +61,9 @@ class BagSource(Source):
             topics = bag.topics
             states = self._states_topic(topics)
             numbers = self._number_topics(topics)
-            for one in topics:
-                if one.name in (states, *numbers.values()):
-                    self.check_size(one.count, _width(self.robot) if one.kind == JOINT_STATE else 1)
+            for offered in topics:
+                if offered.name in (states, *numbers.values()):
+                    self.check_size(offered.count, _width(self.robot) if offered.kind == JOINT_STATE else 1)
             joints, others = self._messages(bag, states, tuple(numbers.values()))
         table = joints.table()
         known = np.ones(len(joints.recorded), dtype=bool)
@@ -193,8 +193,8 @@ class _JointStates:
     def _order(self, names: tuple[str, ...]) -> list[int] | None:
         """Return the place in a message of each joint, by its own name or by ROS'; None where one is missing."""
         places = [
-            names.index(one) if one in names else names.index(two) if two in names else None
-            for one, two in self._names.items()
+            names.index(name) if name in names else names.index(alias) if alias in names else None
+            for name, alias in self._names.items()
         ]
         return None if None in places else [place for place in places if place is not None]
 

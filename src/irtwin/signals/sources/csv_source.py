@@ -64,9 +64,9 @@ class CsvSource(Source):
         if not text.isascii():
             as_text(self.path, text)  # Arrow stumbles over such a line of the wrong length, and says so to nobody
         head = text[: text.index(b"\n")]
-        if b"," not in head and (other := next((sign for sign in (b";", b"\t", b"|") if sign in head), None)):
+        if b"," not in head and (separator := next((sign for sign in (b";", b"\t", b"|") if sign in head), None)):
             raise InputError(
-                f"{self.path}, line 1: columns are separated by {_OTHERS[other]}; separate them by commas, or let "
+                f"{self.path}, line 1: columns are separated by {_OTHERS[separator]}; separate them by commas, or let "
                 "`irtwin import` do that"
             )
         columns = head.count(b",") + 1

@@ -1,0 +1,61 @@
+"""Terms that a user's statement may have: of the project's own those that its ontology declares, and none concludes."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+from functools import lru_cache
+
+from pyoxigraph import NamedNode, Quad
+
+from irtwin.errors import InputError
+from irtwin.knowledge.explain.mapping import maps_of
+from irtwin.knowledge.rules.files import all_rules
+from irtwin.knowledge.rules.rule import head_of
+from irtwin.knowledge.store import ontology
+from irtwin.knowledge.vocabulary import IRT, LIMIT, OWL, RDFS, TARIFF, TYPE, shorten, term
+from irtwin.resources import Resources
+
+_DECLARING = (IRT, LIMIT, TARIFF)
+_BELOW = f"{RDFS}subClassOf"
+_CONCLUDED = re.compile(rf"(?:\birt:|<{IRT})(\w+)")
+_ALSO_SAID = frozenset(map(term, ("Saving_Action", "saves_at", "applies_Remedy", "Currency")))  # as of what was done
+
+
+def check(resources: Resources, quad: Quad, statement: str) -> None:
+    """Raise InputError where a statement has a term that the ontology lacks, or one that rules or axioms conclude."""
+    declared, concluded = _terms(resources)
+    names = [node.value for node in (quad.subject, quad.predicate, quad.object) if isinstance(node, NamedNode)]
+    for name in names:
+        if name.startswith(_DECLARING) and name not in declared:
+            near = get_close_matches(name, declared, 1)
+            meant = f"did you mean {shorten(near[0])}? " if near else ""
+            raise InputError(
+                f"{statement}: the ontology has no {shorten(name)}: {meant}A term of your own has a namespace of your "
+                "own; nothing changed"
+            )
+    used = names[-1] if quad.predicate == TYPE else quad.predicate.value
+    if used in concluded:
+        raise InputError(
+            f"{statement}: {shorten(used)} is concluded; change what it is concluded from; nothing changed"
+        )
+
+
+@lru_cache(maxsize=4)
+def _terms(resources: Resources) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the terms that the ontology declares, and the properties and classes that are concluded."""
+    statements = [
+        (quad.subject.value, quad.predicate.value, quad.object)
+        for quad in ontology.of_modules(resources)
+        if isinstance(quad.subject, NamedNode)
+    ]
+    defined = {name for name, property, _ in statements if property == f"{OWL}equivalentClass" and name.startswith(IRT)}
+    mapped = {kind.value for _, triples_map in maps_of(resources.of("mappings")) for kind in triples_map.classes}
+    above = {(name, of.value) for name, property, of in statements if property == _BELOW and isinstance(of, NamedNode)}
+    noteworthy = more = {term("Noteworthy")}
+    while more:
+        more = {name for name, parent in above if parent in more} - noteworthy
+        noteworthy = noteworthy | more
+    heads = ((rule.construct, head_of(rule.construct)) for rule in all_rules(resources))
+    made = {term(name) for text, head in heads if head for name in _CONCLUDED.findall(text, *head.span())}
+    return frozenset(name for name, _, _ in statements), frozenset(defined - mapped | noteworthy | made - _ALSO_SAID)
