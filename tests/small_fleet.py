@@ -116,6 +116,12 @@ def fill(workspace: Workspace) -> None:
 
 NOTES = (
     ("Arm_A", "location", 1, "cell 4"),
+    ("Arm_A", "cell", 1, "1"),
+    ("Arm_A", "line", 1, "body"),
+    ("Arm_B", "cell", 1, "2"),
+    ("Arm_B", "line", 1, "body"),
+    ("Arm_C", "cell", 1, "1"),
+    ("Arm_D", "line", 1, "paint"),
     ("Arm_C", "supply.voltage", 1, "400"),
     ("Arm_C", "tools", 1, "gripper"),
     ("Arm_C", "tools", 2, "welder"),

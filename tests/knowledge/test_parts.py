@@ -43,6 +43,7 @@ ROBOTS = ("r", "s")
 
 LIMIT = "https://w3id.org/irtwin/limit/idle_share"
 EFFECT = "https://w3id.org/irtwin/effect/copper_loss"
+CELL, LINE = individual("cell", "4"), individual("line", "body")
 ONTOLOGY = list(
     in_graph(
         turtle(f"""
@@ -51,6 +52,9 @@ ONTOLOGY = list(
         irt:has_RunProcess owl:inverseOf irt:run_of ; a owl:InverseFunctionalProperty .
         irt:has_Joint a owl:InverseFunctionalProperty . irt:run_of a owl:FunctionalProperty .
         irt:of_Run a owl:ObjectProperty . irt:before a owl:TransitiveProperty . irt:Idle_Share rdfs:range xsd:double .
+        irt:part_of a owl:TransitiveProperty . irt:stands_in rdfs:subPropertyOf irt:part_of .
+        irt:stands_in rdfs:range irt:Robot_Cell .
+        irt:cell_of_Line rdfs:subPropertyOf irt:part_of . irt:joint_of rdfs:subPropertyOf irt:part_of .
         irt:Run_Name rdfs:range xsd:string . irt:Joint_Number rdfs:range xsd:integer .
         <{LIMIT}> irt:Limit_Value "0.5"^^xsd:double ."""),
         GRAPH_ONTOLOGY,
@@ -77,6 +81,11 @@ def of_robot(robot: str) -> list[Quad]:
         quad(energy, term("of_Effect"), EFFECT),
         quad(energy, term("Energy"), Literal(5.0)),
         quad(joint, term("Joint_Number"), Literal(5)),
+        quad(joint, term("joint_of"), body),
+        quad(body, term("stands_in"), CELL),
+        quad(CELL, TYPE, term("Robot_Cell")),
+        quad(CELL, term("cell_of_Line"), LINE),
+        quad(LINE, TYPE, term("Production_Line")),
     ]
 
 
@@ -134,7 +143,8 @@ def test_robots_are_parts_of_their_own() -> None:
     assert reason(graph).joined_by is None
     ontology = parts.Ontology(graph)
     top = parts.parted(ontology, reasoning.asserted(graph))
-    assert len({top(node) for triple in graph.triples(DRAWN) for node in ontology.nodes(triple)}) == len(ROBOTS)
+    tops = {top(node) for triple in graph.triples(DRAWN) for node in ontology.nodes(triple)}
+    assert len(tops) == len((*ROBOTS, CELL, LINE))
 
 
 def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,9 +205,26 @@ def test_only_the_part_that_changed_is_reasoned_over(monkeypatch: pytest.MonkeyP
     assert said_of == {one.subject.value for one in of_robot("r")}
 
 
+@pytest.mark.parametrize("change", ["stands_in", "cell_of_Line", "type"])
+def test_who_stands_in_a_place_that_changes_is_part_of_what_it_is_part_of_then(change: str) -> None:
+    graph = anew(FACTS)
+    assert graph.holds(Triple(*map(NamedNode, (individual("joint", "s"), term("part_of"), LINE))))
+    old = {
+        "stands_in": quad(individual("robot", "s"), term("stands_in"), CELL),
+        "cell_of_Line": quad(CELL, term("cell_of_Line"), LINE),
+        "type": quad(CELL, TYPE, term("Robot_Cell")),
+    }[change]
+    graph.change({old}, ())
+    reason(graph)
+    assert inferred(graph) == inferred(anew([one for one in FACTS if one != old]))
+    graph.change((), {old})
+    assert reason(graph).joined_by is None
+    assert inferred(graph) == inferred(anew(FACTS))
+
+
 def test_a_part_that_goes_takes_its_conclusions_along() -> None:
     graph = anew(FACTS)
-    graph.change(set(of_robot("s")), ())
+    graph.change(set(of_robot("s")) - set(of_robot("r")), ())
     reason(graph)
     assert inferred(graph) == inferred(anew(of_robot("r")))
 

@@ -98,16 +98,19 @@ def test_a_measured_energy_is_proved_by_the_samples_alone(filled: Path) -> None:
 
 
 def test_what_a_data_set_says_cites_it(filled: Path) -> None:
-    for name in ("Payload", "Run_Role"):
-        _, files, _ = asked(filled, f"irt:{name}")
+    for name, key in (("Payload", "payload_mass"), ("Run_Role", "role")):
+        _, files, outline = asked(filled, f"irt:{name}")
         assert files == ["whole: data/dataset.toml"]
+        assert f'at [[run]] file = "runs/work.csv": {key}' in outline
     assert asked(filled, "irt:Sample_Count")[1] == ["whole: data/runs/work.csv"]
 
 
 def test_a_joints_limits_cite_the_file_that_describes_the_robot(filled: Path) -> None:
     joint = f"id:joint/{rows.ROBOT}/joint_a1"
     for name in ("Lower_Limit", "Upper_Limit", "Speed_Limit"):
-        assert asked(filled, f"irt:{name}", joint)[1] == ["whole: data/robot.urdf"]
+        _, files, outline = asked(filled, f"irt:{name}", joint)
+        assert files == ["whole: data/robot.urdf"]
+        assert "at joint joint_a1: limit " in outline
     graph = KnowledgeGraph()  # of a robot that a table of its data set describes
     graph.update("""INSERT DATA { irt:Lower_Limit irt:told_in "URDF" . <urn:j> irt:joint_of <urn:r> .
         <urn:s> irt:source_of <urn:r> ; irt:Source_Kind "data set" ; irt:File "dataset.toml" ; irt:Checksum "1" ;

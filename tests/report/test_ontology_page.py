@@ -55,9 +55,28 @@ def test_the_page_needs_no_network(elements: Elements, text: str) -> None:
     assert "default-src &#39;none&#39;" in text
 
 
+def said_of(text: str, term: str) -> str:
+    article = re.search(rf'<article id="{term}">.*?</article>', text, re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", article[0]))
+
+
+@pytest.mark.parametrize(
+    ("term", "words"),
+    [
+        ("Wasteful_Run", "equivalent to idle-heavy run or standby-heavy run"),
+        ("Planned_Run", "disjoint with live run , measured run , replayed run"),
+        ("Planned_Run", "at most 0 measured energy"),
+        ("lies_in", "follows from caused by effect then sits in"),
+        ("IR_RunProcess", "key run name , run of"),
+        ("Verification_Result", "range &#34;verified&#34; or &#34;not verified&#34;"),
+    ],
+)
+def test_axioms_are_said_in_words(text: str, term: str, words: str) -> None:
+    assert words in said_of(text, term)
+
+
 def test_what_the_page_says_of_a_property(text: str) -> None:
-    article = re.search(r'<article id="Energy_Error">.*?</article>', text, re.DOTALL)
-    said = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", article[0]))
+    said = said_of(text, "Energy_Error")
     for words in (
         "energy error irt:Energy_Error",
         "Difference of modelled and measured energy over the measured",

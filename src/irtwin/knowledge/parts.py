@@ -1,7 +1,8 @@
 """The graph in parts: what individuals of one part say together bears on no other part.
 
 All parts have the ontology in common: its triples, and the terms that they speak of. Any other subject or object, but
-for literals and classes, is a node of one part: a robot with its joints, runs and twins is one.
+for literals and classes, is a node of one part: a robot with its joints, runs and twins is one. Cells, lines and plants
+are nodes of the part of each robot in them, which their other robots are not.
 
 What is concluded of a part, and which constraints it breaks, is what follows from it beside the ontology: a rule or
 constraint sees one part at a time. Where something but the ontology says more of its terms, or models (subclasses,
@@ -31,7 +32,9 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_ONTOLOGY,
     GRAPH_REASONED,
     GRAPH_VALIDATION,
+    INTO_PLACES,
     OWL,
+    PLACES,
     TYPE,
     term,
 )
@@ -97,7 +100,8 @@ class Ontology:
 
     def nodes(self, triple: Triple) -> list[Name]:
         """Return the nodes of parts that a triple speaks of."""
-        ends = (triple.subject,) if triple.predicate == TYPE else (triple.subject, triple.object)
+        alone = triple.predicate == TYPE or triple.predicate in INTO_PLACES
+        ends = (triple.subject,) if alone else (triple.subject, triple.object)
         return [end for end in ends if isinstance(end, NamedNode | BlankNode) and end not in self.terms]
 
 
@@ -106,6 +110,7 @@ class Region:
     """Some parts of the graph: their nodes, what is asserted of them, and what was concluded of them before."""
 
     nodes: set[Name] = field(default_factory=set)
+    places: set[Name] = field(default_factory=set)
     asserted: set[Triple] = field(default_factory=set)
     concluded: set[Quad] = field(default_factory=set)
 
@@ -118,6 +123,8 @@ class Region:
                 place = places.setdefault(graph, _place(graph.value))
             if place == _ASSERTED:
                 self.asserted.add(Triple(subject, predicate, object))
+                if object in PLACES and predicate == TYPE:
+                    self.places.add(subject)
             elif place == _APART:
                 continue
             else:
@@ -136,10 +143,12 @@ def around(graph: KnowledgeGraph, ontology: Ontology, seeds: Iterable[Name]) -> 
     if any(map(_says_more, graph.store.said_of(terms))):
         return None
     todo -= terms
+    from_below = set(todo)
     while todo:
         region.nodes |= todo
         nodes = region.take(graph.store.said_of(todo), ontology)
-        before = graph.store.leading_to(todo, _NOT_FOLLOWED)
+        before = graph.store.leading_to(todo - region.places | todo & from_below, _NOT_FOLLOWED)
+        from_below = before
         nodes |= region.take((row for row in graph.store.said_of(before & ontology.terms) if row[2] in todo), ontology)
         todo = (nodes | before - ontology.terms) - region.nodes
     return region

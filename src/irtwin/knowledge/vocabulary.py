@@ -71,6 +71,11 @@ def term(name: str) -> str:
     return IRT + name
 
 
+# Where robots stand together: a place says nothing of them, so that they stay parts of their own.
+PLACES = {NamedNode(term(name)) for name in ("Robot_Cell", "Production_Line", "Plant")}
+INTO_PLACES = {NamedNode(term(name)) for name in ("stands_in", "cell_of_Line", "line_of_Plant", "part_of")}
+
+
 def prefixes(base: str) -> dict[str, str]:
     """Return the prefixes of a graph whose individuals lie below a base."""
     return {**PREFIXES, "id": base}

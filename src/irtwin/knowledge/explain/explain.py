@@ -144,12 +144,14 @@ class Explainer:
             return Explanation(statement, maker, tuple(map(self.individual, behind)), **near)
         if name == GRAPH_ONTOLOGY:
             module = _module(triple, self._graph.resources.of("ontology"))
+            unnamed = triple.subject if isinstance(triple.subject, BlankNode) else None
             if module is None and triple.subject == ELECTRICITY:
                 return Explanation(statement, "the plant's tariff", file=FILE)
-            if module is None and triple.predicate == SOURCE:
+            if module is None and unnamed is None and triple.predicate == SOURCE:
                 values = self._graph.store.said(triple.subject, LIMIT_VALUE)
                 return Explanation(statement, "who set the limit", tuple(self.triple(quad.triple) for quad in values))
-            return Explanation(statement, "the ontology", file=module)
+            leading = [axiom for axiom in Ontology.of(self._graph).triples if unnamed and axiom.object == unnamed]
+            return Explanation(statement, "the ontology", tuple(map(self.triple, leading)), file=module)
         return Explanation(statement, f"what was written into {shorten(name)}")
 
     def _each(self, facts: list[Triple], are_all: bool) -> tuple[Explanation, ...]:
@@ -246,8 +248,14 @@ def _matching(graph: KnowledgeGraph, pattern: str) -> list[Triple]:
     terms += [f"?_{place}" for place in range(len(terms), 3)]
     text = " ".join(terms)
     equal = " ".join(f"FILTER(?_{place} = {number})" for place, number in numbers.items())  # whatever its datatype
-    matching = graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} LIMIT {MOST_TRIPLES + 1}")
-    return list(cast(QueryTriples, matching))
+    unnamed = {place: term for place, term in enumerate(parts) if term.startswith("_:")}
+    equal += "".join(f" FILTER(isBlank(?_{place}))" for place in unnamed)  # SPARQL has no way to say which
+    limit = "" if unnamed else f"LIMIT {MOST_TRIPLES + 1}"
+    matching = list(cast(QueryTriples, graph.answer(f"CONSTRUCT {{ {text} }} WHERE {{ {text} {equal} }} {limit}")))
+    named_so = [
+        triple for triple in matching if all(str(tuple(triple)[place]) == term for place, term in unnamed.items())
+    ]
+    return named_so or matching
 
 
 def _sparql(term: str, variable: str, prefixes: Mapping[str, str]) -> str:
@@ -274,10 +282,14 @@ def _maker(maker: dict[str, object]) -> str:
 
 
 def _module(triple: Triple, files: Files) -> str | None:
-    """Return the module of the ontology that says a triple; None for a part without a name."""
-    if isinstance(triple.subject, BlankNode) or isinstance(triple.object, BlankNode):
+    """Return the module of the ontology that says a triple; None of a subject without a name."""
+    if isinstance(triple.subject, BlankNode):
         return None
-    return next((name for name, module in _modules(files) if next(in_graph([triple])) in module), None)
+    object = None if isinstance(triple.object, BlankNode) else triple.object
+    matches = (
+        (name, module.quads_for_pattern(triple.subject, triple.predicate, object)) for name, module in _modules(files)
+    )
+    return next((name for name, quads in matches if any(quads)), None)
 
 
 @lru_cache(maxsize=16)

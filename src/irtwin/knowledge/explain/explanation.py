@@ -14,7 +14,8 @@ class Explanation:
     """A triple or an individual, with prefixes; who or what says it; and from what, down to files.
 
     `meaning` is what the rule or provider does, in words. `file` and `checksum` are of the individual's own file, or
-    of the document that says the triple; its path begins in the workspace, or in the `folder` of a data set.
+    of the document that says the triple, at a `place`; its path begins in the workspace, or in the `folder` of a data
+    set.
     """
 
     what: str
@@ -24,6 +25,7 @@ class Explanation:
     file: str | None = None
     checksum: str | None = None
     folder: str | None = None
+    place: str | None = None
 
     def __str__(self) -> str:
         """Return it as an indented outline."""
@@ -32,7 +34,9 @@ class Explanation:
 
 def to_json(explanation: Explanation) -> dict[str, Any]:
     """Write an explanation as nested objects, for JSON; what it lacks is left out."""
-    plain = {name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "folder", "checksum")}
+    plain = {
+        name: getattr(explanation, name) for name in ("what", "by", "meaning", "file", "folder", "checksum", "place")
+    }
     known = {name: value for name, value in plain.items() if value is not None}
     if explanation.because:
         known["because"] = [to_json(premise) for premise in explanation.because]
@@ -48,8 +52,10 @@ def _lines(explanation: Explanation, margin: str) -> Iterator[str]:
         yield f"{inner}({explanation.meaning})"
     if explanation.file:
         checksum = f", sha256 {explanation.checksum}" if explanation.checksum else ""
-        place = f" in {explanation.folder}" if explanation.folder else ""
-        yield f"{inner}file {explanation.file}{place}{checksum}"
+        folder = f" in {explanation.folder}" if explanation.folder else ""
+        yield f"{inner}file {explanation.file}{folder}{checksum}"
+    if explanation.place:
+        yield f"{inner}at {explanation.place}"
     for premise in explanation.because:
         first, *rest = _lines(premise, inner + "  ")
         yield f"{inner}- {first.lstrip()}"

@@ -34,13 +34,15 @@ WHERE {
 ORDER BY ?file"""
 
 _TOLD_IN = """
-SELECT ?file ?checksum ?folder
+SELECT ?file ?checksum ?folder ?place ?name
 WHERE {
   ?property irt:told_in ?kind .
-  ?thing (irt:run_of | irt:joint_of | ^irt:has_Information | irt:note_of) ?robot .
+  ?thing (irt:run_of | irt:joint_of | ^irt:has_Information | irt:note_of)? ?robot .
   ?source irt:source_of ?robot ; irt:Source_Kind ?one ; irt:File ?file ; irt:Checksum ?checksum ;
     irt:Data_Folder ?folder .
   FILTER(?one = ?kind || (?kind = "URDF" && NOT EXISTS { ?other irt:source_of ?robot ; irt:Source_Kind ?kind }))
+  OPTIONAL { ?property irt:told_as ?place FILTER(?one = ?kind) }
+  OPTIONAL { ?thing irt:File | irt:Joint_Name | irt:Note_Name ?name }
   FILTER NOT EXISTS { ?thing irt:run_of ?robot FILTER NOT EXISTS { ?thing irt:Run_Role ?role } }
 }
 ORDER BY ?file"""
@@ -85,6 +87,7 @@ _NEXT = """
 SELECT DISTINCT ?next
 WHERE {
   { ?thing ?leads ?next } UNION { ?next irt:source_of ?thing }
+  UNION { ?next irt:source_of / irt:part_of ?thing ; irt:Source_Kind "data set" }
   FILTER(isIRI(?next) && ?next != ?thing)
 }
 ORDER BY ?next"""
@@ -196,5 +199,8 @@ def _same(written: str, term: NamedNode | Literal) -> bool:
 
 
 def told_in(graph: KnowledgeGraph, thing: str, property: str) -> Row:
-    """Return the file of a data set that says a property of a thing, as `file_of`."""
-    return next(iter(graph.query(_TOLD_IN, {"thing": thing, "property": property})), {})
+    """Return the file of a data set that says a property of a thing, as `file_of`, and in which `place`."""
+    for row in graph.query(_TOLD_IN, {"thing": thing, "property": property}):
+        place = row["place"] and row["place"].replace("NAME", row["name"] or "")
+        return {"file": row["file"], "checksum": row["checksum"], "folder": row["folder"], "place": place}
+    return {}

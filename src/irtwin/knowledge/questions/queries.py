@@ -22,7 +22,7 @@ from irtwin.input_file import read_text
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.readable import NOT_READABLE, is_readable
 from irtwin.knowledge.store.table import AnswerTable
-from irtwin.knowledge.vocabulary import ID, IRT, PREFIXES
+from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, ID, IRT, PREFIXES
 from irtwin.resources import MOST_BYTES, Resources, shipped
 
 _HEADER = re.compile(r"^# (title|question|theme|of|concluded): (.+)$", re.MULTILINE)
@@ -73,7 +73,8 @@ def ask(graph: KnowledgeGraph, question: str, robot: str | None = None) -> Answe
 
 def _unknown_terms(graph: KnowledgeGraph, text: str) -> Iterator[str]:
     """Say which terms of a query the ontology lacks, each with the nearest that it has."""
-    rows = graph.query(f"SELECT DISTINCT ?term {{ ?term a ?kind FILTER(STRSTARTS(STR(?term), '{IRT}')) }}")
+    terms = f"?term a ?kind FILTER(STRSTARTS(STR(?term), '{IRT}'))"
+    rows = graph.query(f"SELECT DISTINCT ?term {{ GRAPH <{GRAPH_ONTOLOGY}> {{ {terms} }} }}")
     known = [row["term"].removeprefix(IRT) for row in rows]
     for name in sorted(set(_TERM.findall(text)) - set(known)):
         near = get_close_matches(name, known, 1)

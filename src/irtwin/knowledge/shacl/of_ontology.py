@@ -1,4 +1,4 @@
-"""SHACL shapes that the ontology itself tells: of domains, of ranges, and of catalogues.
+"""SHACL shapes that the ontology itself tells: of domains, of ranges, of listed texts, and of catalogues.
 
 A domain concludes a type in OWL; here it asks for one: what has a property of joints must be said to be a joint. A
 class whose individuals stand in the ontology is a catalogue, such as effects and channels: there are no others. Nothing
@@ -38,7 +38,7 @@ def with_ontology(by_hand: Iterable[Triple], ontology: Iterable[Triple]) -> set[
         and isinstance(triple.object, NamedNode)
         and triple.object.value in terms.catalogues
     }
-    told = _PROLOGUE + "\n".join(chain(terms.domains(), terms.ranges(), terms.members()))
+    told = _PROLOGUE + "\n".join(chain(terms.domains(), terms.ranges(), terms.codes(), terms.members()))
     of_ontology = {quad.triple for quad in parse(told, format=RdfFormat.TURTLE)}
     return (written - closed.keys()).union(closed.values(), of_ontology)
 
@@ -77,6 +77,20 @@ class _Ontology:
             fits = _one_of(classes, members) if members else _of_classes(classes)
             yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; {fits} ."
 
+    def codes(self) -> Iterator[str]:
+        """Yield that a property whose range is a list of literals has one of these, and one alone if functional."""
+        for name in self._properties("range"):
+            codes = self._said.items(self._said.value(self._said.value(NamedNode(name), RDFS + "range"), OWL + "oneOf"))
+            if not codes:
+                continue
+            *others, last = (f'"{getattr(code, "value", code)}"' for code in codes)
+            message = f"{self._label(name)} is {' or '.join(filter(None, (', '.join(others), last)))}"
+            once = " ; sh:maxCount 1" if self._is_functional(name) else ""
+            of_range, value = _name("range", name), _name("value", name)
+            yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
+            listed = " ".join(map(str, codes))
+            yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; sh:in ( {listed} ){once} ."
+
     def members(self) -> Iterator[str]:
         """Yield that a catalogue has no individuals but those of the ontology."""
         for name, individuals in self.catalogues.items():
@@ -85,6 +99,9 @@ class _Ontology:
 
     def _properties(self, end: str) -> list[str]:
         return sorted(node.value for node in self._said.having(RDFS + end) if self._is_own(node))
+
+    def _is_functional(self, name: str) -> bool:
+        return NamedNode(OWL + "FunctionalProperty") in self._said.values(NamedNode(name), TYPE.value)
 
     def _is_own(self, term: Node) -> TypeGuard[NamedNode]:
         """Whether a term has a name, and is not of a vocabulary that the ontology has no module of."""

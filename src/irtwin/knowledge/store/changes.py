@@ -22,6 +22,8 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_REASONED,
     GRAPH_SOURCE,
     GRAPH_VALIDATION,
+    INTO_PLACES,
+    PLACES,
     PROV,
     TYPE,
 )
@@ -42,7 +44,8 @@ def notes(store: Store, quads: Iterable[Quad]) -> set[Quad]:
     asserted = [quad for quad in quads if is_asserted(quad)]
     if not asserted or not made_of(store):
         return set()
-    ends = {quad.subject for quad in asserted} | {quad.object for quad in asserted if quad.predicate != TYPE}
+    leading = [quad for quad in asserted if quad.predicate != TYPE and not _into_place(store, quad)]
+    ends = {quad.subject for quad in asserted} | {quad.object for quad in leading}
     return {_note(reader, node) for reader in _READERS for node in ends if not isinstance(node, Literal)}
 
 
@@ -68,6 +71,14 @@ def made_of(store: Store) -> set[Quad]:
 def is_asserted(quad: Quad) -> bool:
     """Whether a quad stands in a named graph that nobody inferred."""
     return isinstance(quad.graph_name, NamedNode) and not quad.graph_name.value.startswith(NOT_ASSERTED)
+
+
+def _into_place(store: Store, quad: Quad) -> bool:
+    """Whether a quad leads to a place, which is one whoever stands in it."""
+    if quad.predicate not in INTO_PLACES:
+        return False
+    types = store.quads_for_pattern(quad.object, TYPE, None, None)  # type: ignore[arg-type]
+    return any(kind.object in PLACES and is_asserted(kind) for kind in types)
 
 
 def _note(reader: str, node: object) -> Quad:

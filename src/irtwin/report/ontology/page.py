@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from pyoxigraph import NamedNode, RdfFormat, Store, parse
 
 from irtwin.knowledge.store.table import AnswerTable, table_of
 from irtwin.knowledge.vocabulary import ONTOLOGY, OWL, shorten
+from irtwin.report.ontology.axioms import Word, axioms
 from irtwin.report.page import content_policy
 from irtwin.report.templates import environment, style
 from irtwin.resources import Resource, Resources, folder, shipped
@@ -36,13 +38,14 @@ _ALIGNED = {  # vocabularies that only the alignment speaks of
 
 @dataclass
 class DocumentedTerm:
-    """A class, property or individual: what `terms.rq` says of it, and what it leads to, by IRIs."""
+    """A class, property or individual: what `terms.rq` says of it, and what it leads to, by IRIs or in words."""
 
     iri: str
     label: str
     said: Mapping[str, Any]
     extends: str | None = None  # the module that it is of, where that does not ship
     links: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    axioms: dict[str, list[list[Word]]] = field(default_factory=lambda: defaultdict(list))
     values: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
 
     @property
@@ -107,7 +110,11 @@ def page(modules: list[Module]) -> str:
     """Return the page."""
     known = {term.iri: term for module in modules for group in module.terms.values() for term in group}
     templates = environment(shipped()).overlay()
-    templates.filters = templates.filters | {"link": lambda iri: _link(iri, known), "short": short}
+    templates.filters = templates.filters | {
+        "link": lambda iri: _link(iri, known),
+        "linked": partial(_linked, known=known),
+        "short": short,
+    }
     return templates.get_template("ontology/page.html.jinja").render(
         modules=modules,
         kinds=KINDS,
@@ -139,6 +146,9 @@ def _terms(store: Store, extensions: Mapping[str, Resource]) -> dict[str, dict[s
             known[row["term"]].links[row["link"]].append(row["other"])
             if row["back"] and row["other"] in known:
                 known[row["other"]].links[row["back"]].append(row["term"])
+    for iri, name, words in axioms(store):
+        if iri in known:
+            known[iri].axioms[name].append(words)
     for row in _ask(store, "values"):
         if row["term"] in known:
             known[row["term"]].values[row["property"]].append(row["value"])
@@ -188,6 +198,12 @@ def _link(iri: Any, known: Mapping[str, DocumentedTerm]) -> Markup:
     if term is None:
         return Markup("<code>{}</code>").format(short(iri) if isinstance(iri, str) else iri)
     return Markup('<a href="#{}">{}</a>').format(term.anchor, term.label if term.own else short(term.iri))
+
+
+def _linked(words: list[Word], known: Mapping[str, DocumentedTerm]) -> Markup:
+    """Return what an axiom says with a link at each term; no blank within parentheses."""
+    text = Markup(" ").join(_link(word.value, known) if isinstance(word, NamedNode) else word for word in words)
+    return text.replace("( ", "(").replace(" )", ")")
 
 
 def _ask(store: Store, name: str) -> AnswerTable:
