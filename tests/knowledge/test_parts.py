@@ -147,6 +147,12 @@ def test_robots_are_parts_of_their_own() -> None:
     assert len(tops) == len((*ROBOTS, CELL, LINE))
 
 
+def test_what_parts_conclude_of_the_cell_that_they_share_counts_once() -> None:
+    of_r, of_s = of_robot("r"), of_robot("s")
+    graph = holding([*of_r[:3], of_r[16], *of_s[16:19], JOINING["runs that are the same"]])
+    assert reason(graph).owl_rl == len(conclusions(graph)[GRAPH_OWL_RL])
+
+
 def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "_schema", Schema)  # as in a new process, which has closed no ontology yet
     graph = holding(of_robot("r"))

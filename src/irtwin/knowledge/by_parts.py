@@ -42,9 +42,9 @@ class Changes:
         removed, added = region.concluded - concluded, concluded - region.concluded
         if has_blank_node(removed | added):
             raise Joined("a node without a name")
+        self.new.update(map(graph_of, added - self.added))  # of a cell, each of its robots' parts concludes the same
         self.removed |= removed
         self.added |= added
-        self.new.update(map(graph_of, added))
         self.noted.update(quad for quad in region.concluded | added if graph_of(quad) == GRAPH_REASONED)
         if len(self.removed) + len(self.added) > MOST_WAITING:
             self.write(self.graph.made_of() if self.whole else ())
