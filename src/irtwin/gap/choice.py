@@ -119,13 +119,13 @@ def _predicting(case: Case, finding: ChannelFinding) -> ChannelFinding:
 
     Beside much that no effect explains, causes of the whole robot hide each other: a diagnosis names none of them.
     """
+    system = finding.system
     while (better := _best_predicting(case, finding)) is not None:
-        causes = (*finding.causes, better)
-        noise = finding.system.residual_rms([*finding.chosen, *better.columns], finding.attribution.noise)
-        attribution = replace(finding.attribution, causes=causes, noise=noise)
-        finding = replace(finding, attribution=attribution)
-        after = left_out(finding.system, noise, finding.chosen, np.flatnonzero(finding.system.group_observed))
-        finding = replace(finding, held_out=replace(finding.held_out, after=after))
+        columns = [*finding.chosen, *better.columns]
+        noise = system.residual_rms(columns, finding.attribution.noise)
+        after = left_out(system, noise, columns, np.flatnonzero(system.group_observed))
+        attribution = replace(finding.attribution, causes=(*finding.causes, better), noise=noise)
+        finding = replace(finding, attribution=attribution, held_out=replace(finding.held_out, after=after))
     return finding
 
 
