@@ -43,6 +43,22 @@ def test_the_verdict_is_one_sentence(verdict, against, said):
     assert summary.line(gap_cases.document(verdict), against) == f"{verdict}: {said}"
 
 
+def test_what_is_no_gap_but_far_from_noise_is_said():
+    diagnosis = gap_cases.diagnosis("no_gap")
+    joint = next(iter(diagnosis["gap"]["torque"]))
+    diagnosis["gap"]["torque"][joint]["excess"] = 142.0
+    document = Document.from_json(diagnosis)
+    much = f"12.0 times the noise floor at {joint}"
+    assert summary.line(document, "reference") == (
+        "no_gap: Nothing changed since the reference runs. The twin leaves as much of them as of the observed ones: "
+        f"{much}."
+    )
+    assert summary.line(document, None) == (
+        f"no_gap: There is no gap away from reversals. With these the twin leaves {much}: how dry friction turns is "
+        "not known."
+    )
+
+
 def test_a_simulator_that_is_right_agrees_beside_what_the_twin_leaves_of_both():
     diagnosis = gap_cases.diagnosis("no_gap")
     torque = {"before": 0.42, "after": 0.42, "noise_floor": 0.4, "interval95_after": None}

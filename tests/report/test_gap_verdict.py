@@ -11,11 +11,11 @@ from irtwin.report.gap.verdict import sentence
 
 def answers(scope, simulated=False, parameters=(), sure=0.9, verdict="ambiguous", odd=()):
     """A diagnosis with one finding, payload or contact, of the whole robot."""
-    rows = dict.fromkeys(("finding_joints", "locations", "disturbances"), ()) | {
+    rows = dict.fromkeys(("finding_joints", "locations", "disturbances", "sizes"), ()) | {
         "diagnosis": [
             {"verdict": verdict, "reason": "unsure", "floor_from": "repeats"}
             | {"tracking_error": None, "torque_error": 0.42}
-            | {"against_simulator": simulated}
+            | {"against_simulator": simulated, "against_reference": not simulated}
         ],
         "findings": [
             {"finding": "f1", "family": "load", "family_label": None, "confidence": 0.9, "scope": scope}

@@ -117,12 +117,14 @@ def sentence(
     differ: str = "",
     has_floor: bool = True,
     agrees: str | None = None,
+    left: str | None = None,
 ) -> str:
     """Return the verdict in plain words; `where` the gap lies may be empty.
 
     closes: how much of it is closed; None: unknown of the whole, and said of the first finding. `because`: of the
     verdict `unexplained`, as in the document; `differ`: by what runs of one motion differ, of what nothing explains;
-    `has_floor`: whether a noise floor is known; `agrees`: how far a simulator does, where it is held against one.
+    `has_floor`: whether a noise floor is known; `agrees`: how far a simulator does, where it is held against one;
+    `left`: what is said where the twin leaves far more than noise, and no gap.
     """
     if verdict == "no_gap":
         if agrees is not None:
@@ -133,7 +135,7 @@ def sentence(
                 "No cause of a gap was found. The noise of these data is not known: the twin may leave more than noise."
             )
         if not findings:
-            return "There is no gap: away from reversals the twin explains the data down to the noise floor."
+            return left or "There is no gap: away from reversals the twin explains the data down to the noise floor."
         return f"There is no gap that matters: {counted(findings)}."
     told = _told(findings)
     rest = [finding for finding in findings if finding not in told]

@@ -11,7 +11,7 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import AnswerTable, Row
 from irtwin.knowledge.vocabulary import EFFECT
 from irtwin.report.gap import findings
-from irtwin.report.gap.verdict import agrees, closes, differing, where
+from irtwin.report.gap.verdict import agrees, closes, differing, left, where
 from irtwin.report.wording import listed
 
 _DIGITS = 3  # significant ones: more than any interval leaves sure
@@ -50,6 +50,7 @@ def line(diagnosis: Document, against: str | None) -> str:
         ),
         shrink.noise_floor_from is not None,
         agrees(against, tracking, torque),
+        left([(size.joint, size.excess) for size in diagnosis.gap.sizes], since=against == "reference"),
     )
     numbers = findings.other_numbers([
         (parameter.name, parameter.joint, parameter.simulator, parameter.robot, parameter.unit, parameter.interval95)

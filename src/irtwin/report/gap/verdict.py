@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import groupby
 
@@ -13,6 +14,7 @@ from irtwin.report.gap.findings import ToldFinding
 from irtwin.report.questions import Answers, Row, effect_name
 
 _MOSTLY = 0.5  # share of a gap
+_FAR = 2.0  # noise floors: a twin that leaves more does not explain the data down to it
 
 
 def sentence(answers: Answers) -> str:
@@ -40,6 +42,7 @@ def sentence(answers: Answers) -> str:
         ]),
         judged["floor_from"] is not None,
         agrees(_against(judged), judged["tracking_error"], judged["torque_error"]),
+        left([(size["joint"], size["excess"]) for size in answers["sizes"].rows], since=judged["against_reference"]),
     )  # fmt: skip
     return numbers + words + findings.look_at(wording.local_name(judged["verdict"]), _odd_stretches(answers))
 
@@ -122,3 +125,21 @@ def agrees(against: str | None, tracking: float | None, torque: float | None) ->
     if torque is None or against != "simulated":
         return None
     return f"beside the {torque:.3g} N m RMS that no effect explains"
+
+
+def left(sizes: Sequence[tuple[str | None, float | None]], *, since: bool) -> str | None:
+    """Say what a twin leaves that is no gap, where it is far more than noise; `sizes`: joint and excess of places.
+
+    `since`: whether reference runs show it too; else it is dry friction near zero speed.
+    """
+    known = ((excess, joint or "the robot") for joint, excess in sizes if excess is not None)
+    most, joint = max(known, default=(0.0, ""))
+    floors = math.sqrt(max(1 + most, 0.0))
+    if floors < _FAR:
+        return None
+    much = f"{wording.number(floors)} times the noise floor at {joint}"
+    if since:
+        alike = "The twin leaves as much of them as of the observed ones"
+        return f"Nothing changed since the reference runs. {alike}: {much}."
+    turning = "how dry friction turns is not known"
+    return f"There is no gap away from reversals. With these the twin leaves {much}: {turning}."
