@@ -98,6 +98,7 @@ class WindingTemperature(_DriveLoss):
 
     id: ClassVar[str] = "winding_temperature"
     requires: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    alters: ClassVar[str | None] = "copper_loss"
     manual_test: ClassVar[str | None] = "log power and temperatures from a cold start"
     needs: ClassVar[str | None] = "torque"
 

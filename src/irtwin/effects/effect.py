@@ -145,7 +145,8 @@ class Effect(ABC):
     sample's states alone, and vary no faster than these. `differs_by_run`: what its coefficients are called, which are
     others in each run. `prior_tells`: that its coefficients lie far from what is known of them is evidence by itself.
 
-    `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion.
+    `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion,
+    `alters` an effect whose number it changes: where the twin lacks that, there is nothing to change.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
     `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, one
     `of_every_drive` needs no proof, what is `drawn_at_rest` does not depend on the motion, and what `scales_power`
@@ -173,6 +174,7 @@ class Effect(ABC):
     differs_by_run: ClassVar[str | None] = None
     family: ClassVar[str]
     requires: ClassVar[frozenset[str]] = frozenset()
+    alters: ClassVar[str | None] = None
     bodies: ClassVar[bool] = False
     within_bodies: ClassVar[bool] = False
     carries_torque: ClassVar[bool] = False

@@ -1,0 +1,35 @@
+"""What data cannot show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.synthetic import arm, as_run, data_set, measure, swing
+
+from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.gap.data.case import case_of
+from irtwin.gap.isolation.detectability import untestable
+from irtwin.gap.search import variants
+from irtwin.gap.thresholds import DEFAULT
+
+ROBOT = arm(2)
+WARM = "winding_temperature"
+
+
+@pytest.fixture(scope="module")
+def run():
+    motion = measure(ROBOT, swing(ROBOT, 0, seconds=5.0), noise=0.1)
+    return as_run(motion, temperature=np.full_like(motion.dq, 40.0))
+
+
+@pytest.mark.parametrize(("losses", "tried"), [((), False), (("copper_loss",), True)])
+def test_windings_are_warm_only_in_a_twin_that_has_their_resistance(run, losses, tried):
+    case = case_of(data_set(ROBOT, [run], (*BASELINE, *losses)), (), DEFAULT, None)
+    assert (WARM in {effect.id for effect in variants(case, "power")}) == tried
+
+
+def test_an_effect_that_alters_what_the_twin_lacks_is_said(run):
+    motions = case_of(data_set(ROBOT, [run], BASELINE), (), DEFAULT, None).seen
+    channels = [("power", type("Nothing", (), {"hypotheses": (), "visible": np.zeros((0, 2))}))]
+    (said,) = untestable([catalogue()[WARM]], BASELINE, channels, motions, DEFAULT.criterion)
+    assert (said.effect, said.why) == (WARM, "the twin has no copper_loss, which it alters")
