@@ -1,10 +1,14 @@
-"""Play and elasticity between motor and link: the link is one mass that swings behind a spring."""
+"""Play and elasticity between motor and link: the link is one mass that swings behind a spring.
+
+By its swing it drags the links of other joints along: joint i feels M_ij / M_jj of what joint j's link takes for itself
+(M: mass matrix), as the link's acceleration beyond its motor's is that torque over M_jj.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -55,15 +59,38 @@ def load_inertia(robot: Robot, motion: Motion, predicted: Predicted | None) -> n
     """Return (N, n) the inertia that each joint moves beyond its gear while the others hold, kg m^2, by the URDF."""
     if predicted is not None and predicted.inertia is not None:
         return predicted.inertia
+    rows, known = _mass_matrices(robot, motion)
+    own = np.maximum(np.diagonal(known, axis1=1, axis2=2), _LIGHTEST)
+    return np.column_stack([np.interp(np.arange(len(motion.time)), rows, of_joint) for of_joint in own.T])
+
+
+def _mass_matrices(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return some rows of a motion, the same ones in any part of a run, and the mass matrix (R, n, n) in each."""
     model = robot.model
     data = model.createData()
     every = max(1, round(_INERTIA_EVERY * motion.rate))
-    rows = np.arange(-motion.start % every, len(motion.time), every)  # the same ones in any part of a run
-    known = np.empty((len(rows), model.nv))
+    rows = np.arange(-motion.start % every, len(motion.time), every)
+    known = np.empty((len(rows), model.nv, model.nv))
     for row, q in enumerate(motion.q[rows]):
-        known[row] = pin.crba(model, data, q).diagonal()
-    known = np.maximum(known, _LIGHTEST)
-    return np.column_stack([np.interp(np.arange(len(motion.time)), rows, of_joint) for of_joint in known.T])
+        upper = np.triu(pin.crba(model, data, q))
+        known[row] = upper + np.triu(upper, 1).T
+    return rows, known
+
+
+def _dragged(robot: Robot, motion: Motion, acting: Sequence[int], predicted: Predicted | None) -> np.ndarray:
+    """Return (2, N, n, m): the torque of each joint, by 1 N m on an acting one's own inertia, and by 1 rad of its link.
+
+    The second is of the weight alone.
+    """
+    rows, known = _mass_matrices(robot, motion)
+    own = np.maximum(np.diagonal(known, axis1=1, axis2=2), _LIGHTEST)[:, None, acting]
+    model = model_of(robot, None if predicted is None else predicted.bodies)
+    data = model.createData()
+    weighs = np.array([pin.computeGeneralizedGravityDerivatives(model, data, q) for q in motion.q[rows]])
+    each = np.stack([known[:, :, acting] / own, weighs[:, :, acting]]).reshape(2, len(rows), -1)
+    every = np.arange(len(motion.time))
+    drawn = [[np.interp(every, rows, ratio) for ratio in ratios.T] for ratios in each]
+    return np.array(drawn).transpose(0, 2, 1).reshape(2, len(every), len(robot.joints), len(acting))
 
 
 def transmitted(
@@ -205,6 +232,33 @@ class _Compliance(JointEffect):
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
+    across: ClassVar[bool] = True
+
+    contribution = Effect.contribution
+    carried = Effect.carried
+
+    @property
+    def of_link(self) -> bool:
+        """Whether the position is measured on the link, so that all that swings is the motor."""
+        return False
+
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, k): what a link behind its motor takes of its own joint, and of those whose links it moves."""
+        own, acting = super().columns(robot, motion, predicted), self.places(robot)
+        if self.of_link or not acting:
+            return own
+        kept: dict[Any, Any] = {} if predicted is None else predicted.kept
+        key = "dragged", tuple(acting), motion.start
+        if key not in kept:
+            kept[key] = _dragged(robot, motion, acting, predicted)
+        dragged, weighs = kept[key]
+        swung = own[:, acting, range(len(acting))]
+        sag = self._sag(robot, swung + load_torque(robot, motion, predicted)[:, acting])
+        return np.asarray(swung[:, None] * dragged - sag[:, None] * weighs)
+
+    def _sag(self, robot: Robot, passed: np.ndarray) -> np.ndarray:
+        """Return (N, m) rad by which a spring of an acting joint gives under what it passes, N m."""
+        return np.zeros_like(passed)
 
     def _among(
         self,
@@ -291,7 +345,7 @@ class Backlash(_Compliance):
 
 @dataclass(frozen=True)
 class JointElasticity(_Compliance):
-    """A link that swings behind its motor; or a motor that turns beyond its link, Ia d2/dt2 (tau_load/K).
+    """A link that swings and sags behind its motor; or a motor that turns beyond its link, Ia d2/dt2 (tau_load/K).
 
     Which of the two depends on where the position is measured: on the motor, or (`antiresonance` 0) on the link. The
     antiresonance (Hz) is the frequency of the link's swing while the motor holds, with the joint's mean inertia; in
@@ -303,13 +357,18 @@ class JointElasticity(_Compliance):
 
     antiresonance: float = 0.0
 
+    @property
+    def of_link(self) -> bool:
+        """Whether no antiresonance is said."""
+        return self.antiresonance == 0
+
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
         """Return the link's encoder, and swings of 5 to 40 Hz."""
         return self.variants(antiresonance=(0.0, *_SWINGS))
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
         """Return Ia/K, or the share."""
-        if self.antiresonance == 0:
+        if self.of_link:
             return (Term("Ia/K", "s^2", joint.name, spread=5e-3, lowest=0.0),)
         return (Term("share", "1", joint.name, lowest=0.0),)
 
@@ -317,7 +376,7 @@ class JointElasticity(_Compliance):
         """Return what a unit of the coefficient adds."""
         acting = self.places(robot)
         load = load_torque(robot, motion, predicted)[:, acting]
-        if self.antiresonance == 0:
+        if self.of_link:
             return (_at(acting, motion, differentiate(differentiate(load, motion.rate), motion.rate)),)
         inertia = load_inertia(robot, motion, predicted)[:, acting]
         unit = np.sqrt(_mean_inertia(robot)[acting] / inertia)
@@ -330,19 +389,27 @@ class JointElasticity(_Compliance):
         )
         return (_at(acting, motion, passed - load),)
 
+    def _sag(self, robot: Robot, passed: np.ndarray) -> np.ndarray:
+        """Return by how much the spring gives under what it passes."""
+        return np.asarray(passed / self._stiffness(robot)[self.places(robot)])
+
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return K; nothing where the rotor's inertia is needed and not known."""
         quantities = []
-        stiffness = (2 * np.pi * self.antiresonance) ** 2 * _mean_inertia(robot)
+        stiffness = self._stiffness(robot)
         for joint, value, deviation in zip(self.acting(robot), given.values, given.deviations, strict=True):
             rotor = given.known.get(("rotor_inertia", joint.name, "Ia"), joint.rotor_inertia)
-            top = rotor if self.antiresonance == 0 else float(stiffness[robot.index(joint.name)])
+            top = rotor if self.of_link else float(stiffness[robot.index(joint.name)])
             if top is not None and value > 0:  # where no rotor swings K is 0, which is refused
                 sure = value - NORMAL * deviation > 0  # else K has no upper end
                 unit = f"{force_unit(joint)}/{joint.unit}"
                 convert = lambda give, top=top: ratio(top, give)  # noqa: E731
                 quantities.append(quantity("K", joint.name, value, unit, deviation if sure else None, convert))
         return tuple(quantities)
+
+    def _stiffness(self, robot: Robot) -> np.ndarray:
+        """Return (n,) N m/rad, by which a link of a joint's mean inertia swings so."""
+        return np.asarray((2 * np.pi * self.antiresonance) ** 2 * _mean_inertia(robot))
 
     def possible(self, robot: Robot, stated: Stated) -> Mapping[str, Possible]:
         """Return how soft the acting joint that moves least can be."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeGuard
 
 import numpy as np
 
@@ -301,7 +301,9 @@ class Effect(ABC):
 
 @dataclass(frozen=True)
 class JointEffect(Effect):
-    """An effect that acts within each joint alone, by m coefficients and columns per joint."""
+    """An effect of each joint by m coefficients and samples of it; within that joint alone, unless it acts `across`."""
+
+    across: ClassVar[bool] = False
 
     @abstractmethod
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
@@ -355,6 +357,11 @@ class JointEffect(Effect):
         parts = [part * along for part in self.samples(robot, motion, predicted)]
         acting = self.places(robot)
         return np.array([part[:, joint] for joint in acting for part in parts]).reshape(-1, len(along)).T
+
+
+def stays_within(effect: Effect) -> TypeGuard[JointEffect]:
+    """Return whether an effect acts within each joint alone, so that its samples are its columns."""
+    return isinstance(effect, JointEffect) and not effect.across
 
 
 def quantity(

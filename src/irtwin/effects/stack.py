@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from irtwin.effects.catalogue import catalogue
-from irtwin.effects.effect import Effect, JointEffect, Predicted, Term
+from irtwin.effects.effect import Effect, JointEffect, Predicted, Term, stays_within
 from irtwin.effects.prior import Prior
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
@@ -147,7 +147,7 @@ class Stack:
         predicted = Predicted(rng.uniform(-50, 50, shape))
         patterns = [
             np.array([[term.joint == name for term in effect.terms(self.robot)] for name in self.robot.joint_names])
-            if isinstance(effect, JointEffect)
+            if stays_within(effect)
             else np.any(effect.columns(self.robot, probe, predicted) != 0, axis=0)
             for effect in self._torque
         ]
@@ -191,7 +191,7 @@ class Stack:
         below = self._below(motion, values)
         by_joint: list[list[np.ndarray | AnyColumns]] = [[np.zeros((len(motion.time), 0))] for _ in self.robot.joints]
         for effect in self._torque:
-            if isinstance(effect, JointEffect) and effect.acts_in(motion) and not effect.memory:
+            if stays_within(effect) and effect.acts_in(motion) and not effect.memory:
                 samples = effect.samples(self.robot, motion, _part(below.get(effect.stage), motion))
                 for joint in effect.acting(self.robot):
                     place = self.robot.index(joint.name)

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from irtwin.document.document import Document
-from irtwin.effects.effect import Effect, JointEffect
+from irtwin.effects.effect import Effect, stays_within
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
 from irtwin.input_file import read_text
@@ -94,8 +94,8 @@ class _Torque:
         for (effect, term), value in zip(self._stack.torque_terms, self._values, strict=True):
             if number := effect.in_mjcf.get(term.name):
                 getattr(model, f"dof_{number}")[self._dq[twin.robot.index(str(term.joint))]] = max(value, 0.0)
-        self._within = [effect for effect in rest if isinstance(effect, JointEffect)]
-        self._across = [effect for effect in rest if not isinstance(effect, JointEffect)]
+        self._within = [effect for effect in rest if stays_within(effect)]
+        self._across = [effect for effect in rest if not stays_within(effect)]
         rubs = [place for effect in self._within for place in effect.places(twin.robot)]
         friction = model.dof_frictionloss
         friction[self._dq[rubs]] = np.maximum(friction[self._dq[rubs]], _LEAST)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from irtwin.effects.effect import Effect, JointEffect, Predicted
+from irtwin.effects.effect import Effect, Predicted, stays_within
 from irtwin.effects.stack import side_by_side
 from irtwin.gap.regression.hypotheses import CandidateColumn
 from irtwin.robot.description import Robot
@@ -102,7 +102,7 @@ class Candidates:
         effect, robot = self._effects[place], self._robot
         if not effect.acts_in(motion):
             return [[np.zeros((len(motion.time), int(used.sum())))] for used in self._patterns[place]]
-        if isinstance(effect, JointEffect) and effect.signal == "torque":  # dense, it would be zeros for the most part
+        if stays_within(effect) and effect.signal == "torque":  # dense, it would be zeros for the most part
             samples = effect.samples(robot, motion, predicted)
             acting = {joint.name for joint in effect.acting(robot)}
             return [
