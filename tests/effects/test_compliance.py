@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -106,44 +105,6 @@ def test_one_joint_alone_is_as_among_others(effect):
     (one,) = effect.on(robot.joint_names[1]).samples(robot, motion, predicted)
     np.testing.assert_allclose(one[:, 1], every[:, 1], rtol=1e-12, atol=1e-12)
     assert every[:, 1].any() and not one[:, [0, 2]].any()
-
-
-def softly_driven(robot, motion, stiffness, damping):
-    """The torque of all joints, (N, n), the second of which is a spring: by full dynamics, in fine steps."""
-    model, steps = robot.model, 20
-    data, step = model.createData(), 1 / (steps * motion.rate)
-    fine = np.arange((len(motion.time) - 1) * steps + 1) / steps
-    motors = [
-        np.column_stack([np.interp(fine, np.arange(len(values)), of_joint) for of_joint in values.T])
-        for values in (motion.q, motion.dq, motion.ddq)
-    ]
-    behind, gains, torque = 0.0, 0.0, []
-    for row in range(len(fine)):
-        q, dq, ddq = (values[row].copy() for values in motors)
-        q[1] += behind
-        dq[1] += gains
-        free = pin.rnea(model, data, q, dq, ddq)[1]
-        more = (-stiffness * behind - damping * gains - free) / pin.crba(model, data, q)[1, 1]
-        ddq[1] += more
-        torque.append(pin.rnea(model, data, q, dq, ddq))
-        gains += step * more
-        behind += step * gains
-    return np.array(torque[::steps])
-
-
-def test_an_elastic_joint_moves_the_others_as_its_full_dynamics_say():
-    robot = arm(3)
-    motion = swing(robot, 3, seconds=4, rate=200)
-    effect = JointElasticity(antiresonance=12.0, joints=("joint_2",))
-    stiffness = (2 * np.pi * 12.0) ** 2 * robot.mean_inertia[1]
-    inertia = load_inertia(robot, motion, None)[:, 1].mean()
-    rigid = load_torque(robot, motion, None)
-    added = softly_driven(robot, motion, stiffness, 0.2 * np.sqrt(stiffness * inertia)) - rigid
-    said = effect.columns(robot, motion)[..., 0]
-    later = motion.time > 1  # the swing that it begins with is over
-    missed, whole = (np.sqrt((values[later] ** 2).mean(axis=0)) for values in (added - said, added))
-    assert (missed[1:] < 0.12 * whole[1:]).all()
-    assert missed[0] < 0.05 * whole[1]  # of the upright axis, by Coriolis' force alone
 
 
 def test_a_gap_that_is_known_about_passes_the_mean_of_it_and_of_those_about_it():

@@ -111,21 +111,29 @@ def dahl(state, d=0.05, fc=TRUE["Fc"][1]):
 
 
 def behind_a_spring(state, stiffness, damping, play=0.0):
-    """The torque that passes a spring with play between motor and link, less what a stiff gear passes."""
-    time, load = state.motion.time, state.rigid[:, 1]
-    inertia = np.array([pin.crba(ROBOT.model, ROBOT.model.createData(), q)[1, 1] for q in state.motion.q])
-    pushed, moved = make_interp_spline(time, load, k=1), make_interp_spline(time, inertia, k=1)
+    """The torque of all joints where joint 2's link is behind a spring with play, less that behind a stiff gear."""
+    motion, model, data = state.motion, ROBOT.model, ROBOT.model.createData()
+    motors = [make_interp_spline(motion.time, values, k=1) for values in (motion.q, motion.dq, motion.ddq)]
 
     def passed(lead, speed):
         give = np.sign(lead) * max(abs(lead) - play / 2, 0.0)
         return stiffness * give + damping * speed * (give != 0)
 
-    def motion(now, lead_and_speed):
-        return lead_and_speed[1], (pushed(now) - passed(*lead_and_speed)) / moved(now)
+    def links(now, *leads):
+        q, dq, ddq = (motor(now) - np.multiply(lead, [0, 1, 0]) for motor, lead in zip(motors, leads, strict=True))
+        return pin.rnea(model, data, q, dq, ddq), pin.crba(model, data, q)[1, 1]
 
-    start = (load[0] / stiffness + np.sign(load[0]) * play / 2, 0.0)
-    done = solve_ivp(motion, time[[0, -1]], start, t_eval=time, method="LSODA", max_step=2e-3, rtol=1e-5, atol=1e-8)
-    return only(np.array([passed(*each) for each in done.y.T]) - load)
+    def gains(now, lead, speed):
+        taken, inertia = links(now, lead, speed, 0.0)
+        return (taken[1] - passed(lead, speed)) / inertia
+
+    start = (state.rigid[0, 1] / stiffness + np.sign(state.rigid[0, 1]) * play / 2, 0.0)
+    moved = solve_ivp(
+        lambda now, lead: (lead[1], gains(now, *lead)),
+        motion.time[[0, -1]], start, t_eval=motion.time, method="LSODA", max_step=2e-3, rtol=1e-5, atol=1e-8,
+    )  # fmt: skip
+    taken = [links(now, *lead, gains(now, *lead))[0] for now, lead in zip(moved.t, moved.y.T, strict=True)]
+    return np.array(taken) - state.rigid
 
 
 def tilted(state, x=0.05, y=-0.03):
@@ -335,6 +343,16 @@ def test_truth_is_found_predicted_booked_and_saved(case, tmp_path):
     assert loaded.effects == twin.effects and loaded.quantities == twin.quantities
     np.testing.assert_array_equal(loaded.torque(again), twin.torque(again))
     np.testing.assert_array_equal(loaded.power(again), twin.power(again))
+
+
+def test_an_elastic_joint_moves_the_others_as_its_full_dynamics_say():
+    motion = swing(ROBOT, 2, seconds=4, rate=200)
+    added = behind_a_spring(healthy(motion), SOFT, 11.5)
+    said = compliance.JointElasticity(antiresonance=10.0, joints=J2).columns(ROBOT, motion)[..., 0]
+    share = SOFT / ((2 * np.pi * 10) ** 2 * ROBOT.mean_inertia[1])  # of the spring whose link swings so
+    missed, whole = (np.sqrt((values[motion.time > 1] ** 2).mean(axis=0)) for values in (added - said / share, added))
+    assert (missed[1:] < 0.15 * whole[1:]).all()
+    assert missed[0] < 0.1 * whole[1]  # of the upright axis: Coriolis' force alone
 
 
 def test_an_encoders_offset_shifts_torque_as_inverse_dynamics_says():
