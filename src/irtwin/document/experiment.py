@@ -33,7 +33,7 @@ class Instruction:
 class PlannedRun:
     """A run that a programme asks for: its payload, kg, and the joints' temperature, degC, where it matters."""
 
-    payload_mass_kg: float = told("Planned_Payload")
+    payload_mass: float = told("Planned_Payload", column="payload_mass_kg")
     temperature_degc: float | None = told("Planned_Temperature")
 
 
@@ -94,7 +94,7 @@ class Programme(Settings, Course):  # in JSON the course comes first
         """The runs, one for each payload."""
         temperatures = self.temperatures or (None,) * len(self.payload_mass)
         both = zip(self.payload_mass, temperatures, strict=True)
-        return tuple(PlannedRun(payload_mass_kg=mass, temperature_degc=temperature) for mass, temperature in both)
+        return tuple(PlannedRun(payload_mass=mass, temperature_degc=temperature) for mass, temperature in both)
 
     @property
     @tells()
