@@ -17,7 +17,7 @@ from irtwin.toml_file import TomlTable, read_toml
 
 FILE = "plant.toml"  # in a workspace; a person writes it
 _YEAR = 8784  # hours of the longest
-_KEYS = ("name", "price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", KEY)
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", "name", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
 
 
