@@ -21,7 +21,7 @@ from irtwin.storage.database import Workspace
 from tests import small_fleet
 from tests.mapped import MAPPINGS
 
-TARIFF = 'price_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
+TARIFF = 'name = "Werk 1"\nprice_per_kwh = 0.2\ncurrency = "EUR"\nco2_kg_per_kwh = 0.4\nhours_a_year = 1000\n'
 HOSTILE = "=1+1\"><script>alert('x')</script>"
 
 

@@ -1,3 +1,4 @@
+import random
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
@@ -38,6 +39,15 @@ def test_triple_in_two_graphs_counts_once() -> None:
     assert total(graph) == 2.0
     graph.replace([], A)
     assert total(graph) == 0
+
+
+def test_what_comes_and_goes_in_two_graphs_stays_in_the_union_as_long_as_one_says_it() -> None:
+    draw = random.Random(32)
+    every = [quad(name, 1.0, place) for name in ("x", "y") for place in (A, B)]
+    with KnowledgeGraph() as graph:
+        for _ in range(300):
+            graph.change(draw.sample(every, draw.randint(0, 3)), draw.sample(every, draw.randint(0, 3)))
+            assert graph.triples() == graph.triples("")
 
 
 def test_many_new_quads_go_into_files_of_their_own_and_count_once(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from irtwin.knowledge.explain import rules
 from irtwin.knowledge.explain.explain import explain
 from irtwin.knowledge.explain.explanation import LEFT_OUT
 from irtwin.knowledge.explain.verify import WHOLE, verify
+from irtwin.knowledge.questions.queries import named_questions
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.rules.files import read_rules
 from irtwin.knowledge.rules.running import conclusions
@@ -82,6 +83,15 @@ def test_a_cost_is_explained_down_to_the_tariff(graph: KnowledgeGraph) -> None:
     assert 'irt:Energy_Consumption "1000"^^xsd:double' in said
     (found,) = explain(graph, "id:robot/Arm_A irt:Yearly_Saving ?")
     assert "tariff:electricity irt:Operating_Hours" in str(found)
+
+
+def test_robots_and_joints_are_parts_of_the_plant_that_the_workspace_names(graph: KnowledgeGraph) -> None:
+    parts = graph.query("SELECT ?part { ?part irt:part_of ?plant . ?plant a irt:Plant ; rdfs:label 'Werk 1' }")
+    assert {graph.iri(f"robot/Arm_{letter}") for letter in "ABCD"} < {row["part"] for row in parts}
+    places = graph.query(named_questions()["energy_per_place"].text)
+    assert [(row["plant"], row["robots"]) for row in places if row["plant"]] == [("Werk 1", 2)]  # two have a meter
+    found = str(explain(graph, "id:robot/Arm_A irt:part_of id:plant/Werk%201")[0])
+    assert 'the rule "part of the plant"' in found and "file plant.toml" in found
 
 
 def logged(place: Path, runs: int) -> KnowledgeGraph:

@@ -36,6 +36,7 @@ def test_all_of_it(tmp_path: Path) -> None:
         ("co2_kg_per_kwh = -1", "co2_kg_per_kwh should be a number of at least 0, not -1"),
         ("co2_kg_per_kwh = inf", "not inf"),
         ("co2_kg_per_kwh = true", "not True"),
+        ("name = ' '", "name should be text, not ' '"),
         ('currency = "<script>"', "currency is a code or a sign"),
     ],
 )

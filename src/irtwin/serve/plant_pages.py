@@ -1,4 +1,4 @@
-"""/, /robot/NAME, /run/NAME, /compare, /tables, /saving: the plant as a person reads it, by answers of the workers."""
+"""/, /robot/NAME, /run/NAME, /compare, /tables, /saving, /say/NAME: the plant for people, as the workers answer."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from irtwin.serve.protocol import Refusal, read_body
 from irtwin.serve.report_files import ReportFiles
 from irtwin.serve.saving_form import KNOWN, read_form
 from irtwin.serve.updates import Updates
+from irtwin.serve.value_form import SaidValue, read_value
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
 POLICY = (
@@ -57,8 +58,11 @@ class PlantPages:
             "/tables/ledger.{form}": self._ledger_table,
             "/tables/comparison.{form}": self._comparison_table,
         }
-        done = Route("/saving", self._done, methods=["POST"])
-        return [*(Route(path, page, methods=["GET"]) for path, page in pages.items()), done]
+        said = {"/saving": self._done, "/say/{name}": self._say}
+        return [
+            *(Route(path, page, methods=["GET"]) for path, page in pages.items()),
+            *(Route(path, keep, methods=["POST"]) for path, keep in said.items()),
+        ]
 
     async def _plant(self, request: Request) -> Response:
         asked, wrong = self._chosen(request)
@@ -74,11 +78,12 @@ class PlantPages:
 
         return await html(drawn)
 
-    async def _robot(self, request: Request) -> Response:
+    async def _robot(self, request: Request, refused: str = "", said: SaidValue | None = None) -> Response:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
         values = self._beside(request) | self._reports.of_robot(links.tail(iri, self._asking.base))
         values["number"] = page_number(request.query_params.get("page"))
+        values |= {"writable": self._updates.allowed, "refused": refused, "said": said}
         shown = {**robot.of_robot(answers, values["zone"]), **values}
         return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
 
@@ -135,6 +140,27 @@ class PlantPages:
             raise Refusal(404, f"the graph knows no saving action {done.action}")
         await self._updates.do(done.operation, self._asking.base, done.authorization, done.author)
         return RedirectResponse("/#saving", status_code=303)
+
+    async def _say(self, request: Request) -> Response:
+        """Keep a value that a robot's page lets users say, and lead back to it: with why, where it is refused."""
+        said = read_value(await read_body(request, self._limits.request, self._limits.seconds))
+        self._updates.admit(said.authorization)
+        asked = {"sayable": page.questions("robot")["sayable"]}
+        iri = self._individual("robot", request.path_params["name"])
+        answers = await self._known(request, asked, {"robot": iri}, "sayable")
+        ranges = {(row["about"], row["property"]): row["range"] for row in answers["sayable"].rows}
+        if (said.about, said.property) not in ranges:
+            raise Refusal(404, f"the page of {iri} has nothing to say of {said.property} of {said.about}")
+        operation = said.operation(ranges[said.about, said.property])
+        try:
+            await self._updates.do(operation, self._asking.base, said.authorization, said.author)
+        except Refusal as refusal:
+            if refusal.status != 400:
+                raise
+            answer = await self._robot(request, refusal.message, said)
+            answer.status_code = refusal.status
+            return answer
+        return RedirectResponse(f"/robot{request.url.path.removeprefix('/say')}#say", status_code=303)
 
     async def _made_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, {"made": page.questions()["made"]}, {})

@@ -104,6 +104,11 @@ def read_parameters(encoded: str) -> dict[str, list[str]]:
         raise Refusal(400, f"more than {_MOST_PARAMETERS} parameters") from None
 
 
+def read_fields(body: bytes) -> dict[str, str]:
+    """Read a form that a page sends: the last value of each field."""
+    return {name: values[-1] for name, values in read_parameters(body.decode("ascii", errors="replace")).items()}
+
+
 def _text(body: bytes) -> str:
     try:
         return body.decode()

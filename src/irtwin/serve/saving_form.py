@@ -9,7 +9,7 @@ from pyoxigraph import Literal, NamedNode
 from irtwin.errors import InputError
 from irtwin.knowledge.vocabulary import GRAPH_ASSERTED, IRT
 from irtwin.report.plant.choice import day
-from irtwin.serve.protocol import Operation, Refusal, read_parameters
+from irtwin.serve.protocol import Operation, Refusal, read_fields
 
 KNOWN = f"?action a <{IRT}Saving_Action> ; <{IRT}saves_at> ?robot"  # what an action must be to be done
 _TAKEN_BACK = "DELETE WHERE {{ GRAPH <{graph}> {{ {action} ?said ?of_it }} }}"
@@ -36,7 +36,7 @@ class SaidDone:
 
 def read_form(body: bytes) -> SaidDone:
     """Read a form of `action`, `day`, `by` and `token`; without a day what was said is taken back. Raises Refusal."""
-    fields = {name: values[-1] for name, values in read_parameters(body.decode("ascii", errors="replace")).items()}
+    fields = read_fields(body)
     try:
         action = NamedNode(fields.get("action", ""))
         done_on = day(fields.get("day", ""))

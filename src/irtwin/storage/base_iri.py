@@ -24,6 +24,7 @@ SERVED = (
     "robot",
     "run",
     "saving",
+    "say",
     "sparql",
     "tables",
 )

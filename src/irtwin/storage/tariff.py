@@ -1,6 +1,6 @@
-"""What a kilowatt hour costs and emits at this plant: said once, in `plant.toml` of the workspace, never guessed.
+"""The plant and what a kilowatt hour costs and emits there: said once, in `plant.toml` of the workspace, never guessed.
 
-The graph is told it as the individual `tariff:electricity`; what follows from it is concluded there.
+The graph is told it as the individuals `plant/NAME` and `tariff:electricity`; what follows is concluded there.
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from irtwin.toml_file import TomlTable, read_toml
 
 FILE = "plant.toml"  # in a workspace; a person writes it
 _YEAR = 8784  # hours of the longest
-_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", KEY)
+_KEYS = ("price_per_kwh", "currency", "co2_kg_per_kwh", "hours_a_year", "time_zone", "name", KEY)
 _CURRENCY = re.compile(r"[^\W\d_]{1,8}|[$€£¥₹₩]")
 
 
 @dataclass(frozen=True)
 class Tariff:
     """Price and emission factor of a kWh, and the hours that robots are on in a year, None where nobody said; the
-    plant's clock."""
+    plant's clock and name."""
 
     price: float | None = None  # currency/kWh
     currency: str = ""
     co2: float | None = None  # kg/kWh
     hours: float | None = None  # a year
     zone: ZoneInfo = field(default_factory=lambda: ZoneInfo("UTC"))
+    plant: str | None = None
 
 
 def read_tariff(workspace: Path) -> Tariff:
@@ -49,7 +50,7 @@ def read_tariff(workspace: Path) -> Tariff:
     if hours is not None and hours > _YEAR:
         raise InputError(f"{file}: hours_a_year is {_YEAR} at most, not {hours:g}")
     zone = _zone(file, table.values.get("time_zone", "UTC"))
-    return Tariff(price, currency, table.number("co2_kg_per_kwh", least=0.0), hours, zone)
+    return Tariff(price, currency, table.number("co2_kg_per_kwh", least=0.0), hours, zone, table.text("name"))
 
 
 def _zone(file: Path, name: Any) -> ZoneInfo:

@@ -147,6 +147,8 @@ class Explainer:
             unnamed = triple.subject if isinstance(triple.subject, BlankNode) else None
             if module is None and triple.subject == ELECTRICITY:
                 return Explanation(statement, "the plant's tariff", file=FILE)
+            if module is None and str(triple.subject).startswith(f"<{self._graph.iri('plant/')}"):
+                return Explanation(statement, "the plant", file=FILE)
             if module is None and unnamed is None and triple.predicate == SOURCE:
                 values = self._graph.store.said(triple.subject, LIMIT_VALUE)
                 return Explanation(statement, "who set the limit", tuple(self.triple(quad.triple) for quad in values))

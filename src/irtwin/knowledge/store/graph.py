@@ -114,16 +114,16 @@ class KnowledgeGraph:
 
     @property
     def has_ontology(self) -> bool:
-        """Whether the ontology's graph is made of the modules and of the tariff that hold for the workspace now."""
-        return self.holds(ontology.version(self.resources, self._workspace))
+        """Whether the ontology's graph is made of the modules, plant and tariff that hold for the workspace now."""
+        return self.holds(ontology.version(self.resources, self._workspace, self.base))
 
     def load_ontology(self) -> None:
-        """Put the modules of `ontology/` into the ontology's graph, and the tariff that the workspace says.
+        """Put the modules of `ontology/` into the ontology's graph, and the plant and tariff that the workspace says.
 
         With them goes a name of their content, by which a graph that is made of these already is left alone.
         """
         if not self.has_ontology:
-            self.replace(ontology.quads(self.resources, self._workspace), GRAPH_ONTOLOGY)
+            self.replace(ontology.quads(self.resources, self._workspace, self.base), GRAPH_ONTOLOGY)
 
     @property
     @telling

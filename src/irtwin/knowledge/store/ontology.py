@@ -1,4 +1,4 @@
-"""What the ontology's graph says: the modules that hold for a workspace, its tariff, and a name of their content."""
+"""What the ontology's graph says: the modules of a workspace, its plant and tariff, and a name of their content."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
+from urllib.parse import quote
 
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 
 from irtwin.knowledge.store.named_graphs import in_graph
 from irtwin.knowledge.store.rdf_input import read_turtle
-from irtwin.knowledge.vocabulary import DCTERMS, GRAPH_ONTOLOGY, ONTOLOGY, OWL, TARIFF, term
+from irtwin.knowledge.vocabulary import DCTERMS, GRAPH_ONTOLOGY, ONTOLOGY, OWL, RDFS, TARIFF, TYPE, term
 from irtwin.resources import Resources
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
@@ -20,14 +21,14 @@ ELECTRICITY = NamedNode(f"{TARIFF}electricity")
 LIMIT_VALUE, SOURCE = NamedNode(term("Limit_Value")), NamedNode(f"{DCTERMS}source")
 
 
-def quads(resources: Resources, workspace: Path | None) -> Iterator[Quad]:
-    """Yield what the ontology's graph says."""
-    more = chain(_tariff(workspace), [version(resources, workspace)])
+def quads(resources: Resources, workspace: Path | None, base: str) -> Iterator[Quad]:
+    """Yield what the ontology's graph says; the plant is an individual below the base."""
+    more = chain(_of_plant(workspace, base), [version(resources, workspace, base)])
     return chain(of_modules(resources), in_graph(more, GRAPH_ONTOLOGY))
 
 
 def of_modules(resources: Resources) -> tuple[Quad, ...]:
-    """Return what the modules say, without the tariff."""
+    """Return what the modules say, without plant and tariff."""
     return _read_modules(*_modules(resources))
 
 
@@ -41,10 +42,10 @@ def limits(resources: Resources) -> dict[tuple[NamedNode, NamedNode], Quad]:
     return {(subject, name): quad for (subject, name), quad in about.items() if (subject, LIMIT_VALUE) in about}
 
 
-def version(resources: Resources, workspace: Path | None) -> Triple:
-    """Return what a graph of these modules and this tariff says of itself."""
+def version(resources: Resources, workspace: Path | None, base: str) -> Triple:
+    """Return what a graph of these modules, this plant and its tariff says of itself."""
     digest = hashlib.sha256(_modules(resources)[1])
-    digest.update("".join(map(str, _tariff(workspace))).encode())
+    digest.update("".join(map(str, _of_plant(workspace, base))).encode())
     return Triple(NamedNode(ONTOLOGY), NamedNode(f"{OWL}versionInfo"), Literal(f"sha-256:{digest.hexdigest()}"))
 
 
@@ -54,8 +55,8 @@ def _modules(resources: Resources) -> tuple[tuple[Path, ...], bytes]:
     return paths, b"".join(path.read_bytes() for path in paths)
 
 
-def _tariff(workspace: Path | None) -> Iterator[Triple]:
-    """Yield what `plant.toml` says of the tariff, which holds for all robots. InputError where it is at fault."""
+def _of_plant(workspace: Path | None, base: str) -> Iterator[Triple]:
+    """Yield what `plant.toml` says of plant and tariff, which hold for all robots. InputError where it is at fault."""
     tariff = Tariff() if workspace is None else read_tariff(workspace)
     values: dict[str, float | str | None] = {
         term("Energy_Price"): tariff.price,
@@ -68,6 +69,11 @@ def _tariff(workspace: Path | None) -> Iterator[Triple]:
         yield Triple(ELECTRICITY, NamedNode(name), Literal(value))
     if known:
         yield Triple(ELECTRICITY, SOURCE, Literal(FILE))
+    if tariff.plant is not None:
+        plant = NamedNode(f"{base}plant/{quote(tariff.plant, safe='')}")
+        yield Triple(plant, TYPE, NamedNode(term("Plant")))
+        yield Triple(plant, NamedNode(f"{RDFS}label"), Literal(tariff.plant))
+        yield Triple(ELECTRICITY, NamedNode(term("tariff_of")), plant)
 
 
 @lru_cache(maxsize=1)  # a run puts them into two graphs

@@ -43,6 +43,8 @@ def render(name: str, answers: Answers, bindings: Mapping[str, str], **values: A
             "curves": None,
             "actions": (),
             "writable": False,
+            "refused": "",
+            "said": None,
             "fewest": FEWEST,
             "asked": choice.ALL,
             "groups": choice.GROUPS,
