@@ -14,6 +14,7 @@ from irtwin.cli.options import (
     DAY,
     FILE,
     FOLDER,
+    OUT,
     PLACE,
     Number,
     database_option,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from irtwin.plans import Kept, Timings
     from irtwin.twin.price import Figure
 
-_OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -55,7 +55,7 @@ _kept = locating(
 @click.option(
     "--via", metavar="POSE", multiple=True, help="Stand there on the way, in the order that takes least. Repeatable."
 )
-@click.option("--out", type=FILE, help=_OUT)
+@click.option("--out", type=FILE, help=OUT)
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -181,7 +181,7 @@ def predict(
 )
 @click.option("--base", is_flag=True, help="Look for a place where the base would stand better, too.")
 @click.option("--free-order", is_flag=True, help="Look for a better order of the places where it pauses, too.")
-@click.option("--out", type=FILE, help=_OUT)
+@click.option("--out", type=FILE, help=OUT)
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
 def optimise(
