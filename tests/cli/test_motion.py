@@ -59,4 +59,4 @@ def test_an_order_says_what_it_saves() -> None:
     said = _order_text(of_run)
     assert said.startswith("order of places between the first pause and the last: 2, 1; saves 12 +- 3 J")
     assert said.endswith("(6 +- 1.5 kWh in 5000 h a year)")
-    assert "there is no other order" in _order_text(SimpleNamespace(tour=None))
+    assert "no other order" in _order_text(SimpleNamespace(tour=None))

@@ -247,3 +247,6 @@ def test_a_programme_pauses_at_its_places_in_the_order_that_takes_least(folder) 
     tour = any_order(known, programme)
     assert tour.order in ((3, 2, 1), (2, 3, 1)) and tour.saved.value > 0
     assert any_order(known, replace(programme, sections=sections[:5])) is None
+    best = [0, *(2 * place for place in tour.order), 8]
+    ordered = replace(programme.motion, q=np.repeat(q[::2][[row // 2 for row in best]], 2, axis=0))
+    assert any_order(known, replace(programme, motion=ordered)) is None

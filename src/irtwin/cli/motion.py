@@ -256,10 +256,9 @@ def _placement_text(timings: Timings) -> str:
 
 def _order_text(timings: Timings) -> str:
     if (tour := timings.tour) is None:
-        return "order of places: between the first pause and the last there are not two, so there is no other order"
-    return _tour_text(tour, "places between the first pause and the last") + (
-        "" if tour.saved is None else _year(timings, tour.saved)
-    )
+        return "no other order of the places between the first pause and the last takes less"
+    assert tour.saved is not None
+    return _tour_text(tour, "places between the first pause and the last") + _year(timings, tour.saved)
 
 
 def _year(timings: Timings, saved: Figure) -> str:

@@ -137,7 +137,7 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
 def any_order(twin: Twin, programme: SectionedMotion) -> Tour | None:
     """Return the order of a programme's pauses that takes least energy; its first and last stay where they are.
 
-    Both orders are planned, as `plan` does. None where there is one order alone.
+    Both orders are planned, as `plan` does. None where no other takes less.
     """
     motion = programme.motion
     poses = [motion.q[section.first] for section in programme.sections if section.kind == "pause"]
@@ -151,7 +151,8 @@ def any_order(twin: Twin, programme: SectionedMotion) -> Tour | None:
         payload_mass=motion.payload_mass,
         payload_com=motion.payload_com,
     )
-    return plan(twin, task).tour
+    tour = plan(twin, task).tour
+    return tour if tour and tour.saved and tour.saved.value > 0 else None
 
 
 def _toured(twin: Twin, task: Task, rate: float) -> Plan:
