@@ -86,14 +86,16 @@ def _rows(robot: Robot, fitted: list[Motion], filtered: list[Motion], judging: l
     begin = sum(os.times()[:4])
     twin = identify(robot, fitted)
     seconds = sum(os.times()[:4]) - begin
-    told, their_seconds = _figaroh(robot.urdf, filtered, judging, python)
+    told, their_seconds = figaroh_torque(robot.urdf, filtered, judging, python)
     return [
         f"| {robot.name} | irtwin | {_left(judging, [twin.torque(motion) for motion in judging])} | {seconds:.1f} |",
         f"| | figaroh | {_left(judging, told)} | {their_seconds:.1f} |",
     ]
 
 
-def _figaroh(urdf: str, fitted: list[Motion], judging: list[Motion], python: str) -> tuple[list[np.ndarray], float]:
+def figaroh_torque(
+    urdf: str, fitted: list[Motion], judging: list[Motion], python: str
+) -> tuple[list[np.ndarray], float]:
     """Return what figaroh tells of the torque of each motion that judges, and the seconds of its fit."""
     with TemporaryDirectory() as name:
         folder = Path(name)

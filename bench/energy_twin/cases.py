@@ -41,14 +41,15 @@ MORE = ("holding_brakes", "stribeck_friction", "load_dependent_friction")
 class Case:
     """A data set and its truth; `effects`: those beyond the baseline.
 
-    `plant`: what a motion takes when it is executed, (N,) W each `STEP`, before any sensor.
+    `plant`: what a motion takes when it is executed with a payload by a day's friction, (N,) W each `STEP`, before any
+    sensor.
     """
 
     name: str
     data_set: DataSet
     effects: tuple[str, ...]
     truth: Truth
-    plant: Callable[[PlantMotion], np.ndarray]
+    plant: Callable[[PlantMotion, PlantPayload, np.random.Generator], np.ndarray]
 
 
 def cases(seeds: Sequence[int], only: str = "") -> Iterator[Case]:
@@ -70,12 +71,16 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     ]
     effects = _effects(machine, len(motions), more)
 
-    def executed(motions: list[PlantMotion]) -> tuple[Traces, np.ndarray, Parts]:
+    def executed(
+        motions: list[PlantMotion], payload: PlantPayload, rng: np.random.Generator
+    ) -> tuple[Traces, np.ndarray, Parts]:
         """Return what motions do, their power, (T, R) W, and its parts, (T, R) W or a joint's, (T, R, n)."""
         told = np.stack([motion.dq for motion in motions], axis=1)
         released = _released(told) if more else np.ones(told.shape[:2])
         traces, friction = (
-            _followed(machine, motions, more) if exact else _simulated(machine, motions, effects, rng, 1 - released)
+            _followed(machine, motions, payload, more)
+            if exact
+            else _simulated(machine, motions, payload, effects, rng, 1 - released)
         )
         driven = replace(traces, torque=traces.torque * released[:, :, None])  # closed brakes carry the links
         parts = {
@@ -92,7 +97,7 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
             drawn = drawn + parts["holding_brakes"]
         return traces, drawn, parts
 
-    traces, drawn, parts = executed(motions)
+    traces, drawn, parts = executed(motions, PlantPayload(), rng)
     sensed = shown(traces, machine, (), STEP)[::STRIDE]
     sensors, cut = drawings.sensors, slice(None, None, STRIDE)
     noise = np.random.default_rng([9, seed])
@@ -109,7 +114,7 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
     logged = {part: np.trapezoid(watts[cut], dx=STEP * STRIDE, axis=0) for part, watts in parts.items()}
     energies = {run.name: {part: joules[k] for part, joules in logged.items()} for k, run in enumerate(runs)}
     truth = Truth(drawings.joints, machine, numbers(machine, exact=exact, more=more), energies, plain=not more)
-    return Case(name, known, listed, truth, lambda motion: executed([motion])[1][:, 0])
+    return Case(name, known, listed, truth, lambda motion, payload, day: executed([motion], payload, day)[1][:, 0])
 
 
 def _run(name: str, signals: Signals) -> Run:
@@ -144,6 +149,7 @@ def _effects(machine: Machine, runs: int, more: bool) -> tuple[Effect, ...]:
 def _simulated(
     machine: Machine,
     motions: list[PlantMotion],
+    payload: PlantPayload,
     effects: tuple[Effect, ...],
     rng: np.random.Generator,
     braked: np.ndarray,
@@ -151,18 +157,18 @@ def _simulated(
     """Return what a controller in MuJoCo makes of motions, and its friction, (T, R, n) N m, where laws are simple."""
     runs, n = len(motions), len(machine.drawings.joints)
     jitter = 1 + machine.drawings.tolerance.friction_per_run * rng.standard_normal((runs, 2, n)).clip(-2, 2)
-    traces = Fleet(
-        machine, motions, [PlantPayload()] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked
-    ).run(effects)
+    traces = Fleet(machine, motions, [payload] * runs, np.full((runs, n), 35.0), jitter, STEP, braked=braked).run(
+        effects
+    )
     if any(effect.id == "stribeck_friction" for effect in effects):
         return traces, {}
     dry, oil = machine.friction.coulomb * jitter[:, 0], machine.friction.viscous * jitter[:, 1]
     return traces, {"coulomb_friction": dry * np.sign(traces.dq), "viscous_friction": oil * traces.dq}
 
 
-def _followed(machine: Machine, motions: list[PlantMotion], more: bool) -> tuple[Traces, Parts]:
+def _followed(machine: Machine, motions: list[PlantMotion], payload: PlantPayload, more: bool) -> tuple[Traces, Parts]:
     """Return the motions followed exactly, and friction by the catalogue's laws, (T, R, n) N m."""
-    arm, friction, rotor = machine.arm(PlantPayload()), machine.friction, machine.drive.joint_inertia
+    arm, friction, rotor = machine.arm(payload), machine.friction, machine.drive.joint_inertia
     arm.model.dof_armature[:] = 0.0
     q, dq, ddq = (np.stack([getattr(one, name) for one in motions], axis=1) for name in ("q", "dq", "ddq"))
     flat = (x.reshape(-1, x.shape[2]) for x in (q, dq, ddq))

@@ -15,7 +15,19 @@ from irtwin.twin.account import account
 from irtwin.twin.price import cost
 from irtwin.twin.twin import Twin
 
-KINDS = ("energy", "standby", "ledger parts", "numbers", "base parameters")
+KINDS = (
+    "energy",
+    "ledger parts",
+    "standby_power",
+    "copper_loss",
+    "iron_loss",
+    "inverter_loss",
+    "rotor_inertia",
+    "coulomb_friction",
+    "viscous_friction",
+    "torque_offset",
+    "base parameters",
+)
 _READ = 1e-4  # of a run's energy: nearer than that a sampled log tells no part of it
 
 
@@ -45,8 +57,7 @@ def checks(case: Case, twin: Twin, motions: Sequence[Motion]) -> Iterator[Check]
     for number in twin.stated:
         true = case.truth.numbers.get((number.effect, number.joint, number.name))
         if true is not None and number.lower is not None and number.upper is not None:
-            kind = "standby" if number.effect == "standby_power" else "numbers"
-            yield Check(kind, f"{number.name} {number.joint or ''}", number.lower, number.upper, true)
+            yield Check(number.effect, f"{number.name} {number.joint or ''}", number.lower, number.upper, true)
     known = {"rigid_body", "rotor_inertia", "coulomb_friction", "viscous_friction", "torque_offset"}
     if case.truth.plain and {effect.id for effect, _ in twin.stack.torque_terms} == known:
         for base, true in zip(twin.base_parameters, case.truth.base(twin.stack), strict=True):

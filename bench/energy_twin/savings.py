@@ -1,7 +1,7 @@
-"""`python -m energy_twin.savings [--seeds N...] [--only WORD] [--base]`: savings said, and those when it is executed.
+"""`python -m energy_twin.savings [--seeds N...] [--only WORD] [--base | --payload]`: savings said, and as executed.
 
 Runs that took no part in the fit are timed anew, in a quarter more time and with pauses that may shrink; or, by
-`--base`, the flange goes the same way with the robot's base elsewhere.
+`--base`, the flange goes the same way with the robot's base elsewhere; by `--payload`, the same way with 2 kg for 3.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from energy_twin.cases import STEP, Case, cases
+from irtwin.demo.plant.arm import PlantPayload
 from irtwin.demo.plant.motion import PlantMotion as Programmed
 from irtwin.errors import InputError
 from irtwin.gap.choice import identified
@@ -24,7 +25,7 @@ from irtwin.planning.placement import better_placement
 from irtwin.planning.programme import programme_of
 from irtwin.signals.conditioning import condition
 from irtwin.signals.motion import Motion, standstill, stretches
-from irtwin.twin.price import Figure, with_standing
+from irtwin.twin.price import Figure, kilogram_less, with_standing
 from irtwin.twin.twin import Twin
 
 LONGER, PAUSE = 1.25, 0.1
@@ -47,7 +48,8 @@ def savings(
         if (proposal := propose(twin, motion)) is None:
             continue
         saved, without, with_it = proposal
-        before, after = (_energy(case, one) for one in (without, with_it))
+        same_day = without.payload_mass != with_it.payload_mass
+        before, after = (_energy(case, one, day) for one, day in ((without, 0), (with_it, 0 if same_day else 1)))
         yield motion.run, saved, before - after, before
 
 
@@ -68,14 +70,22 @@ def moved_base(twin: Twin, motion: Motion) -> Proposal | None:
     return None if placed is None else (placed.saved, motion, placed.motion)
 
 
-def _energy(case: Case, motion: Motion) -> float:
-    """Return what a motion takes on the plant, J: told to stand where it stood."""
+def lightened(twin: Twin, motion: Motion) -> Proposal:
+    """Return what 2 kg at the flange save in place of 3."""
+    heavy, light = (replace(motion, payload_mass=mass, payload_com=(0.0, 0.0, 0.05)) for mass in (3.0, 2.0))
+    return kilogram_less(twin, heavy), heavy, light
+
+
+def _energy(case: Case, motion: Motion, day: int) -> float:
+    """Return what a motion takes on the plant, J, by a day's friction: told to stand where it stood."""
     q = motion.q.copy()
     for own in stretches(standstill(motion)):
         q[own] = q[own].mean(axis=0)
     law = CubicSpline(motion.time - motion.time[0], q)
     time = np.arange(0.0, law.x[-1], STEP)
-    return float(np.trapezoid(case.plant(Programmed(*(law(time, order) for order in range(3)))), dx=STEP))
+    programmed = Programmed(*(law(time, order) for order in range(3)))
+    payload = PlantPayload(motion.payload_mass, motion.payload_com)
+    return float(np.trapezoid(case.plant(programmed, payload, np.random.default_rng(day)), dx=STEP))
 
 
 def main() -> None:
@@ -83,8 +93,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--only", default="", help="cases whose name has this word")
     parser.add_argument("--base", action="store_true", help="the base elsewhere, in place of other times")
+    parser.add_argument("--payload", action="store_true", help="a kilogram less, in place of other times")
     arguments = parser.parse_args()
-    propose = moved_base if arguments.base else timed_anew
+    propose = moved_base if arguments.base else lightened if arguments.payload else timed_anew
     print("| case | run | takes, J | saves: said | executed |\n| --- | --- | --- | --- | --- |")
     held = []
     for case in cases(arguments.seeds, arguments.only):

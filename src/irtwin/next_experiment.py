@@ -14,11 +14,12 @@ from irtwin.identification.excitation import excite
 from irtwin.json_text import parse_json
 from irtwin.knowledge.questions.queries import ask
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.modelling import expect
+from irtwin.modelling import expect, write_motion
 from irtwin.proposed_motion import by_hand, how_to_play, play
 from irtwin.providers.records import load_robot, load_twin
 from irtwin.robot.collision import CollisionModel
 from irtwin.robot.description import Robot
+from irtwin.signals.motion import Motion
 from irtwin.storage.database import Workspace
 from irtwin.storage.files import InsidePath, remove, write
 from irtwin.storage.gap_schema import GapDiagnosis
@@ -109,7 +110,8 @@ def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
 def _exciting(robot: Robot, motion: InsidePath) -> list[str]:
     """Write a motion that excites every base parameter; return how to play it, or what to do where there is none."""
     try:
-        excite(robot, _SECONDS, iterations=_ITERATIONS).write_csv(motion)
+        found = excite(robot, _SECONDS, iterations=_ITERATIONS)
+        write_motion(Motion(*found.sample(), run=motion.stem), robot, motion)
     except InputError as error:
         remove(motion)
         return [f"No motion could be designed ({error}). Move all joints, slowly and fast, over their whole range."]

@@ -16,7 +16,7 @@ from irtwin.location import WORKSPACE, Location
 from irtwin.modelling import Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
 from irtwin.planning.placement import Placement, better_placement
-from irtwin.planning.plan import Plan, Task
+from irtwin.planning.plan import Plan, Task, Tour, any_order
 from irtwin.planning.programme import SectionedMotion, programme_of
 from irtwin.planning.waiting import PauseProposal, proposals
 from irtwin.providers.energy import stored_price
@@ -33,7 +33,7 @@ from irtwin.storage.files import check_place
 from irtwin.storage.schema import MEASURED_RUN
 from irtwin.storage.staging import staged
 from irtwin.storage.tariff import read_tariff
-from irtwin.twin.price import Price
+from irtwin.twin.price import Figure, Price, kilogram_less
 from irtwin.twin.twin import Twin
 from irtwin.workflow import populate_apart, write_report
 
@@ -127,8 +127,10 @@ def predict(
 class Timings:
     """The timing of a programme that takes least in the cycle that was asked for, and those of other cycle times.
 
-    `proposals`: what to do in the pauses of the best; `hours`: how many of a year the robot is on, None: not known;
-    `placement`: where the base would stand better; None: nowhere, or nobody asked for it.
+    `proposals`: what to do in the pauses of the best; `unseen`: states that no log shows, as "off"; `hours`: how many
+    of a year the robot is on, None: not known; `kilogram`: what a lighter tool or payload saves, J per kg;
+    `placement`: where the base would stand better, `tour`: the order of its places that takes less; None: there is
+    none, or nobody asked for it.
     """
 
     robot: Robot
@@ -136,9 +138,11 @@ class Timings:
     best: Cycle
     curve: Sequence[Cycle]
     proposals: Sequence[PauseProposal]
-    shows_off: bool
+    unseen: Sequence[str]
     hours: float | None
+    kilogram: Figure
     placement: Placement | None = None
+    tour: Tour | None = None
 
 
 def optimise(
@@ -150,16 +154,17 @@ def optimise(
     cycle: float | None = None,
     least_pause: float | None = None,
     base: bool = False,
+    free_order: bool = False,
     out: Path | str | None = None,
     announce: Announce = lambda line: None,
 ) -> tuple[Timings, Kept]:
     """Time the moves of a robot's measured run so that it takes least energy, and keep that as a planned run.
 
     `name`: of the planned run, RUN_optimised if None; `cycle`: how long it may take, s, as long as the run if None;
-    `least_pause`: see `CycleTimes`; `base`: whether to look for a better place of the base, too; `out`: a file of the
-    motion, as of `plan`. Raises InputError, and keeps nothing,
-    where there is no such run or name, the run has no whole move, the robot cannot be so fast, or its twin knows no
-    power.
+    `least_pause`: see `CycleTimes`; `base`: whether to look for a better place of the base, too; `free_order`: whether
+    the run may pause at its places in any order, between the first and the last; `out`: a file of the motion, as of
+    `plan`. Raises InputError, and keeps nothing, where there is no such run or name, the run has no whole move, the
+    robot cannot be so fast, or its twin knows no power.
     """
     location, name = Location.of(workspace), name or f"{run}_optimised"
     if out is not None:
@@ -188,10 +193,20 @@ def optimise(
             time_scaling_of=known.name,
             time_scale=best.seconds / was,
         )
-        waiting = tuple(proposals(twin, programme.timed(best.factors), off))
-        hours = read_tariff(location.folder).hours
-        placement = better_placement(twin, best.motion) if base else None
-        return Timings(twin.robot, programme, best, times.curve(), waiting, off is not None, hours, placement), made
+        shown = {"off": off is not None, "with closed brakes": twin.stack.drives_on(best.motion) is not None}
+        timings = Timings(
+            twin.robot,
+            programme,
+            best,
+            times.curve(),
+            tuple(proposals(twin, programme.timed(best.factors), off)),
+            [state for state, seen in shown.items() if not seen],
+            read_tariff(location.folder).hours,
+            kilogram_less(twin, best.motion),
+            better_placement(twin, best.motion) if base else None,
+            any_order(twin, programme) if free_order else None,
+        )
+        return timings, made
 
     timings, kept = _keep(robot, name, make, location, announce)
     if out is not None:

@@ -14,8 +14,9 @@ from tests.data_sets import irtwin, irtwin_does, irtwin_refuses
 from tests.planning.boxes import arm, folded, twin_of
 
 from irtwin.errors import InputError
-from irtwin.planning.plan import Plan, Task, nominal_twin, plan
+from irtwin.planning.plan import Plan, Task, any_order, nominal_twin, plan
 from irtwin.planning.poses import Pose, read_target
+from irtwin.planning.programme import Section, SectionedMotion
 from irtwin.planning.timing import MotionLimits
 from irtwin.robot.collision import CollisionModel, Obstacle
 from irtwin.robot.kinematics import placements
@@ -233,3 +234,19 @@ def test_poses_between_are_visited_in_the_order_that_takes_least() -> None:
     assert np.ptp(np.diff(made.motion.time)) < 1e-9
     with pytest.raises(InputError, match=r"a duration is that of one move; give none, and time the whole by"):
         plan(nominal_twin(SIX), Task(START, GOAL, via=(near,), seconds=3.0))
+
+
+def test_a_programme_pauses_at_its_places_in_the_order_that_takes_least(folder) -> None:
+    far, near = (np.array([turn, 1.0, 0.6]) for turn in (0.7, -0.7))
+    start, goal = np.array([-0.9, 1.0, 0.6]), np.array([0.9, 1.0, 0.6])
+    q = np.repeat([start, far, near, start, goal], 2, axis=0)
+    kinds = ("pause", "move") * 4 + ("pause",)
+    sections = tuple(Section(row, row + 1, kind) for row, kind in enumerate(kinds))
+    known = load(folder / "twin.json")
+    programme = SectionedMotion(Motion(np.arange(10.0), q, 0 * q, 0 * q, run="weld"), sections)
+    tour = any_order(known, programme)
+    assert tour.order in ((3, 2, 1), (2, 3, 1)) and tour.saved.value > 0
+    assert any_order(known, replace(programme, sections=sections[:5])) is None
+    best = [0, *(2 * place for place in tour.order), 8]
+    ordered = replace(programme.motion, q=np.repeat(q[::2][[row // 2 for row in best]], 2, axis=0))
+    assert any_order(known, replace(programme, motion=ordered)) is None

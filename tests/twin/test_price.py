@@ -10,7 +10,7 @@ from tests.synthetic import arm, measure, swing
 
 from irtwin.twin.files import from_json, load, to_json
 from irtwin.twin.identify import identify
-from irtwin.twin.price import price, saving, with_standing
+from irtwin.twin.price import kilogram_less, price, saving, with_standing
 
 ROBOT = arm(2)
 
@@ -83,6 +83,17 @@ def test_what_effects_leave_of_power_is_in_the_interval():
     off = [replace(one, power=one.power + by) for one, by in zip(motions, (9, -7, 4, -8, 6, -4), strict=True)]
     steady, varying = (price(identify(ROBOT, of), [swing(ROBOT, 7)]).energy.half_width for of in (motions, off))
     assert varying > 3 * steady
+
+
+def test_a_kilogram_less_saves_what_it_takes_and_what_effects_leave_of_the_way_drops_out():
+    motions = [measure(ROBOT, swing(ROBOT, of, seconds=10.0), 0.1, seed=of) for of in range(6)]
+    twin, motion = identify(ROBOT, motions), replace(swing(ROBOT, 7), payload_com=(0.0, 0.0, 0.1))
+    for carried, heavier in ((0.0, 1.0), (2.5, 2.5)):
+        loaded, lighter = (replace(motion, payload_mass=mass) for mass in (heavier, heavier - 1))
+        less = kilogram_less(twin, replace(motion, payload_mass=carried))
+        assert less.value == pytest.approx(twin.energy(loaded) - twin.energy(lighter))
+        unsure = kilogram_less(replace(twin, remainder=replace(twin.remainder, mean=50.0)), motion)
+        assert 0 < unsure.half_width < 5.0
 
 
 def test_a_motion_stands_longer_where_it_stood_last():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import FILE, PLACE, Number, announce, say_unchecked, speech
+from irtwin.cli.options import FILE, OUT, PLACE, Number, announce, say_unchecked, speech
 
 _LONG = 30.0  # s: of less nothing is said before
 
@@ -17,7 +17,7 @@ _LONG = 30.0  # s: of less nothing is said before
 @click.command()
 @click.argument("urdf", type=PLACE)
 @click.option("--seconds", type=Number(min=1.0), required=True, help="Duration of the motion, s.")
-@click.option("--out", type=FILE, required=True, help="CSV file to write.")
+@click.option("--out", type=FILE, required=True, help=OUT)
 @click.option("--rate", type=Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
 @click.option(
@@ -66,7 +66,9 @@ def excite(
     from irtwin.identification.motion_limits import Box
     from irtwin.robot.collision import CollisionModel
     from irtwin.robot.urdf import read_urdf
+    from irtwin.signals.motion import Motion
 
+    modelling.check_plan_file(out)
     described = read_urdf(urdf)
     within = None
     if box is not None:
@@ -89,7 +91,7 @@ def excite(
         tasks=[motion for task in tasks for motion in modelling.motions_of(described, task)],
         progress=_excitation_progress(),
     )
-    motion.write_csv(out)
+    modelling.write_motion(Motion(*motion.sample(), run=out.stem), described, out)
     say_unchecked(checks_itself)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
     if ended or not speech.quiet:

@@ -14,6 +14,7 @@ from irtwin.cli.options import (
     DAY,
     FILE,
     FOLDER,
+    OUT,
     PLACE,
     Number,
     database_option,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from irtwin.plans import Kept, Timings
     from irtwin.twin.price import Figure
 
-_OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 _PLAN = "plan"  # name of a planned run that was given none
 
 _NO_POWER = "energy and power are not known; the twin has seen no power"
@@ -55,7 +55,7 @@ _kept = locating(
 @click.option(
     "--via", metavar="POSE", multiple=True, help="Stand there on the way, in the order that takes least. Repeatable."
 )
-@click.option("--out", type=FILE, help=_OUT)
+@click.option("--out", type=FILE, help=OUT)
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -180,11 +180,19 @@ def predict(
     help="What a pause needs, s; what is longer may go to the moves. Default: pauses stay as they are.",
 )
 @click.option("--base", is_flag=True, help="Look for a place where the base would stand better, too.")
-@click.option("--out", type=FILE, help=_OUT)
+@click.option("--free-order", is_flag=True, help="Look for a better order of the places where it pauses, too.")
+@click.option("--out", type=FILE, help=OUT)
 @located
 @click.option("--run", "name", metavar="NAME", help="Name of the planned run. Default: RUN_optimised.")
 def optimise(
-    robot: str, run: str, base: bool, out: Path | None, location: Location, name: str | None, **asked: Any
+    robot: str,
+    run: str,
+    base: bool,
+    free_order: bool,
+    out: Path | None,
+    location: Location,
+    name: str | None,
+    **asked: Any,
 ) -> None:
     """Time the moves of a run so that it takes least energy, by the robot's twin.
 
@@ -192,20 +200,26 @@ def optimise(
     and what the run saves in --cycle against the run as it was, with waiting after it where that was shorter: a robot
     that waits anyway saves so much by going slower. A move gets faster only where all joints have limits of speed and
     torque. Said, too, is what each pause of a second and more could save by waiting elsewhere, parked at a pose of its
-    own, closed brakes, or off: states that the robot's logs show. With --base the flange keeps its way through the
-    room, the base up to 0.3 m beside. What stands around is not known, there or where it parks. A year is as long as
-    plant.toml says. The motion is kept as a planned run, and the robot's report says what it saves.
+    own, closed brakes, or off: states that the robot's logs show; and what a kilogram less at the flange saves. With
+    --base the flange keeps its way through the room, the base up to 0.3 m beside. With --free-order the places between
+    the first pause and the last are visited in the order that takes least, by moves as `irtwin plan` makes them. What
+    stands around is not known, there or where it parks. A year is as long as plant.toml says. The motion is kept as a
+    planned run, and the robot's report says what it saves.
 
     \b
     Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
     """
     from irtwin import plans
 
-    timings, kept = plans.optimise(robot, run, location, name=name, base=base, out=out, announce=say, **asked)
+    timings, kept = plans.optimise(
+        robot, run, location, name=name, base=base, free_order=free_order, out=out, announce=say, **asked
+    )
     for line in _curve_lines(timings):
         click.echo(line)
     if base:
         click.echo(_placement_text(timings))
+    if free_order:
+        click.echo(_order_text(timings))
     saved = _cycle_text(timings.best) + f" than {run}{_year(timings, timings.best.saved)}"
     click.echo(f"{_where(out, kept)}: {saved} (95 % interval)")
 
@@ -224,8 +238,10 @@ def _curve_lines(timings: Timings) -> Iterator[str]:
         back = "how long coming back takes is in no log" if proposal.takes is None else f"it takes {proposal.takes:g} s"
         year = _year(timings, proposal.saved)
         yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
-    if not timings.shows_off:
-        yield "no log shows the robot off: what switching it off saves is not known"
+    for state in timings.unseen:
+        yield f"no log shows the robot {state}: what a pause saves so is not known"
+    less = timings.kilogram
+    yield f"each kilogram less at the flange: {less} J less{_year(timings, less)}; it takes no time"
 
 
 def _placement_text(timings: Timings) -> str:
@@ -238,6 +254,13 @@ def _placement_text(timings: Timings) -> str:
     return f"base moved by {shift} m (x, y, z): {saved} J less{_year(timings, saved)}; it takes no time"
 
 
+def _order_text(timings: Timings) -> str:
+    if (tour := timings.tour) is None:
+        return "no other order of the places between the first pause and the last takes less"
+    assert tour.saved is not None
+    return _tour_text(tour, "places between the first pause and the last") + _year(timings, tour.saved)
+
+
 def _year(timings: Timings, saved: Figure) -> str:
     """Say what a saving of each cycle, J, comes to in a year, where `plant.toml` says how many hours that has."""
     if timings.hours is None or saved.value <= 0:
@@ -245,10 +268,10 @@ def _year(timings: Timings, saved: Figure) -> str:
     return f" ({saved.times(timings.hours / timings.best.seconds / 1000)} kWh in {timings.hours:g} h a year)"
 
 
-def _tour_text(tour: Tour) -> str:
+def _tour_text(tour: Tour, places: str = "--via") -> str:
     saved = "" if tour.saved is None else f"{tour.saved} J and "
     order = ", ".join(map(str, tour.order))
-    return f"order of --via: {order}; saves {saved}{tour.sooner:.3f} s against the order given (95 % interval)"
+    return f"order of {places}: {order}; saves {saved}{tour.sooner:.3f} s against the order given (95 % interval)"
 
 
 def _cycle_text(cycle: Cycle) -> str:

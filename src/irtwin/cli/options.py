@@ -19,6 +19,7 @@ from irtwin.location import WORKSPACE, Location
 
 DAY = 86400.0  # s
 FILE = click.Path(path_type=Path, dir_okay=False)
+OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 FOLDER = click.Path(path_type=Path, file_okay=False)
 PLACE = click.Path(path_type=Path)  # of either
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from time import monotonic
 
 import numpy as np
@@ -18,7 +17,6 @@ from irtwin.identification.motion_limits import Box, JointLimits, Walls
 from irtwin.identification.own_body import OwnBody
 from irtwin.identification.two_processes import one_blas_thread
 from irtwin.robot.description import Robot
-from irtwin.signals.channels import Signals, csv_text
 from irtwin.signals.motion import Motion
 
 Progress = Callable[[int, float, float], None]
@@ -65,17 +63,6 @@ class Excitation:
         time = np.linspace(0.0, self.seconds, 1 + max(1, round(self.seconds * (rate or self.rate))))
         q, dq, ddq = (np.round(values, 12) + 0.0 for values in self.series.motion(time))  # rest is 0, not -1e-16
         return time, q, dq, ddq
-
-    def write_csv(self, path: Path) -> None:
-        """Write columns time, q_J, dq_J, ddq_J (s, rad, rad/s, rad/s^2) for each joint J. Raises InputError."""
-        time, q, dq, ddq = self.sample()
-        part = path.with_name(path.name + ".part")
-        try:
-            with part.open("w", newline="", encoding="utf-8") as file:
-                file.write(csv_text(Signals(time, q, dq=dq, ddq=ddq), self.joint_names))
-            part.replace(path)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
 
 
 def expected_seconds(joints: int, seconds: float, iterations: int = 200) -> float:

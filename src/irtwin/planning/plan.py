@@ -17,6 +17,7 @@ from irtwin.planning.energy_optimal import Movement, Power, cheapest, keeps
 from irtwin.planning.order import best_order
 from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
 from irtwin.planning.poses import Pose, joints_for
+from irtwin.planning.programme import SectionedMotion
 from irtwin.planning.timing import MotionLimits, Timed, Torque, fastest, rounded, through
 from irtwin.robot.collision import CollisionModel, Obstacle
 from irtwin.robot.description import Robot
@@ -26,6 +27,7 @@ from irtwin.twin.twin import Parameter, Twin
 
 KEEP_OFF = 0.01  # m: what a path keeps between two bodies, where start and goal do
 _LONGEST = 600.0  # s
+_SAME = 1e-3  # rad or m: nearer poses are one
 _MOST = 1_000_000  # samples
 
 
@@ -132,6 +134,27 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
     )
 
 
+def any_order(twin: Twin, programme: SectionedMotion) -> Tour | None:
+    """Return the order of a programme's pauses that takes least energy; its first and last stay where they are.
+
+    Both orders are planned, as `plan` does. None where no other takes less.
+    """
+    motion = programme.motion
+    poses = [motion.q[section.first] for section in programme.sections if section.kind == "pause"]
+    if len(poses) < 4:
+        return None
+    task = Task(
+        start=poses[0],
+        goal=poses[-1],
+        via=poses[1:-1],
+        least_energy=True,
+        payload_mass=motion.payload_mass,
+        payload_com=motion.payload_com,
+    )
+    tour = plan(twin, task).tour
+    return tour if tour and tour.saved and tour.saved.value > 0 else None
+
+
 def _toured(twin: Twin, task: Task, rate: float) -> Plan:
     if task.seconds is not None:
         raise InputError("a duration is that of one move; give none, and time the whole by `irtwin optimise`")
@@ -147,7 +170,7 @@ def _toured(twin: Twin, task: Task, rate: float) -> Plan:
     last = len(poses) - 1
     cost = np.full((last + 1, last + 1), np.inf)
     for start, goal in permutations(range(last + 1), 2):
-        if goal != 0 and start != last:
+        if goal != 0 and start != last and np.abs(poses[goal] - poses[start]).max() > _SAME:
             quick = leg(start, goal, False)
             cost[start, goal] = twin.energy(quick.motion) if task.least_energy else quick.seconds
     order, given = best_order(cost), list(range(last + 1))
@@ -188,7 +211,7 @@ def _fastest(twin: Twin, task: Task, limits: MotionLimits, collisions: Collision
     robot = twin.robot
     start = joints_for(robot, task.start, collisions, None, "the start")
     goal = joints_for(robot, task.goal, collisions, start, "the goal")
-    if np.abs(goal - start).max() < 1e-6:
+    if np.abs(goal - start).max() < _SAME:
         raise InputError("start and goal are the same pose; give another goal")
     ends = min(collisions.clearance(start), collisions.clearance(goal))
     collisions.keep_off(min(KEEP_OFF, ends / 2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,6 +107,12 @@ def saving(twin: Twin, motion: Motion, was: Motion) -> Figure:
     return balance(twin, (instead, trapezoid(instead.time)), (motion, -trapezoid(motion.time)))
 
 
+def kilogram_less(twin: Twin, motion: Motion) -> Figure:
+    """Return the electrical energy, J, that a motion saves by a kilogram less at the flange, where its payload is."""
+    heavier = max(motion.payload_mass, 1.0)
+    return saving(twin, replace(motion, payload_mass=heavier - 1), replace(motion, payload_mass=heavier))
+
+
 def with_standing(motion: Motion, seconds: float) -> Motion:
     """Return a motion that lasts so many seconds, if it is shorter: it stands longer where it stood last."""
     more = round((seconds - _seconds(motion)) * motion.rate)
@@ -123,16 +129,19 @@ def with_standing(motion: Motion, seconds: float) -> Motion:
 def _left(twin: Twin, parts: Sequence[tuple[Motion, np.ndarray]]) -> list[float]:
     """Return what effects leave of a balance, J, one standard deviation each: of motions, and of poses of their pauses.
 
-    What is left at a pose is the same in each motion, so what stands there as long in both drops out.
+    What is left at a pose is the same in each motion, so what stands there as long in both drops out; so does what is
+    left of one way that is gone with two payloads.
     """
     if twin.remainder is None:
         return []
     standing: dict[tuple[int, ...], float] = {}
+    ways: dict[int, float] = {}
     for motion, weights in parts:
+        ways[id(motion.q)] = ways.get(id(motion.q), 0.0) + float(weights.sum())
         for own in stretches(standstill(motion)):
             pose = tuple(np.round(motion.q[own].mean(axis=0) / _SAME_POSE).astype(int).tolist())
             standing[pose] = standing.get(pose, 0.0) + float(weights[own].sum())
-    lasting = (twin.remainder.energy(float(np.abs(weights).sum())) for _, weights in parts)
+    lasting = (twin.remainder.energy(abs(seconds)) for seconds in ways.values())
     return [*lasting, *(twin.remainder.pause * seconds for seconds in standing.values())]
 
 
