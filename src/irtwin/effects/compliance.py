@@ -1,8 +1,4 @@
-"""Play and elasticity between motor and link: the link is one mass that swings behind a spring.
-
-By its swing it drags the links of other joints along: joint i feels M_ij / M_jj of what joint j's link takes for itself
-(M: mass matrix), as the link's acceleration beyond its motor's is that torque over M_jj.
-"""
+"""Play and elasticity between motor and link: the link is one mass that swings behind a spring."""
 
 from __future__ import annotations
 
@@ -232,33 +228,6 @@ class _Compliance(JointEffect):
     stage: ClassVar[int] = 1
     memory: ClassVar[bool] = True
     reach: ClassVar[float | None] = 2.0
-    across: ClassVar[bool] = True
-
-    contribution = Effect.contribution
-    carried = Effect.carried
-
-    @property
-    def of_link(self) -> bool:
-        """Whether the position is measured on the link, so that all that swings is the motor."""
-        return False
-
-    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
-        """Return (N, n, k): what a link behind its motor takes of its own joint, and of those whose links it moves."""
-        own, acting = super().columns(robot, motion, predicted), self.places(robot)
-        if self.of_link or not acting:
-            return own
-        kept: dict[Any, Any] = {} if predicted is None else predicted.kept
-        key = "dragged", tuple(acting), motion.start
-        if key not in kept:
-            kept[key] = _dragged(robot, motion, acting, predicted)
-        dragged, weighs = kept[key]
-        swung = own[:, acting, range(len(acting))]
-        sag = self._sag(robot, swung + load_torque(robot, motion, predicted)[:, acting])
-        return np.asarray(swung[:, None] * dragged - sag[:, None] * weighs)
-
-    def _sag(self, robot: Robot, passed: np.ndarray) -> np.ndarray:
-        """Return (N, m) rad by which a spring of an acting joint gives under what it passes, N m."""
-        return np.zeros_like(passed)
 
     def _among(
         self,
@@ -354,12 +323,16 @@ class JointElasticity(_Compliance):
 
     id: ClassVar[str] = "joint_elasticity"
     family: ClassVar[str] = "transmission"
+    across: ClassVar[bool] = True
+
+    contribution = Effect.contribution
+    carried = Effect.carried
 
     antiresonance: float = 0.0
 
     @property
     def of_link(self) -> bool:
-        """Whether no antiresonance is said."""
+        """Whether the position is measured on the link, so that all that swings is the motor."""
         return self.antiresonance == 0
 
     def candidates(self, robot: Robot | None = None) -> tuple[Effect, ...]:
@@ -389,9 +362,19 @@ class JointElasticity(_Compliance):
         )
         return (_at(acting, motion, passed - load),)
 
-    def _sag(self, robot: Robot, passed: np.ndarray) -> np.ndarray:
-        """Return by how much the spring gives under what it passes."""
-        return np.asarray(passed / self._stiffness(robot)[self.places(robot)])
+    def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
+        """Return (N, n, k): what a link behind its motor takes of its own joint, and of those whose links it moves."""
+        own, acting = super().columns(robot, motion, predicted), self.places(robot)
+        if self.of_link or not acting:
+            return own
+        kept: dict[Any, Any] = {} if predicted is None else predicted.kept
+        key = self.id, "dragged", tuple(acting), motion.start
+        if key not in kept:
+            kept[key] = _dragged(robot, motion, acting, predicted)
+        dragged, weighs = kept[key]
+        swung = own[:, acting, range(len(acting))]
+        sag = (swung + load_torque(robot, motion, predicted)[:, acting]) / self._stiffness(robot)[acting]
+        return np.asarray(swung[:, None] * dragged - sag[:, None] * weighs)
 
     def parameters(self, robot: Robot, given: Coefficients) -> tuple[Quantity, ...]:
         """Return K; nothing where the rotor's inertia is needed and not known."""
