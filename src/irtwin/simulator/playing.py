@@ -77,9 +77,7 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = replace(servos(model), trusted=trust.numbers)
-    clipped = _clipped(own, runs)
-    for line in clipped:
-        tell(f"  {line}")
+    clipped = clipping(own, runs)
     tell("Fitting numbers of servos")
     fitted, judged = (
         [run for run in runs if run.name not in apart],
@@ -93,14 +91,16 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
     tell("Playing the runs that are held out" if apart else "Playing all runs")
     names = [run.name for run in judged]
     numbers = dict.fromkeys(names, chosen.numbers) if apart else held_out(chosen, runs)
-    before = tracked(data_set.robot, own, judged, dict.fromkeys(names, own.numbers))
+    as_it_is = dict.fromkeys(names, own.numbers)
+    before = tracked(data_set.robot, own, judged, as_it_is)
     after = tracked(data_set.robot, own, judged, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
     named = {f"{writing.PUSH} {place}": found_push for place, found_push in enumerate(pushes)}
     families = writing.families([*differing, *named])
     judging = _stretches(judged, lasts) if apart else chosen.fit.stretches
     closed = parts(own, judging, numbers, families, {name: found_push.push for name, found_push in named.items()})
-    horizons = restarted(own, judged, numbers, _of(pushes))
+    anew = restarted(own, judged, as_it_is), restarted(own, judged, numbers, _of(pushes))
+    horizons = [(seconds, error, anew[1][seconds]) for seconds, error in anew[0].items()]
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
@@ -159,14 +159,15 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
     return bool(max(np.sqrt((remainder**2).mean(axis=0)).max() for remainder in left) > _FALLEN)
 
 
-def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
-    """Return of which joints the model clips commands. Raises InputError where it clips more than a few."""
+def clipping(own: Servos, runs: Sequence[Run]) -> list[str]:
+    """Say and return of which joints the model clips commands. Raises InputError where it clips more than a few."""
     shares = own.clipped(np.concatenate([run.signals.command for run in runs if run.signals.command is not None]))
     lines = []
     for joint, share in shares.items():
         line = f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
         if share > _CLIPPED:
             raise InputError(f"{own.model.file.path}: {line}; correct ctrlrange, or zero and unit of the commands")
+        tell(f"  {line}")
         lines.append(line)
     return lines
 
