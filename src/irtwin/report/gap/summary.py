@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
@@ -24,7 +25,8 @@ _SPLIT = (
     "interval holds zero is not in the data, but split as the robot's description has it."
 )
 _MEANINGS = """SELECT ?effect ?name ?meaning {
-    ?effect irt:has_Effect_Parameter ?parameter . ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
+    ?effect irt:has_Effect_Parameter|irt:has_Body_Quantity ?parameter .
+    ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
 }"""
 
 
@@ -188,8 +190,8 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 
 def meanings(diagnosis: Document) -> list[str]:
     """Return what each parameter of the causes that matter means, in the ontology's words, as far as it has any."""
-    parameters = {  # each once, and of a vector's parts ("f_x") the whole
-        (cause.effect, parameter.name.partition("_")[0]): None
+    parameters = {  # each once, and of a vector's parts ("f_x"), or links' ("mass (link_1)"), the whole
+        (cause.effect, re.split("[_ ]", parameter.name)[0]): None
         for cause in diagnosis.mattering
         for parameter in cause.parameters
     }
