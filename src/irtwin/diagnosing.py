@@ -222,6 +222,8 @@ def _said_of_written(file: Path, diagnosis: Diagnosis | Playing, model: Model) -
     if isinstance(diagnosis, Playing):
         if lacking := diagnosis.unwritten:
             yield f"{file} has no place for {', '.join(lacking)}: these stay as they are"
+        if diagnosis.in_file is not diagnosis.chosen:
+            yield f"{file} has no place for a soft joint: it has the others of its numbers that come nearest"
     elif (beside := bodies_beside(model, diagnosis.document, diagnosis.twin)) is not None:
         if beside.written:
             yield f"{file} has all bodies{' and rotors' if beside.rotors else ''} of the twin with the causes"
@@ -240,8 +242,8 @@ def _take_in(model: Model, files: _Files, announce: Announce) -> None:
 
 
 def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
-    if isinstance(diagnosis, Playing) and diagnosis.chosen.differs.any():
-        write(file, script(diagnosis.chosen, diagnosis.document, data_set.folder, file))
+    if isinstance(diagnosis, Playing) and diagnosis.in_file.differs.any():
+        write(file, script(diagnosis.in_file, diagnosis.document, data_set.folder, file))
     else:
         announce(f"  no number of the servos differs: there is nothing for {file} to fit")
 

@@ -20,8 +20,8 @@ from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import PlayedStretch, Push, each, play
 from irtwin.simulator.push import FoundPush, find_pushes
-from irtwin.simulator.refined import softened
-from irtwin.simulator.servos import NAMES, Servos, part_of, servos
+from irtwin.simulator.refined import limited, softened
+from irtwin.simulator.servos import NAMES, SOFT, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 from irtwin.simulator.trusted import NOTHING, Trusted
 
@@ -35,11 +35,15 @@ _CLIPPED = 0.05  # of a joint's commands: with more, what it does is the clippin
 
 @dataclass(frozen=True)
 class Playing:
-    """A diagnosis by playing: its document, what a page draws, and the robot's numbers."""
+    """A diagnosis by playing: its document, what a page draws, and the robot's numbers.
+
+    `in_file`: those that come nearest in the model's file, which has no place for a soft joint.
+    """
 
     document: Document
     curves: Curves
     chosen: DifferingNumbers
+    in_file: DifferingNumbers
     against: str = "simulated"  # the role of what the observed runs are held against
     twin: None = None  # positions alone make none
 
@@ -51,7 +55,7 @@ class Playing:
 
     def written(self) -> bytes:
         """Return the model's file with the robot's numbers."""
-        return self.chosen.fit.servos.written(self.chosen.numbers, self.chosen.differs)
+        return self.in_file.fit.servos.written(self.in_file.numbers, self.in_file.differs)
 
     @property
     def unwritten(self) -> list[str]:
@@ -60,7 +64,7 @@ class Playing:
 
     def drawn(self, rng: np.random.Generator) -> bytes:
         """Return the model's file with the robot's numbers as they could be."""
-        return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
+        return self.in_file.fit.servos.written(self.in_file.drawn(rng), self.in_file.differs)
 
 
 def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out_runs: Collection[str] = ()) -> Playing:
@@ -86,8 +90,8 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
     lasts = _BRIEF if _falls(own, _stretches(fitted, _LASTS)) else _LASTS
     stretches = _stretches(fitted, lasts)
     step = max(_STEP, model.compiled.opt.timestep)
-    chosen, pushes = _chosen(own, stretches, step, trust.pushes)
-    chosen = softened(chosen)
+    rigid, pushes = _chosen(own, stretches, step, trust.pushes)
+    chosen = softened(rigid)
     tell("Playing the runs that are held out" if apart else "Playing all runs")
     names = [run.name for run in judged]
     numbers = dict.fromkeys(names, chosen.numbers) if apart else held_out(chosen, runs)
@@ -108,6 +112,7 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
         ),
         writing.curves(data_set.robot, names, before, after),
         chosen,
+        limited(rigid) if chosen.differs[list(SOFT)].any() else chosen,
     )
 
 

@@ -18,6 +18,7 @@ from irtwin.report.wording import listed
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
+_SOFT = "K"  # of a joint that is played as soft: others in its file come nearest
 _WORTH_SAYING = 0.01  # of friction, from run to run
 _STEPS = 3  # motions to log that are told
 _SPLIT = (
@@ -240,11 +241,13 @@ def _named(parameters: Sequence[CauseParameter]) -> str:
 
 def _kept(cause: Cause, diagnosis: Document) -> str:
     """Return what a model leaves of its tracking error that has all numbers of the robot but a cause's."""
-    by = "irtwin.simulator.callback" if any(parameter.name == _CALLED_BACK for parameter in cause.parameters) else "it"
+    names = [parameter.name for parameter in cause.parameters]
+    by, is_soft = "irtwin.simulator.callback" if _CALLED_BACK in names else "it", _SOFT in names
     for change in diagnosis.shrink.by_cause:
         if change.cause == cause.id and change.channel == "position":
             left, all_ = (1e3 * pooled(some) for some in (change.rmse_when_left_out, change.rmse_with_all))
-            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with {by}"
+            written = "; a file that is written has the others that come nearest" if is_soft else ""
+            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with {by}{written}"
     return ""
 
 
