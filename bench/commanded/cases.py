@@ -22,7 +22,7 @@ from closed_loop.machine import Machine, build
 from closed_loop.models import SOURCES, read_model
 from closed_loop.programmes import exciting, working
 
-SEED = 330_000_000
+SEED, DEVELOPMENT = 330_000_000, 770_000_000
 STEP, EVERY = 0.002, 5  # s; steps from one sample of the log to the next
 SECONDS, RUNS, HELD_OUT = 8.0, 6, 2
 NOISE = 3e-4  # rad
@@ -100,6 +100,7 @@ class Case:
     seed: int
     count: int  # of differences
     torque: bool  # whether it is logged
+    kinds: tuple[str, ...] = ()  # of these; none: of any
 
 
 def plans(count: int, torque: bool, split: int = 0) -> Iterator[Case]:
@@ -112,12 +113,20 @@ def plans(count: int, torque: bool, split: int = 0) -> Iterator[Case]:
         yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of), torque)
 
 
+def of_kinds(kinds: tuple[str, ...], count: int, torque: bool) -> Iterator[Case]:
+    """Yield development cases that differ in these kinds, arm after arm."""
+    for number in range(count):
+        arm = ARMS[number % len(ARMS)]
+        yield Case(f"case_{number:03d}", arm, DEVELOPMENT + number, len(kinds), torque, kinds)
+
+
 def make(case: Case, models: Path, folder: Path) -> list[Difference]:
     """Write the model, the data set and apart the runs that are held out; return the label."""
     rng = np.random.default_rng([case.seed, 7])
     machine = build(read_model(models, case.arm), case.seed)
     own = _drawn(machine, rng)
-    kinds = rng.choice((*KINDS, "tilt") if case.torque else KINDS, case.count, replace=False)
+    every = (*KINDS, "tilt") if case.torque else KINDS
+    kinds = rng.choice(case.kinds or every, case.count, replace=False)
     differences = tuple(_difference(str(kind), own, _links(machine), rng) for kind in kinds)
     if case.torque:
         differences = tuple(_reached(one, machine, own, rng) for one in differences)

@@ -1,5 +1,7 @@
 """`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1]`: make sealed cases, then judge them.
 
+With `--kinds elasticity,offset` they are development cases that differ in these.
+
 MODELS is where `pip download --no-deps robosuite gymnasium-robotics -d MODELS` put its wheels. The first call makes the
 cases, writes `labels.json` in FOLDER_labels and prints its SHA-256: commit that. The second diagnoses those that are
 not yet diagnosed, one after another, and writes `page.md` beside the labels. What was found stands in
@@ -12,7 +14,7 @@ import argparse
 import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ import mujoco
 import numpy as np
 
 from closed_loop.models import read_model as read_arm
-from commanded.cases import NOISE, labels, make, plans
+from commanded.cases import NOISE, Case, labels, make, of_kinds, plans
 from irtwin.diagnosing import diagnose
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
@@ -39,10 +41,10 @@ APART = ("c_", "angle_y", "f_", "start", "stop")  # labels have a mass, a tilt's
 Label = Mapping[str, Any]
 
 
-def seal(models: Path, folder: Path, count: int, torque: bool, split: int = 0) -> None:
+def seal(models: Path, folder: Path, cases: Iterable[Case]) -> None:
     """Make the cases and apart their labels; print the checksum of these."""
     made, joints = {}, {}
-    for case in plans(count, torque, split):
+    for case in cases:
         made[case.name] = case, make(case, models, folder)
         joints[case.name] = read_arm(models, case.arm).joints
         print(f"made {case.name}", flush=True)
@@ -185,10 +187,14 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--torque", action="store_true", help="log the servos' torque, too")
     parser.add_argument("--split", type=int, default=0, help="which cases: others by each number")
+    parser.add_argument("--kinds", default="", help="development cases of these kinds, as elasticity,offset")
     arguments = parser.parse_args()
     file = Path(f"{arguments.folder}_labels") / "labels.json"
     if not file.exists():
-        seal(arguments.models, arguments.folder, arguments.count, arguments.torque, arguments.split)
+        count, torque = arguments.count, arguments.torque
+        kinds = tuple(filter(None, arguments.kinds.split(",")))
+        cases = of_kinds(kinds, count, torque) if kinds else plans(count, torque, arguments.split)
+        seal(arguments.models, arguments.folder, cases)
         return
     told, found = json.loads(file.read_text(encoding="utf-8")), {}
     for name in told:

@@ -2,7 +2,7 @@
 
 As a library: `read_data_set` reads a data set, `identify` fits a `Twin` to it, `predict` says what the twin expects of
 a run, `diagnose` says where twin and robot differ and why, a `Diagnosis` whose `document` is what JSON, graph and page
-say; `read_urdf` gives a `Robot`, `catalogue` the effects.
+say, `play` how far a simulator's model is from its robot; `read_urdf` gives a `Robot`, `catalogue` the effects.
 `import_logs` makes a data set of logs in other formats, and `check_log` says what is wrong with one.
 With a workspace: `run`, `adopt`, `ask`, `explain`, `export`, `optimise`; a `Location` names one whose
 database or graph is kept elsewhere.
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from irtwin.asking import export as export
     from irtwin.bring.bring import import_logs as import_logs
     from irtwin.diagnosing import diagnose as diagnose
+    from irtwin.diagnosing import play as play
     from irtwin.effects.catalogue import catalogue as catalogue
     from irtwin.gap.diagnosis import Diagnosis as Diagnosis
     from irtwin.location import Location as Location
@@ -51,6 +52,7 @@ _MODULES = {
     "identify": "modelling",
     "import_logs": "bring.bring",
     "optimise": "plans",
+    "play": "diagnosing",
     "predict": "modelling",
     "read_data_set": "signals.log",
     "read_urdf": "robot.urdf",

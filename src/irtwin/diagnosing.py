@@ -1,5 +1,7 @@
 """A diagnosis, end to end: a data set is read and judged; what is found is kept in a workspace, and written into files.
 
+A simulator's model is played beside it, if no more is asked than how far it is from the robot.
+
 Graph, database and pages are imported where a workspace or a report is asked for: a diagnosis alone is physics.
 """
 
@@ -25,6 +27,7 @@ from irtwin.signals.log import DataSet
 from irtwin.signals.sampling import checked_cutoff
 from irtwin.simulator.differences import bodies_beside, drawn, written
 from irtwin.simulator.model import Model, read_model, with_simulated_runs
+from irtwin.simulator.played_log import PlayedLog, play_log
 from irtwin.simulator.playing import Playing
 from irtwin.simulator.playing import diagnose as diagnose_by_playing
 from irtwin.simulator.servos import has_servos
@@ -120,23 +123,53 @@ def diagnose(
     return diagnosis
 
 
+def play(
+    dataset: Path | str,
+    simulator: Path | str,
+    *,
+    joints: Sequence[str] = (),
+    repair: bool = False,
+    json_file: Path | str | None = None,
+    announce: Announce = lambda line: None,
+) -> PlayedLog:
+    """Play the commands of a robot's runs through a model, MJCF, URDF, SDF or USD, as it is: how far is it off?
+
+    `joints` as of `diagnose`; `json_file`: where to write what is returned. Nothing is fitted, and no cause is sought.
+    Raises InputError on bad input, before anything is written.
+    """
+    announce, files = clocked(announce), _Files.checked(json_file, draws=0)
+    data_set = read_sound(Path(dataset), repair, announce, commanded=True)
+    files.check_apart([Path(simulator), *data_set.sha256, *(run.file for run in data_set.runs)])
+    model = read_model(Path(simulator), data_set.robot, joints)
+    _take_in(model, files, announce)
+    with telling(announce):
+        played = play_log(data_set, model)
+    if files.json is not None:
+        write(files.json, _json(played.to_json()))
+    return played
+
+
+def _json(told: object) -> bytes:
+    return (json.dumps(told, indent=1, allow_nan=False) + "\n").encode()
+
+
 @dataclass(frozen=True)
 class _Files:
     """Where what is found is to be written."""
 
     json: Path | None
-    report: Path | None
-    twin: Path | None
-    motion: Path | None
-    sysid: Path | None
-    simulator: Path | None
+    report: Path | None = None
+    twin: Path | None = None
+    motion: Path | None = None
+    sysid: Path | None = None
+    simulator: Path | None = None
     draws: tuple[Path, ...] = field(kw_only=True)
 
     @classmethod
     def checked(cls, *files: Path | str | None, draws: int) -> _Files:
         """Take files as they are asked for. Raises InputError where one cannot be written."""
         places = [None if file is None else Path(file) for file in files]
-        last = places[-1]
+        last = places[-1] if draws else None
         more = () if last is None else tuple(last.with_stem(f"{last.stem}-{number + 1}") for number in range(draws))
         for file in (*filter(None, places), *more):
             check_place(file)
@@ -169,7 +202,7 @@ class _Files:
         if self.sysid is not None:
             _write_script(data_set, diagnosis, self.sysid, announce)
         if self.json is not None:
-            write(self.json, (json.dumps(diagnosis.document.to_json(), indent=1, allow_nan=False) + "\n").encode())
+            write(self.json, _json(diagnosis.document.to_json()))
         if self.twin is not None and diagnosis.twin is not None:
             for doubt in doubts(diagnosis.twin):
                 announce(f"  {doubt}")
@@ -189,6 +222,8 @@ def _said_of_written(file: Path, diagnosis: Diagnosis | Playing, model: Model) -
     if isinstance(diagnosis, Playing):
         if lacking := diagnosis.unwritten:
             yield f"{file} has no place for {', '.join(lacking)}: these stay as they are"
+        if diagnosis.in_file is not diagnosis.chosen:
+            yield f"{file} has no place for a soft joint: it has the others of its numbers that come nearest"
     elif (beside := bodies_beside(model, diagnosis.document, diagnosis.twin)) is not None:
         if beside.written:
             yield f"{file} has all bodies{' and rotors' if beside.rotors else ''} of the twin with the causes"
@@ -207,8 +242,8 @@ def _take_in(model: Model, files: _Files, announce: Announce) -> None:
 
 
 def _write_script(data_set: DataSet, diagnosis: Diagnosis | Playing, file: Path, announce: Announce) -> None:
-    if isinstance(diagnosis, Playing) and diagnosis.chosen.differs.any():
-        write(file, script(diagnosis.chosen, diagnosis.document, data_set.folder, file))
+    if isinstance(diagnosis, Playing) and diagnosis.in_file.differs.any():
+        write(file, script(diagnosis.in_file, diagnosis.document, data_set.folder, file))
     else:
         announce(f"  no number of the servos differs: there is nothing for {file} to fit")
 

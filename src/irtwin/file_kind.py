@@ -116,7 +116,11 @@ def _model(path: Path, shown: str) -> FileKind:
         head = file.read(_HEAD)
     if b"<mujoco" in head:
         command = f"irtwin diagnose DATASET --simulator {shown} --save-simulator NEW.xml"
-        return FileKind("a model of MuJoCo", (command, "says what it has otherwise than the robot, and mends it"))
+        return FileKind(
+            "a model of MuJoCo",
+            (command, "says what it has otherwise than the robot, and mends it"),
+            (f"irtwin diagnose DATASET --simulator {shown} --play", "how far it is from the robot, told its commands"),
+        )
     return FileKind(
         "a robot's description",
         (f"irtwin import LOG --robot {shown} --out FOLDER", "makes a data set of a log of this robot"),

@@ -277,3 +277,11 @@ def test_the_residual_of_a_joint_that_slides_is_a_force(tmp_path: Path):
     ]
     assert "N m" not in " ".join(titles)
     assert any(title.endswith(", N") for title in titles)
+
+
+def test_a_number_of_a_link_has_its_meaning_beside_it(tmp_path: Path) -> None:
+    told = gap_cases.diagnosis("attributed")
+    cause = next(one for one in told["causes"] if one["parameters"])
+    cause["effect"] = "rigid_body"
+    cause["parameters"] = [cause["parameters"][0] | {"name": "centre_x (upper_arm)"}]
+    assert "Coordinate of a link’s centre of mass" in plain(page_of(tmp_path, told)).replace("'", "’")

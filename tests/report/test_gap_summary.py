@@ -228,3 +228,15 @@ def test_each_parameter_is_told_once_with_what_it_means():
         "Fs of stribeck friction: Friction above Coulomb's at standstill.",
         "d of stribeck friction: Stribeck exponent.",
     ]
+
+
+def test_numbers_of_links_are_told_by_what_the_ontology_says_of_bodies():
+    told = gap_cases.diagnosis("attributed")
+    for cause in told["causes"]:
+        if cause["effect"] == "stribeck_friction":
+            names = ("mass (link_3)", "centre_x (upper_arm)", "inertia_xy (link_3)")
+            cause["effect"], own = "rigid_body", cause["parameters"][0]
+            cause["parameters"] = [own | {"name": name} for name in names]
+    assert [line.partition(":")[0] for line in summary.meanings(Document.from_json(told))] == [
+        "mass of rigid body", "centre of rigid body", "inertia of rigid body",
+    ]  # fmt: skip

@@ -152,10 +152,12 @@ def test_the_model_is_given_the_twins_numbers_which_belong_with_what_is_added(tm
         np.testing.assert_allclose(getattr(model, f"dof_{number}"), values, atol=1e-6, err_msg=number)
 
 
-@pytest.mark.parametrize("late", [0, 20])
-def test_a_servo_has_its_dead_band_as_it_is_played(late: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("late", "gear"), [(0, 1.0), (20, 1.0), (0, -3.0)])
+def test_a_servo_has_its_dead_band_as_it_is_played(late: int, gear: float, tmp_path: Path) -> None:
     delay = f'kp="15" delay="{2e-3 * late - 1e-3}" nsample="{late + 1}"'  # MuJoCo's is of whole steps
     text = servo_arm.MODEL.replace('kp="15"', delay) if late else servo_arm.MODEL
+    servo = f'kp="{15 / gear**2!r}" kv="{0.6 / gear**2!r}" gear="{gear}" ctrlrange="-4.5 4.5"'
+    text = text if gear == 1 else text.replace('kp="15" kv="0.6" ctrlrange="-1.5 1.5"', servo)
     data_set, model, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(3, 1)}, text))
     (run,) = data_set.runs
     stiff, loose = (servo_arm.changed(own, dead_band=(0.0, band), delay=(0.0, 2e-3 * late)) for band in (0.0, 0.03))
@@ -164,7 +166,7 @@ def test_a_servo_has_its_dead_band_as_it_is_played(late: int, tmp_path: Path) ->
     assert apply(compiled, diagnosis(tmp_path)).effects == ("servo_dead_band",)
     data, found = mujoco.MjData(compiled), np.empty_like(wanted)
     for row, told in enumerate(run.signals.command):
-        found[row], data.ctrl[:] = data.qpos, told
+        found[row], data.ctrl[:] = data.qpos, told * [1.0, gear]
         for _ in range(round(0.02 / compiled.opt.timestep)):
             mujoco.mj_step(compiled, data)
     assert np.abs(wanted - without).max() > 0.02

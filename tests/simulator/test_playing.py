@@ -16,6 +16,7 @@ from tests.data_sets import irtwin, irtwin_does, irtwin_refuses
 from irtwin.document.document import Change, Document
 from irtwin.errors import InputError
 from irtwin.report.gap.summary import line
+from irtwin.simulator.play import play, whole
 from irtwin.simulator.playing import commanded_runs, diagnose
 from irtwin.simulator.writing import together
 
@@ -66,6 +67,24 @@ def test_the_number_that_differs_is_told_and_written(told):
     handed_over = (model.parent / "fit.py").read_text()
     assert handed_over.count("('elbow', 'kp', [15.0], [") == 1
     assert "MODEL, LOGS, FITTED = 'arm.xml', 'data', 'fit-fitted.xml'" in handed_over
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_a_soft_joint_that_no_file_holds_is_written_by_the_numbers_that_come_nearest(tmp_path):
+    data, model = logs(tmp_path, link_compliance=(0.0, 0.05))
+    new = tmp_path / "new.xml"
+    said = irtwin_does("diagnose", data, "--simulator", model, "--save-simulator", new)
+    assert "joint elasticity" in said.out
+    assert f"{new} has no place for a soft joint: it has the others of its numbers that come nearest" in said.err
+    assert "with it; a file that is written has the others that come nearest" in " ".join(said.out.split())
+    data_set = servo_arm.read(data, model)[0]
+    left = []
+    for file in (model, new):
+        own = servo_arm.read(data, file)[2]
+        left.append([np.abs(run.signals.q - play(own, [own.numbers], [whole(run)])[0][0][:, 0]).mean()
+                     for run in data_set.runs])  # fmt: skip
+    assert np.mean(left[1]) < 0.7 * np.mean(left[0])
 
 
 @pytest.mark.slow

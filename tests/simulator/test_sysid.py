@@ -47,6 +47,15 @@ def test_what_differs_is_free_in_the_words_of_the_model(arm):
     assert told["elbow", "delay"][2] == [0.0]
 
 
+def test_what_differs_behind_a_gear_is_free_as_the_file_has_it(tmp_path):
+    text = servo_arm.MODEL.replace('kp="20" kv="0.8" ctrlrange="-1.5 1.5"', 'kp="5" kv="0.2" gear="2"')
+    own = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(6, 0)}, text))[2]
+    told = {number: (model[0], robot[0]) for _, number, model, robot, *_ in free(chosen(own, **ROBOT))}
+    assert told["kp"] == pytest.approx((5.0, 3.0))
+    assert told["kv"] == pytest.approx((0.2, 0.35))
+    assert told["offset"] == pytest.approx((0.0, 0.04))
+
+
 def test_gravity_of_a_tilted_base_is_free_along_two_axes(arm):
     ((of, number, model, robot, *_),) = free(chosen(arm[2][2], tilt_x=(0.05, 0.05)))
     assert (of, number, model) == ("world", "gravity", [0.0, 0.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -185,6 +186,12 @@ def _gaps_to_find(data_set: Path, robot: str, location: Location) -> tuple[str, 
     help="What that model calls the robot's joints, in the robot's order, where it calls them otherwise.",
 )
 @click.option(
+    "--play",
+    "only_played",
+    is_flag=True,
+    help="Play the commands through that model as it is, and say how far it is from the robot: nothing is fitted.",
+)
+@click.option(
     "--save-simulator",
     "simulator_file",
     type=FILE,
@@ -233,6 +240,7 @@ def diagnose(
     dataset: Path,
     simulator: Path | None,
     joints: str | None,
+    only_played: bool,
     simulator_file: Path | None,
     location: Location | None,
     **asked: Any,
@@ -256,6 +264,7 @@ def diagnose(
 
     for option, file in (
         ("--joints names those of", joints),
+        ("--play plays", only_played),
         ("--save-simulator writes", simulator_file),
         ("--save-sysid fits", asked["sysid_file"]),
     ):
@@ -263,10 +272,14 @@ def diagnose(
             raise click.UsageError(f"{option} the model of --simulator: give that too")
     if asked["draws"] and not simulator_file:
         raise click.UsageError("--draws writes models beside that of --save-simulator: give that too")
+    called = joints.split(",") if joints else ()
+    if simulator and only_played:
+        _play(dataset, simulator, called, asked)
+        return
     diagnosis = judge(
         dataset,
         simulator=simulator,
-        joints=joints.split(",") if joints else (),
+        joints=called,
         simulator_file=simulator_file,
         workspace=location,
         announce=announce,
@@ -289,6 +302,15 @@ def diagnose(
         click.echo(line)
     for some in filter(None, (kept, summary.next_steps(diagnosis.document))):
         click.echo("\n" + "\n".join(some))
+
+
+def _play(dataset: Path, simulator: Path, joints: Sequence[str], asked: Mapping[str, Any]) -> None:
+    from irtwin.cli.play import tell
+    from irtwin.diagnosing import play
+
+    own = ("json_file", "repair")
+    refuse({*asked, "simulator_file", "workspace"} - {*own}, "is of a diagnosis, and does not go with --play")
+    tell(play(dataset, simulator, joints=joints, announce=announce, **{name: asked[name] for name in own}))
 
 
 @click.command()

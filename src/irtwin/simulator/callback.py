@@ -145,17 +145,18 @@ class _DeadBands:
         joints, _ = joints_of(model, names, _MODEL)
         self._q, self._dq = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         self._drives = np.array([drive_of(model, name, _MODEL) for name in names], dtype=int)
-        self._bands = bands
+        self._gears = model.actuator_gear[self._drives, 0]
+        self._bands = np.abs(self._gears) * bands
 
     def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        at, dq = self._drives, data.qvel[self._dq]
+        at, q, dq = self._drives, self._gears * data.qpos[self._q], self._gears * data.qvel[self._dq]
         stiffness, (offset, _, damping) = model.actuator_gainprm[at, 0], model.actuator_biasprm[at, :3].T
-        off = self._told(model, data) + offset / stiffness - data.qpos[self._q]
+        off = self._told(model, data) + offset / stiffness - q
         pull = stiffness * off + damping * dq
         less = pull - stiffness * np.clip(off, -self._bands, self._bands)
         limited = model.actuator_forcelimited[at] == 1
         least, most = np.where(limited, model.actuator_forcerange[at].T, [[-np.inf], [np.inf]])
-        data.qfrc_passive[self._dq] += np.clip(less, least, most) - np.clip(pull, least, most)
+        data.qfrc_passive[self._dq] += self._gears * (np.clip(less, least, most) - np.clip(pull, least, most))
 
     def _told(self, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the commands (n,) that the servos follow now: late where they have a delay, within their range."""

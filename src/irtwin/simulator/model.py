@@ -61,6 +61,7 @@ class Model:
     speeds: np.ndarray  # (n,) in qvel
     others: tuple[str, ...]
     delays: np.ndarray  # (number of actuators,), s; the compiled model has none
+    gears: np.ndarray  # (number of actuators,), of the file's; the compiled model's servos turn joints themselves
     gains: Gains  # of joints whose servos are not the file's
 
     @property
@@ -195,10 +196,10 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
     called = dict(zip(robot.joint_names, joints or robot.joint_names, strict=True))
     file = read_model_file(path)
     told = {called[joint.name]: (joint.kp, joint.kd or 0.0) for joint in robot.joints if joint.kp}
-    compiled, delays, gains = compiled_of(file, told)
+    compiled, delays, gears, gains = compiled_of(file, told)
     places, others = joints_of(compiled, tuple(called.values()), str(path), _offered(compiled, robot))
     model = Model(
-        file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gains
+        file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gears, gains
     )
     _check_joints(model, robot)
     return model
@@ -251,8 +252,8 @@ def joints_of(
 
 def compiled_of(
     file: ModelFile, gains: Gains, change: Callable[[mujoco.MjSpec], None] = lambda _: None
-) -> tuple[mujoco.MjModel, np.ndarray, Gains]:
-    """Return the compiled model without the delays of its actuators, these, and the gains that make servos of it.
+) -> tuple[mujoco.MjModel, np.ndarray, np.ndarray, Gains]:
+    """Return the compiled model without delays and gears of its servos, these, and the gains that make servos of it.
 
     `change`: what is done to its specification, once it has those servos.
     """
@@ -272,9 +273,34 @@ def compiled_of(
             if joint.name and joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
                 sensor = spec.add_sensor(name=f"{joint.name}{EFFORT}", type=mujoco.mjtSensor.mjSENS_JOINTACTFRC)
                 sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_JOINT, joint.name
-        return spec.compile(), delays, added
+        compiled = spec.compile()
+        return compiled, delays, take_out_gears(compiled), added
     except (ValueError, mujoco.FatalError) as error:
         raise InputError(f"{file.path}: {' '.join(str(error).split())}; MuJoCo cannot load it so") from error
+
+
+def take_out_gears(compiled: mujoco.MjModel) -> np.ndarray:
+    """Give servos of a compiled model the numbers with which they do at their joints what they do behind their gears.
+
+    Return these gears (number of actuators,), 1 where there is no servo or no gear. A command is then the joint's.
+    """
+    servo = (compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)) & (
+        compiled.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    )
+    gears = np.where(servo & (compiled.actuator_gear[:, 0] != 0), compiled.actuator_gear[:, 0], 1.0)
+    if (gears == 1).all():
+        return np.asarray(gears)
+    square = gears**2
+    compiled.actuator_gear[:, 0] /= gears
+    compiled.actuator_gainprm[:, 0] *= square
+    compiled.actuator_biasprm[:, :3] *= np.column_stack([gears, square, square])
+    compiled.actuator_armature[:] *= square
+    compiled.actuator_damping[:] *= square
+    compiled.actuator_dampingpoly[:] *= square[:, None]
+    compiled.actuator_forcerange[:] = np.sort(compiled.actuator_forcerange * gears[:, None])
+    for ends in (compiled.actuator_ctrlrange, compiled.actuator_actrange):
+        ends[:] = np.sort(ends / gears[:, None])
+    return np.asarray(gears)
 
 
 def drop_pictures(spec: mujoco.MjSpec, is_urdf: bool) -> None:

@@ -20,8 +20,8 @@ from irtwin.simulator.fit import unjudged
 from irtwin.simulator.model import Model
 from irtwin.simulator.play import PlayedStretch, Push, each, play
 from irtwin.simulator.push import FoundPush, find_pushes
-from irtwin.simulator.refined import softened
-from irtwin.simulator.servos import NAMES, Servos, part_of, servos
+from irtwin.simulator.refined import limited, softened
+from irtwin.simulator.servos import NAMES, SOFT, Servos, part_of, servos
 from irtwin.simulator.tracking import held_out, parts, restarted, tracked
 from irtwin.simulator.trusted import NOTHING, Trusted
 
@@ -35,11 +35,15 @@ _CLIPPED = 0.05  # of a joint's commands: with more, what it does is the clippin
 
 @dataclass(frozen=True)
 class Playing:
-    """A diagnosis by playing: its document, what a page draws, and the robot's numbers."""
+    """A diagnosis by playing: its document, what a page draws, and the robot's numbers.
+
+    `in_file`: those that come nearest in the model's file, which has no place for a soft joint.
+    """
 
     document: Document
     curves: Curves
     chosen: DifferingNumbers
+    in_file: DifferingNumbers
     against: str = "simulated"  # the role of what the observed runs are held against
     twin: None = None  # positions alone make none
 
@@ -51,7 +55,7 @@ class Playing:
 
     def written(self) -> bytes:
         """Return the model's file with the robot's numbers."""
-        return self.chosen.fit.servos.written(self.chosen.numbers, self.chosen.differs)
+        return self.in_file.fit.servos.written(self.in_file.numbers, self.in_file.differs)
 
     @property
     def unwritten(self) -> list[str]:
@@ -60,7 +64,7 @@ class Playing:
 
     def drawn(self, rng: np.random.Generator) -> bytes:
         """Return the model's file with the robot's numbers as they could be."""
-        return self.chosen.fit.servos.written(self.chosen.drawn(rng), self.chosen.differs)
+        return self.in_file.fit.servos.written(self.in_file.drawn(rng), self.in_file.differs)
 
 
 def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out_runs: Collection[str] = ()) -> Playing:
@@ -77,9 +81,7 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
     if any(run.signals.torque is None for run in runs):
         runs = [replace(run, signals=replace(run.signals, torque=None)) for run in runs]
     own = replace(servos(model), trusted=trust.numbers)
-    clipped = _clipped(own, runs)
-    for line in clipped:
-        tell(f"  {line}")
+    clipped = clipping(own, runs)
     tell("Fitting numbers of servos")
     fitted, judged = (
         [run for run in runs if run.name not in apart],
@@ -88,19 +90,21 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
     lasts = _BRIEF if _falls(own, _stretches(fitted, _LASTS)) else _LASTS
     stretches = _stretches(fitted, lasts)
     step = max(_STEP, model.compiled.opt.timestep)
-    chosen, pushes = _chosen(own, stretches, step, trust.pushes)
-    chosen = softened(chosen)
+    rigid, pushes = _chosen(own, stretches, step, trust.pushes)
+    chosen = softened(rigid)
     tell("Playing the runs that are held out" if apart else "Playing all runs")
     names = [run.name for run in judged]
     numbers = dict.fromkeys(names, chosen.numbers) if apart else held_out(chosen, runs)
-    before = tracked(data_set.robot, own, judged, dict.fromkeys(names, own.numbers))
+    as_it_is = dict.fromkeys(names, own.numbers)
+    before = tracked(data_set.robot, own, judged, as_it_is)
     after = tracked(data_set.robot, own, judged, numbers, _of(pushes))
     differing = list(dict.fromkeys(part_of(name) for row, name in enumerate(NAMES) if chosen.differs[row].any()))
     named = {f"{writing.PUSH} {place}": found_push for place, found_push in enumerate(pushes)}
     families = writing.families([*differing, *named])
     judging = _stretches(judged, lasts) if apart else chosen.fit.stretches
     closed = parts(own, judging, numbers, families, {name: found_push.push for name, found_push in named.items()})
-    horizons = restarted(own, judged, numbers, _of(pushes))
+    anew = restarted(own, judged, as_it_is), restarted(own, judged, numbers, _of(pushes))
+    horizons = [(seconds, error, anew[1][seconds]) for seconds, error in anew[0].items()]
     return Playing(
         replace(
             writing.document(data_set.robot, model.name, names, chosen, named, closed, before, after, horizons),
@@ -108,6 +112,7 @@ def diagnose(data_set: DataSet, model: Model, trust: Trusted = NOTHING, held_out
         ),
         writing.curves(data_set.robot, names, before, after),
         chosen,
+        limited(rigid) if chosen.differs[list(SOFT)].any() else chosen,
     )
 
 
@@ -159,14 +164,15 @@ def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
     return bool(max(np.sqrt((remainder**2).mean(axis=0)).max() for remainder in left) > _FALLEN)
 
 
-def _clipped(own: Servos, runs: Sequence[Run]) -> list[str]:
-    """Return of which joints the model clips commands. Raises InputError where it clips more than a few."""
+def clipping(own: Servos, runs: Sequence[Run]) -> list[str]:
+    """Say and return of which joints the model clips commands. Raises InputError where it clips more than a few."""
     shares = own.clipped(np.concatenate([run.signals.command for run in runs if run.signals.command is not None]))
     lines = []
     for joint, share in shares.items():
         line = f"{joint}: {100 * share:.3g} % of its commands are beyond the model's ctrlrange, which clips them"
         if share > _CLIPPED:
             raise InputError(f"{own.model.file.path}: {line}; correct ctrlrange, or zero and unit of the commands")
+        tell(f"  {line}")
         lines.append(line)
     return lines
 

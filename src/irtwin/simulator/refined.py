@@ -24,7 +24,7 @@ _OF_LIMIT = ((0.8, 0.9, 0.95, 1.05, 1.1, 1.2), (0.97, 0.985, 1.015, 1.03), (0.99
 _LIMIT = NAMES.index("torque_limit")
 _SHARES, _DAMPINGS = (1.0, 0.3), (0.0, 1.0)  # of a step, tried
 _TRIED = (0.05, 0.2, 0.8)  # of the chart: what is softer than such a number is better with it than without
-_NEARER = ((0.5, 0.7, 1.4, 2.0), (0.85, 0.93, 1.08, 1.18))  # times the best of them
+_NEARER = ((0.5, 0.7, 1.4, 2.0, 2.8), (0.85, 0.93, 1.08, 1.18), (0.96, 0.98, 1.02, 1.04))  # times the best of them
 _CLOSES = 0.2  # of what numbers of a joint close, from which a compliance in their place is looked for more closely
 
 Place = tuple[int, int]  # row of a number, and joint
@@ -158,6 +158,11 @@ def softened(chosen: DifferingNumbers) -> DifferingNumbers:
         better = refined(tried)
         if evidence(better) < evidence(chosen):
             return better
+    return limited(chosen)
+
+
+def limited(chosen: DifferingNumbers) -> DifferingNumbers:
+    """Return numbers, fitted by the whole model where a limit of torque is among them."""
     return refined(chosen) if chosen.differs[_LIMIT].any() else chosen
 
 

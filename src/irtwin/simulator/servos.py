@@ -121,6 +121,19 @@ class Servos:
         """Whether the servo of each joint (n,) is the model's file's, not one by its controller's gains."""
         return np.array([joint not in self.model.gains for joint in self.model.joints])
 
+    @cached_property
+    def gears(self) -> np.ndarray:
+        """The gears (n,) of the file's servos: numbers are those at the joints, behind them."""
+        return np.asarray(self.model.gears[self.actuators])
+
+    def of_file(self, numbers: np.ndarray) -> np.ndarray:
+        """Return numbers (k, n) with those of servos as the file has them, before their gears."""
+        own = numbers.copy()
+        own[NAMES.index("stiffness")] /= self.gears**2
+        own[NAMES.index("offset")] *= self.gears
+        own[NAMES.index("torque_limit")] /= np.abs(self.gears)
+        return own
+
     def lead(self, numbers: np.ndarray) -> np.ndarray:
         """Return how many s (n,) of a commanded speed controllers of told gains, or of errors, add to a command."""
         leads = ~self.in_file | self.model.file.damps_error
@@ -199,8 +212,9 @@ class Servos:
         """
         changes: dict[Element, dict[str, float | str | None]] = {}
         file, differs = self.model.file, differs & self.held
-        numbers = np.where(self.held, numbers, self.numbers)
+        numbers = self.of_file(np.where(self.held, numbers, self.numbers))
         in_joint, in_servo = self.dampings(numbers[NAMES.index("damping")])
+        in_servo = in_servo / self.gears**2
         for place, joint in enumerate(self.model.joints):
             own = dict(zip(NAMES, differs[:, place], strict=True))
             told = dict(zip(NAMES, map(float, numbers[:, place]), strict=True))
@@ -244,8 +258,15 @@ class Servos:
             changed |= {**kind, "gaintype": "fixed", "biastype": "affine"}
             changed |= {"gainprm": told["stiffness"], "biasprm": bias}
             compiled, at = self.model.compiled, self.actuators[place]
+            if compiled.actuator_actnum[at]:
+                changed |= {
+                    "timeconst": None,
+                    "dyntype": "filterexact",
+                    "dynprm": float(compiled.actuator_dynprm[at, 0]),
+                }
             if compiled.actuator_ctrllimited[at] and "ctrlrange" not in servo.attributes:
-                changed["ctrlrange"] = " ".join(map(repr, compiled.actuator_ctrlrange[at].tolist()))
+                ends = np.sort(compiled.actuator_ctrlrange[at] * self.gears[place])
+                changed["ctrlrange"] = " ".join(map(repr, ends.tolist()))
         else:
             changed |= {"kp": told["stiffness"]} if own["stiffness"] else {}
             changed |= {"kv": damping, "dampratio": None} if own["damping"] else {}
@@ -319,13 +340,11 @@ def servos(model: Model) -> Servos:
 
 def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
     """Return a joint's position servo. Raises InputError, naming `source`, where it is not driven by one alone."""
-    drive, drives = _servo(compiled, joint), _drives(compiled, joint)
+    drive = _servo(compiled, joint)
     if drive is None:
-        gear = float(compiled.actuator_gear[drives[0], 0]) if len(drives) == 1 else 1.0
-        geared = f" of gear 1, not {gear:g} (kp and kv times the gear's square, forcerange times it)"
         raise InputError(
-            f"{source}: joint {joint} is not driven by one position servo{geared if gear != 1 else ''}; its commands "
-            f'need one to be played: <position joint="{joint}" kp="..."/>'
+            f"{source}: joint {joint} is not driven by one position servo; its commands need one to be played: "
+            f'<position joint="{joint}" kp="..."/>'
         )
     return drive
 
@@ -344,12 +363,12 @@ def _drives(compiled: mujoco.MjModel, joint: str) -> list[int]:
 
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:
-    """Return whether an actuator pulls its joint to its command, as <position> of gear 1 does."""
+    """Return whether an actuator pulls its joint to its command, as <position> does."""
     gain, bias = compiled.actuator_gainprm[actuator], compiled.actuator_biasprm[actuator]
     return bool(
         compiled.actuator_gaintype[actuator] == int(mujoco.mjtGain.mjGAIN_FIXED)
         and compiled.actuator_biastype[actuator] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         and gain[0] > 0
         and bias[1] == -gain[0]
-        and compiled.actuator_gear[actuator, 0] == 1
+        and compiled.actuator_gear[actuator, 0] != 0
     )

@@ -64,9 +64,10 @@ def written(
 
 def free(chosen: DifferingNumbers) -> Iterator[Free]:
     """Yield what differs: joint or body, number, the model's, the robot's, and bounds, as far beyond as they differ."""
-    own, robots = chosen.fit.servos.numbers, chosen.numbers
-    model = chosen.fit.servos.model
-    ways = [np.array(chosen.fit.servos.dampings(some[NAMES.index("damping")])) for some in (own, robots)]
+    servos = chosen.fit.servos
+    own, robots, model = servos.of_file(servos.numbers), servos.of_file(chosen.numbers), servos.model
+    before_gear = np.array([np.ones(own.shape[1]), servos.gears**2])
+    ways = [np.array(servos.dampings(some[NAMES.index("damping")])) / before_gear for some in (own, robots)]
     for row, name in enumerate(OF_JOINTS):
         for place in np.flatnonzero(chosen.differs[row]):
             joint = model.joints[place]

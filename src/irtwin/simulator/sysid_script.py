@@ -131,6 +131,7 @@ def stretches(data_set: DataSet, spec: mujoco.MjSpec) -> tuple[sysid.ModelSequen
             held = np.searchsorted(time, steps, side="right") - 1  # each command until the next comes
             told = np.zeros((2, len(steps), model.nu))
             told[:, :, drives] = commands[rows][held], commanded_speeds[rows][held]
+            told *= model.actuator_gear[:, 0]
             names.append(f"{run.name} from {begin:g} s")
             states.append(sysid.create_initial_state(model, qpos, qvel))
             controls.append(sysid.TimeSeries.from_control_names(steps, told[0], model))

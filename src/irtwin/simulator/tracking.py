@@ -127,31 +127,21 @@ def work(time: np.ndarray, done: np.ndarray) -> float:
     return energy(time, np.maximum(power, 0.0).sum(axis=1))
 
 
-def restarted(
-    own: Servos, runs: Sequence[Run], numbers: OfRun, pushes: tuple[Push, ...] = ()
-) -> list[tuple[float, float, float]]:
-    """Return horizons, s, with the tracking error from the one before: of the model, and with the numbers of runs.
-
-    The latter with the pushes.
-    """
-    left: list[list[np.ndarray]] = [[], []]
-    times = []
+def restarted(own: Servos, runs: Sequence[Run], numbers: OfRun, pushes: tuple[Push, ...] = ()) -> dict[float, float]:
+    """Return the tracking error of runs that begin anew each half second, from a horizon, s, to the one before."""
+    times, left = [], []
     for run in track(runs, lambda run: f"{run.name} played again and again from where the robot is"):
-        stretches = each(run, _BEGUN_ANEW, _MOST)
+        stretches = each(run, _BEGUN_ANEW, _MOST, pushes)
         times += [stretch.time for stretch in stretches]
-        pushed = each(run, _BEGUN_ANEW, _MOST, pushes)
-        for way, (with_, some) in enumerate(((own.numbers, stretches), (numbers[run.name], pushed))):
-            played = play(own, [with_], some)[0]
-            left[way] += [(stretch.q - moved[:, 0]) ** 2 for stretch, moved in zip(stretches, played, strict=True)]
-    time = np.concatenate(times)
-    squares = [np.concatenate(way).mean(axis=1) for way in left]
-    horizons = []
+        played = play(own, [numbers[run.name]], stretches)[0]
+        left += [(stretch.q - moved[:, 0]) ** 2 for stretch, moved in zip(stretches, played, strict=True)]
+    time, squares = np.concatenate(times), np.concatenate(left).mean(axis=1)
+    errors = {}
     for low, high in zip((0.0, *_HORIZONS), _HORIZONS, strict=False):
         inside = (time >= low) & (time < high)
         if inside.any():
-            before, after = (float(np.sqrt(way[inside].mean())) for way in squares)
-            horizons.append((high, before, after))
-    return horizons
+            errors[high] = float(np.sqrt(squares[inside].mean()))
+    return errors
 
 
 def parts(

@@ -92,7 +92,7 @@ def _add_second(spec: mujoco.MjSpec, joint: str) -> None:
     first = next(actuator for actuator in spec.actuators if actuator.target == joint)
     second = spec.add_actuator(name=f"{joint}{_SECOND}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-    second.ctrllimited, second.ctrlrange = first.ctrllimited, first.ctrlrange
+    second.gear, second.ctrllimited, second.ctrlrange = first.gear, first.ctrllimited, first.ctrlrange
     second.forcelimited, second.forcerange = True, (-1.0, 1.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from irtwin.document.curves import Curves, RunError
@@ -17,6 +18,7 @@ from irtwin.report.wording import listed
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
+_SOFT = "K"  # of a joint that is played as soft: others in its file come nearest
 _WORTH_SAYING = 0.01  # of friction, from run to run
 _STEPS = 3  # motions to log that are told
 _SPLIT = (
@@ -24,7 +26,8 @@ _SPLIT = (
     "interval holds zero is not in the data, but split as the robot's description has it."
 )
 _MEANINGS = """SELECT ?effect ?name ?meaning {
-    ?effect irt:has_Effect_Parameter ?parameter . ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
+    ?effect irt:has_Effect_Parameter|irt:has_Body_Quantity ?parameter .
+    ?parameter irt:Parameter_Name ?name ; skos:definition ?meaning
 }"""
 
 
@@ -189,8 +192,8 @@ def _rows_of_causes(diagnosis: Document) -> Iterator[Row]:
 
 def meanings(diagnosis: Document) -> list[str]:
     """Return what each parameter of the causes that matter means, in the ontology's words, as far as it has any."""
-    parameters = {  # each once, and of a vector's parts ("f_x") the whole
-        (cause.effect, parameter.name.partition("_")[0]): None
+    parameters = {  # each once, and of a vector's parts ("f_x"), or links' ("mass (link_1)"), the whole
+        (cause.effect, re.split("[_ ]", parameter.name)[0]): None
         for cause in diagnosis.mattering
         for parameter in cause.parameters
     }
@@ -239,11 +242,13 @@ def _named(parameters: Sequence[CauseParameter]) -> str:
 
 def _kept(cause: Cause, diagnosis: Document) -> str:
     """Return what a model leaves of its tracking error that has all numbers of the robot but a cause's."""
-    by = "irtwin.simulator.callback" if any(parameter.name == _CALLED_BACK for parameter in cause.parameters) else "it"
+    names = [parameter.name for parameter in cause.parameters]
+    by, is_soft = "irtwin.simulator.callback" if _CALLED_BACK in names else "it", _SOFT in names
     for change in diagnosis.shrink.by_cause:
         if change.cause == cause.id and change.channel == "position":
             left, all_ = (1e3 * pooled(some) for some in (change.rmse_when_left_out, change.rmse_with_all))
-            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with {by}"
+            written = "; a file that is written has the others that come nearest" if is_soft else ""
+            return f", {_short(left)} mrad (mm) RMS where {_short(all_)} are left with {by}{written}"
     return ""
 
 
