@@ -81,17 +81,16 @@ class Posterior:
     def beside(
         cls,
         projection: Projection,
-        structure: Sequence[tuple[Hypothesis, Variant]],
+        found: tuple[Sequence[Hypothesis], Sequence[int]],
         candidates: Sequence[Hypothesis],
         prior: HypothesisPrior,
         limits: Criterion,
         misfit: np.ndarray,
     ) -> Posterior:
-        """Try candidates beside what was found, everything refitted; `misfit` (g,) is as of `_Search`."""
+        """Try candidates beside what was `found`, and its columns, everything refitted; misfit (g,): as of `_Search`."""
         variants = [variant for candidate in candidates for variant in candidate.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(candidate.variants) for candidate in candidates])
-        chosen = [k for _, variant in structure for k in variant.columns]
-        known = [hypothesis for hypothesis, _ in structure]
+        known, chosen = found
         odds = [prior.log_odds(candidate, known) - np.log(len(candidate.variants)) for candidate in candidates]
         screened = [variant.effect.screened for variant in variants]
         log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)

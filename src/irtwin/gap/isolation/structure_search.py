@@ -103,6 +103,7 @@ class _Search:
     floor: np.ndarray | None
     tried: dict[tuple[object, ...], Posterior] = field(default_factory=dict)
     leaves: dict[tuple[tuple[int, ...], bytes], np.ndarray] = field(default_factory=dict)
+    bounded: dict[tuple[tuple[int, ...], bytes], list[int]] = field(default_factory=dict)
     projections: dict[bytes, Projection] = field(default_factory=dict)  # by the noise of the last looks
 
     def beside(self, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
@@ -132,7 +133,18 @@ class _Search:
             if not any(set(variant.columns) & taken for variant in candidate.variants)
             and not any(_same_place(candidate, member) for member, _ in structure)
         ]
-        return Posterior.beside(self.projection(noise), structure, left, self.prior, self.limits, self.misfit(noise))
+        found = [hypothesis for hypothesis, _ in structure], self.fitted(structure, noise)
+        return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
+
+    def fitted(self, structure: Sequence[Member], noise: np.ndarray) -> list[int]:
+        """Return the columns of a structure, in order, without those of nuisances that would be below their bounds."""
+        columns = sorted(_columns(structure))
+        if not any(hypothesis.nuisance for hypothesis, _ in structure):
+            return columns
+        asked = tuple(columns), noise.tobytes()
+        if asked not in self.bounded:
+            self.bounded[asked] = self.system.within_bounds(columns, noise)
+        return self.bounded[asked]
 
     def projection(self, noise: np.ndarray) -> Projection:
         """Return what the twin leaves of all variants by `noise`; most looks are by that of the two looks before."""
@@ -287,7 +299,7 @@ class _Search:
         """
         asked = tuple(sorted(_columns(structure))), noise.tobytes()
         if asked not in self.leaves:
-            self.leaves[asked] = self.system.residual_rms(asked[0], noise)
+            self.leaves[asked] = self.system.residual_rms(self.fitted(structure, noise), noise)
         return self.leaves[asked]
 
     def causes(self, structure: Sequence[Member], noise: np.ndarray) -> tuple[FoundCause, ...]:

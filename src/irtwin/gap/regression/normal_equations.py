@@ -392,11 +392,31 @@ class System:
         of: Sequence[int] | np.ndarray,
     ) -> np.ndarray:
         """Return each equation's RMS (g,) in the groups `of`, by a fit to the groups `fitted`, weighted by `noise`."""
-        weights = np.maximum(noise, self.quietest) ** -2.0
-        every = [pair for group in fitted for pair in zip(self._products[group], weights.tolist(), strict=True)]
-        vector = self.solution(chosen, Moments(every))
+        vector = self.solution(chosen, self._together(fitted, noise))
         squares = np.sum([self.squares(vector, int(group)) for group in of], axis=0)
         return np.asarray(np.sqrt(squares / np.maximum(self.rows[list(of)].sum(axis=0), 1)))
+
+    def within_bounds(self, chosen: Sequence[int], noise: np.ndarray) -> list[int]:
+        """Return the chosen columns without those of nuisances that a fit would have below their bounds.
+
+        Dry friction that turns by a negative share is none: it would imitate friction that falls with speed.
+        """
+        kept = list(chosen)
+        while own := [k for k in kept if self.column(k).effect.nuisance]:
+            values = self.solution(kept, self._together(range(self.groups), noise))
+            terms = [self.all_terms[k] for k in own]
+            below = {
+                k for k, term in zip(own, terms, strict=True) if term.expected + values[k] * self.scale[k] < term.lowest
+            }
+            if not below:
+                break
+            kept = [k for k in kept if k not in below]
+        return kept
+
+    def _together(self, groups: Sequence[int] | np.ndarray, noise: np.ndarray) -> Moments:
+        """Return the products of columns of some groups, equations weighted as by `moments`."""
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        return Moments([pair for group in groups for pair in zip(self._products[group], weights.tolist(), strict=True)])
 
     def solution(self, chosen: Sequence[int], total: Moments, without: Moments | None = None) -> np.ndarray:
         """Return the (D,) coefficients, in units of the prior, of the twin's terms and the chosen columns.
