@@ -141,6 +141,35 @@ def test_a_change_and_a_nuisance_are_looked_for_together():
     assert {one.effect for one, _ in right} == {"viscous", "turn"}
 
 
+def falling_with_speed(joint):
+    """A joint whose dry friction falls with speed and turns softly: by a negative share the turn is like the fall."""
+    generator, blocks = np.random.default_rng(4), []
+    for run in range(RUNS):
+        phase, fastest = 2 * np.pi * generator.random(), generator.uniform(0.3, 1.0)
+        speed = fastest * np.sin(np.linspace(0, 20, ROWS) + phase)
+        sign = np.sign(speed)
+        columns = np.column_stack([sign * np.exp(-np.abs(speed) / 0.05), np.tanh(speed / 0.06) - sign])
+        measured = sign * 10.0 + columns @ [8.0, 0.0] + NOISE * generator.standard_normal(ROWS)
+        blocks.append(block(run, np.ones(ROWS), sign, columns, measured))
+    columns = [
+        CandidateColumn(EFFECT, 0, Term("stribeck", "N m", spread=5.0)),
+        CandidateColumn(FrictionTurn(), 0, Term("turn", "N m", spread=5.0, lowest=0.0)),
+    ]
+    known = [(EFFECT, Term(name, "N m", spread=5.0)) for name in ("constant", "dry")]
+    candidates = [alone(column.term.name, 2 + k, column, joint=joint) for k, column in enumerate(columns)]
+    return equation(blocks, known, columns), candidates
+
+
+def test_a_nuisance_below_its_bound_hides_nothing_that_it_imitates():
+    system, (fall, turn) = falling_with_speed("joint_1")
+    noise = np.array([NOISE])
+    assert system.within_bounds([3], noise) == [] and system.within_bounds([2], noise) == [2]
+    search = _Search(system, [fall, turn], HypothesisPrior.of([fall, turn]), DEFAULT.criterion, noise)
+    both = [(each, each.variants[0]) for each in (fall, turn)]
+    found, _ = search.pruned(both, search.left(both, noise))
+    assert [each.effect for each, _ in found] == ["stribeck"]
+
+
 def test_of_two_shapes_that_one_is_taken_which_leaves_less():
     mix = [[0.98, 0.2], [1.0, 0.0]]
     system, (near, true) = system_of(mix, [2.0, 0.0])

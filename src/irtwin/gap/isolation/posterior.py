@@ -87,7 +87,7 @@ class Posterior:
         limits: Criterion,
         misfit: np.ndarray,
     ) -> Posterior:
-        """Try candidates beside what was `found`, and its columns, everything refitted; misfit (g,): as of `_Search`."""
+        """Try candidates beside what was `found`, by its columns, everything refitted; `misfit` (g,): of `_Search`."""
         variants = [variant for candidate in candidates for variant in candidate.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(candidate.variants) for candidate in candidates])
         known, chosen = found
