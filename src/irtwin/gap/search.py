@@ -48,10 +48,11 @@ def check_observed(system: System) -> None:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for the causes in a case: `unknown` are not known to it."""
+    """The search for the causes in a case: `unknown` are not known to it, `found` what one before it found."""
 
     case: Case
     unknown: Set[Without] = frozenset()
+    found: tuple[Effect, ...] = ()
 
     @cached_property
     def stack(self) -> Stack:
@@ -72,7 +73,7 @@ class Search:
         case = self.case
         if not (open_turns := case.turns(known=True)):
             return []
-        stack = case.stack.with_effects([*case.effects, *open_turns])
+        stack = case.stack.with_effects([*case.effects, *self.found, *open_turns])
         values = estimate_of(torque_system(stack, case.with_torque, case.grouping, (), None), ()).values
         shares: dict[str, list[float]] = {}
         for (effect, term), value in zip(stack.torque_terms, values, strict=True):
@@ -167,7 +168,8 @@ class Search:
                 reasons.append(f"it lags by {1e3 * lag:.2g} ms, more than filters make")
                 unknown = unknown | {cause.effect}
         tell(f"Trying every effect on torque again, as {' and '.join(reasons)}")
-        return replace(self, case=case.with_friction_near_zero(added(self.case, causes)), unknown=unknown)
+        found = tuple(added(self.case, causes))
+        return replace(self, case=case.with_friction_near_zero(found), unknown=unknown, found=found)
 
     def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         about = self.below, self.twin.torque, self.before
