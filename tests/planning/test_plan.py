@@ -192,7 +192,7 @@ def test_bad_options_are_told(folder, options, message):
     assert message in said.err
     assert not (folder / "none.csv").exists()
     said = irtwin("plan", folder / "twin.json", *ENDS, "--out", folder / "none.txt")
-    assert "a plan is written as .csv, .parquet, .script or .src" in said.err
+    assert "a motion is written as .csv, .parquet, .script or .src" in said.err
 
 
 @pytest.mark.parametrize(
