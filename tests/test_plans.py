@@ -356,7 +356,7 @@ def test_another_timing_says_what_it_saves(performed: Path, tmp_path: Path) -> N
         ("dome", (), 'the robot has no measured run "dome"; the nearest is "done"'),
         ("done", ("--run", "reach"), 'the robot has a run "reach" already; choose another name'),
         ("done", ("--cycle", "0.5"), 'run "done" cannot be done in 0.5 s; the fastest'),
-        ("done", ("--out", "x.txt"), "a plan is written as .csv, .parquet, .script or .src"),
+        ("done", ("--out", "x.txt"), "a motion is written as .csv, .parquet, .script or .src"),
     ],
 )
 def test_what_cannot_be_timed_otherwise(performed: Path, run: str, more: tuple[str, ...], message: str) -> None:

@@ -235,7 +235,7 @@ def check_plan_file(out: Path) -> None:
     """Raise InputError where no plan can be written to a file of this name."""
     check_place(out)
     if out.suffix.lower() not in (".csv", ".parquet", *robot_program.WRITERS):
-        raise InputError(f"{out}: a plan is written as .csv, .parquet, .script or .src; name such a file")
+        raise InputError(f"{out}: a motion is written as .csv, .parquet, .script or .src; name such a file")
 
 
 def write_motion(motion: Motion, robot: Robot, out: Path) -> None:

@@ -37,15 +37,13 @@ def test_a_proposal_says_what_it_saves_a_cycle_and_a_year_and_what_it_takes() ->
         "it takes 0 s"
     )
     assert brakes.endswith("18 J less (9 kWh in 5000 h a year); how long coming back takes is in no log")
-    assert lighter == (
-        "each kilogram less at the flange: 9 +- 1 J less (4.5 +- 0.5 kWh in 5000 h a year); it takes no time"
-    )
+    assert lighter == "each kilogram less at the flange saves 9 +- 1 J a cycle (4.5 +- 0.5 kWh in 5000 h a year)"
 
 
 def test_without_hours_there_is_no_year_and_states_that_no_log_shows_are_not_known() -> None:
     *_, proposal, off, lighter = _curve_lines(found(None, "off"))
     assert "year" not in proposal + lighter
-    assert off == "no log shows the robot off: what a pause saves so is not known"
+    assert off == "no log shows the robot off: what that would save in a pause is not known"
 
 
 def test_an_order_says_what_it_saves() -> None:

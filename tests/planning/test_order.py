@@ -26,3 +26,20 @@ def test_many_places_come_near_the_least(monkeypatch: pytest.MonkeyPatch) -> Non
     found = best_order(cost)
     assert sorted(found) == list(range(11)) and (found[0], found[-1]) == (0, 10)
     assert length(cost, found) <= 1.15 * length(cost, exact)
+
+
+@pytest.mark.parametrize("at_once", [11, 2])
+def test_places_between_which_there_is_no_way_do_not_follow_one_another(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(order, "_EXACT", at_once)
+    places = np.array([0, 1, 2, 3, 0, 1, 2, 3])
+    cost = np.random.default_rng(5).uniform(1, 9, (8, 8))
+    cost[places[:, None] == places] = np.inf
+    assert length(cost, best_order(cost)) <= length(cost, list(range(8)))
+
+
+def test_the_order_given_stays_where_none_goes_around_what_has_no_way() -> None:
+    cost = np.ones((5, 5))
+    cost[1:4, 1:4] = np.inf
+    assert best_order(cost) == [0, 1, 2, 3, 4]

@@ -192,7 +192,7 @@ def test_bad_options_are_told(folder, options, message):
     assert message in said.err
     assert not (folder / "none.csv").exists()
     said = irtwin("plan", folder / "twin.json", *ENDS, "--out", folder / "none.txt")
-    assert "a plan is written as .csv, .parquet, .script or .src" in said.err
+    assert "a motion is written as .csv, .parquet, .script or .src" in said.err
 
 
 @pytest.mark.parametrize(
@@ -250,3 +250,17 @@ def test_a_programme_pauses_at_its_places_in_the_order_that_takes_least(folder) 
     best = [0, *(2 * place for place in tour.order), 8]
     ordered = replace(programme.motion, q=np.repeat(q[::2][[row // 2 for row in best]], 2, axis=0))
     assert any_order(known, replace(programme, motion=ordered)) is None
+
+
+def test_pauses_one_after_another_at_one_pose_are_one_place(folder) -> None:
+    start, far, near, goal = (np.array([turn, 1.0, 0.6]) for turn in (-0.9, 0.7, -0.7, 0.9))
+    q = np.repeat([start, start, far, far, near, goal], 2, axis=0)
+    sections = tuple(Section(row, row + 1, "pause" if row % 2 == 0 else "move") for row in range(11))
+    programme = SectionedMotion(Motion(np.arange(12.0), q, 0 * q, 0 * q, run="weld"), sections)
+    assert any_order(load(folder / "twin.json"), programme).order == (2, 1)
+
+
+def test_places_that_are_one_pose_are_a_line_where_no_order_parts_them() -> None:
+    near = np.array([-0.7, 1.0, 0.6, 0.0, 0.5, 0.0])
+    with pytest.raises(InputError, match="start and goal are the same pose"):
+        plan(nominal_twin(SIX), Task(START, GOAL, via=(near, near)))

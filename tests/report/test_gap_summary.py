@@ -50,12 +50,11 @@ def test_what_is_no_gap_but_far_from_noise_is_said():
     document = Document.from_json(diagnosis)
     much = f"12.0 times the noise floor at {joint}"
     assert summary.line(document, "reference") == (
-        "no_gap: Nothing changed since the reference runs. The twin leaves as much of them as of the observed ones: "
-        f"{much}."
+        f"no_gap: Nothing changed since the reference runs. Of these, too, the twin leaves {much}."
     )
     assert summary.line(document, None) == (
-        f"no_gap: There is no gap away from reversals. With these the twin leaves {much}: how dry friction turns is "
-        "not known."
+        f"no_gap: There is no gap away from reversals. With them the twin leaves {much}: how dry friction changes "
+        "where a joint turns back is not known."
     )
 
 

@@ -79,6 +79,7 @@ def test_what_nobody_said_is_not_shown(answers: Answers) -> None:
     unsaid = instead(answers, tariff=(nothing,), waiting=())
     priced, without = drawn(answers), drawn(unsaid)
     assert "cost, EUR" in priced and "CO₂, kg" in priced and "could save a year, EUR" in priced
+    assert "Plant Werk 1" in text(priced) and "Werk 1" not in without
     assert "cost, " not in without and "CO₂, kg" not in without and "Cost and CO₂ are not shown" in without
     assert overview.sheet(overview.overview(unsaid)).columns == tuple(
         name for name in overview.sheet(overview.overview(answers)).columns

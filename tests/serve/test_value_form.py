@@ -99,7 +99,9 @@ def test_a_refusal_says_why_on_the_page_and_leaves_the_form_as_it_was(writable: 
 
 @pytest.mark.slow
 def test_who_has_no_token_and_what_is_not_offered_is_turned_away(writable: Server, plant: Server) -> None:
-    assert post(writable, token="wrong").status_code == 401
+    wrong = post(writable, token="guessed")
+    assert wrong.status_code == 401 and 'role="alert">the token for updates is wrong; nothing changed' in wrong.text
+    assert f'value="{PAYLOAD}" selected' in wrong.text and "guessed" not in wrong.text
     other = post(writable, what=f"{RUN} {IRT}Run_Time")
     assert (other.status_code, "has nothing to say of" in other.text) == (404, True)
     of_another = post(writable, what=f"{BASE}run/Arm_B.pick_1 {IRT}Payload")

@@ -207,7 +207,7 @@ def optimise(
     planned run, and the robot's report says what it saves.
 
     \b
-    Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 12
+    Example: irtwin optimise KUKA_KR6_R700 point_to_point --cycle 20
     """
     from irtwin import plans
 
@@ -239,9 +239,9 @@ def _curve_lines(timings: Timings) -> Iterator[str]:
         year = _year(timings, proposal.saved)
         yield f"pause from {proposal.begin:.2f} to {end:.2f} s: {proposal.what}, {proposal.saved} J less{year}; {back}"
     for state in timings.unseen:
-        yield f"no log shows the robot {state}: what a pause saves so is not known"
+        yield f"no log shows the robot {state}: what that would save in a pause is not known"
     less = timings.kilogram
-    yield f"each kilogram less at the flange: {less} J less{_year(timings, less)}; it takes no time"
+    yield f"each kilogram less at the flange saves {less} J a cycle{_year(timings, less)}"
 
 
 def _placement_text(timings: Timings) -> str:

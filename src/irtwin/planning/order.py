@@ -11,10 +11,14 @@ def best_order(cost: np.ndarray) -> list[int]:
     """Return the places 0 to m - 1, first and last in their place, in the order that takes least; cost (m, m): row to
     column.
 
-    Exact by dynamic programming (Held and Karp, 1962) for eleven places between; of more, the nearest next, improved
-    by moving stretches of up to three places elsewhere (Or, 1976) until none helps.
+    Exact by dynamic programming (Held and Karp, 1962) for eleven places between; of more, the nearest next and the
+    order given, improved by moving stretches of up to three places elsewhere (Or, 1976) until none helps. Where a cost
+    is infinite there is no way: where no order goes around all of these, the order given is returned.
     """
-    return _exact(cost) if len(cost) - 2 <= _EXACT else _improved(cost, _nearest(cost))
+    given = list(range(len(cost)))
+    if len(cost) - 2 <= _EXACT:
+        return _exact(cost) or given
+    return min((_improved(cost, order) for order in (given, _nearest(cost))), key=lambda order: length(cost, order))
 
 
 def length(cost: np.ndarray, order: list[int]) -> float:
@@ -22,7 +26,7 @@ def length(cost: np.ndarray, order: list[int]) -> float:
     return float(cost[order[:-1], order[1:]].sum())
 
 
-def _exact(cost: np.ndarray) -> list[int]:
+def _exact(cost: np.ndarray) -> list[int] | None:
     last = len(cost) - 1
     inner = range(1, last)
     least = {(1 << place, place): (float(cost[0, place]), [0, place]) for place in inner}
@@ -36,8 +40,8 @@ def _exact(cost: np.ndarray) -> list[int]:
                 if not visited & 1 << after and taken + cost[place, after] < least.get(key, (np.inf, []))[0]:
                     least[key] = (taken + float(cost[place, after]), [*way, after])
     full = sum(1 << place for place in inner)
-    ends = [[*least[full, place][1], last] for place in inner] or [[0, last]]
-    return min(ends, key=lambda order: length(cost, order))
+    ends = [[*least[full, place][1], last] for place in inner if (full, place) in least]
+    return min(ends, key=lambda order: length(cost, order), default=None)
 
 
 def _nearest(cost: np.ndarray) -> list[int]:

@@ -137,10 +137,15 @@ def plan(twin: Twin, task: Task, rate: float = 100.0) -> Plan:
 def any_order(twin: Twin, programme: SectionedMotion) -> Tour | None:
     """Return the order of a programme's pauses that takes least energy; its first and last stay where they are.
 
-    Both orders are planned, as `plan` does. None where no other takes less.
+    Both orders are planned, as `plan` does; pauses one after another at one pose are one. None where no other order
+    takes less.
     """
     motion = programme.motion
-    poses = [motion.q[section.first] for section in programme.sections if section.kind == "pause"]
+    poses: list[np.ndarray] = []
+    for section in programme.sections:
+        pose = motion.q[section.first]
+        if section.kind == "pause" and not (poses and _are_one(poses[-1], pose)):
+            poses.append(pose)
     if len(poses) < 4:
         return None
     task = Task(
@@ -170,7 +175,7 @@ def _toured(twin: Twin, task: Task, rate: float) -> Plan:
     last = len(poses) - 1
     cost = np.full((last + 1, last + 1), np.inf)
     for start, goal in permutations(range(last + 1), 2):
-        if goal != 0 and start != last and np.abs(poses[goal] - poses[start]).max() > _SAME:
+        if goal != 0 and start != last and not _are_one(poses[start], poses[goal]):
             quick = leg(start, goal, False)
             cost[start, goal] = twin.energy(quick.motion) if task.least_energy else quick.seconds
     order, given = best_order(cost), list(range(last + 1))
@@ -180,6 +185,10 @@ def _toured(twin: Twin, task: Task, rate: float) -> Plan:
     saved = saving(twin, made.motion, was.motion) if twin.knows_power else None
     tour = Tour(tuple(order[1:-1]), saved, was.seconds - made.seconds)
     return replace(made, price=price(twin, [made.motion]), tour=tour)
+
+
+def _are_one(pose: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.abs(pose - other).max() < _SAME)
 
 
 def _joined(legs: Sequence[Plan], rate: float) -> Plan:
@@ -211,7 +220,7 @@ def _fastest(twin: Twin, task: Task, limits: MotionLimits, collisions: Collision
     robot = twin.robot
     start = joints_for(robot, task.start, collisions, None, "the start")
     goal = joints_for(robot, task.goal, collisions, start, "the goal")
-    if np.abs(goal - start).max() < _SAME:
+    if _are_one(start, goal):
         raise InputError("start and goal are the same pose; give another goal")
     ends = min(collisions.clearance(start), collisions.clearance(goal))
     collisions.keep_off(min(KEEP_OFF, ends / 2))

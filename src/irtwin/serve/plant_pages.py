@@ -144,7 +144,12 @@ class PlantPages:
     async def _say(self, request: Request) -> Response:
         """Keep a value that a robot's page lets users say, and lead back to it: with why, where it is refused."""
         said = read_value(await read_body(request, self._limits.request, self._limits.seconds))
-        self._updates.admit(said.authorization)
+        try:
+            self._updates.admit(said.authorization)
+        except Refusal as refusal:
+            if refusal.status != 401:
+                raise
+            return await self._refused(request, 401, "the token for updates is wrong; nothing changed", said)
         asked = {"sayable": page.questions("robot")["sayable"]}
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, asked, {"robot": iri}, "sayable")
@@ -157,10 +162,14 @@ class PlantPages:
         except Refusal as refusal:
             if refusal.status != 400:
                 raise
-            answer = await self._robot(request, refusal.message, said)
-            answer.status_code = refusal.status
-            return answer
+            return await self._refused(request, refusal.status, refusal.message, said)
         return RedirectResponse(f"/robot{request.url.path.removeprefix('/say')}#say", status_code=303)
+
+    async def _refused(self, request: Request, status: int, why: str, said: SaidValue) -> Response:
+        """Return a robot's page that says why, its form filled as it was."""
+        answer = await self._robot(request, why, said)
+        answer.status_code = status
+        return answer
 
     async def _made_table(self, request: Request) -> Response:
         answers = await self._asking.answers(request, {"made": page.questions()["made"]}, {})

@@ -344,7 +344,7 @@ def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
     if drive is None:
         raise InputError(
             f"{source}: joint {joint} is not driven by one position servo; its commands need one to be played: "
-            f'<position joint="{joint}" kp="..."/>'
+            f'<position joint="{joint}" kp="..."/>, or kp of the joint in dataset.toml'
         )
     return drive
 

@@ -139,7 +139,6 @@ def left(sizes: Sequence[tuple[str | None, float | None]], *, since: bool) -> st
         return None
     much = f"{wording.number(floors)} times the noise floor at {joint}"
     if since:
-        alike = "The twin leaves as much of them as of the observed ones"
-        return f"Nothing changed since the reference runs. {alike}: {much}."
-    turning = "how dry friction turns is not known"
-    return f"There is no gap away from reversals. With these the twin leaves {much}: {turning}."
+        return f"Nothing changed since the reference runs. Of these, too, the twin leaves {much}."
+    turning = "how dry friction changes where a joint turns back is not known"
+    return f"There is no gap away from reversals. With them the twin leaves {much}: {turning}."
