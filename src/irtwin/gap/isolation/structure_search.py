@@ -113,19 +113,29 @@ class _Search:
             self.tried[asked] = self._beside(structure, noise)
         return self.tried[asked]
 
-    def instead(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> Posterior:
-        """Try what may stand in the place of one hypothesis of a structure, beside the others, once."""
+    def instead(
+        self, member: Member, structure: Sequence[Member], noise: np.ndarray, *, bounded: bool = False
+    ) -> Posterior:
+        """Try what may stand in the place of one hypothesis of a structure, beside the others, once.
+
+        `bounded`: the others without columns of nuisances that would be below their bounds.
+        """
         rest = [other for other in structure if other is not member]
-        asked = np.sort(_columns(rest)).tobytes(), noise.tobytes(), member[0].place
+        columns = self.fitted(rest, noise) if bounded else sorted(_columns(rest))
+        asked = np.sort(_columns(rest)).tobytes(), np.array(columns).tobytes(), noise.tobytes(), member[0].place
         if asked not in self.tried:
             near = [candidate for candidate in self.candidates if overlap(candidate, member[0])]
-            self.tried[asked] = self._beside(rest, noise, near)
+            self.tried[asked] = self._beside(rest, noise, near, columns)
         return self.tried[asked]
 
     def _beside(
-        self, structure: Sequence[Member], noise: np.ndarray, some: Sequence[Hypothesis] | None = None
+        self,
+        structure: Sequence[Member],
+        noise: np.ndarray,
+        some: Sequence[Hypothesis] | None = None,
+        columns: Sequence[int] | None = None,
     ) -> Posterior:
-        """Try all candidates, or some of them."""
+        """Try all candidates, or some of them, beside a structure, or those `columns` of it."""
         taken = set(_columns(structure))
         left = [
             candidate
@@ -133,7 +143,7 @@ class _Search:
             if not any(set(variant.columns) & taken for variant in candidate.variants)
             and not any(_same_place(candidate, member) for member, _ in structure)
         ]
-        found = [hypothesis for hypothesis, _ in structure], self.fitted(structure, noise)
+        found = [hypothesis for hypothesis, _ in structure], _columns(structure) if columns is None else columns
         return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
 
     def fitted(self, structure: Sequence[Member], noise: np.ndarray) -> list[int]:
@@ -215,8 +225,11 @@ class _Search:
         return structure, noise
 
     def odds(self, member: Member, structure: Sequence[Member], noise: np.ndarray) -> float:
-        """Return the log odds of one hypothesis of a structure beside the others."""
-        posterior = self.instead(member, structure, noise)
+        """Return the log odds of one hypothesis of a structure beside the others.
+
+        Nuisances keep to their bounds: what they imitate beyond these would be dropped, and then the nuisance.
+        """
+        posterior = self.instead(member, structure, noise, bounded=True)
         return float(posterior.log_odds[posterior.index(member[0])])
 
     def settled(self, structure: list[Member], noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
@@ -299,7 +312,7 @@ class _Search:
         """
         asked = tuple(sorted(_columns(structure))), noise.tobytes()
         if asked not in self.leaves:
-            self.leaves[asked] = self.system.residual_rms(self.fitted(structure, noise), noise)
+            self.leaves[asked] = self.system.residual_rms(asked[0], noise)
         return self.leaves[asked]
 
     def causes(self, structure: Sequence[Member], noise: np.ndarray) -> tuple[FoundCause, ...]:
