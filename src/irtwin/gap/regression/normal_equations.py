@@ -401,9 +401,9 @@ class System:
 
         Dry friction that turns by a negative share is none: it would imitate friction that falls with speed.
         """
-        kept = list(chosen)
+        kept, total = list(chosen), self._together(range(self.groups), noise)
         while own := [k for k in kept if self.column(k).effect.nuisance]:
-            values = self.solution(kept, self._together(range(self.groups), noise))
+            values = self.solution(kept, total)
             terms = [self.all_terms[k] for k in own]
             below = {
                 k for k, term in zip(own, terms, strict=True) if term.expected + values[k] * self.scale[k] < term.lowest
