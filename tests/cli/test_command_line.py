@@ -75,8 +75,9 @@ def test_the_same_data_set_again_changes_nothing(workspace, small_data_set):
 
 def test_an_exciting_motion_is_designed_and_said(tmp_path):
     out, logs = tmp_path / "motion.csv", data_set(tmp_path / "logs", "Arm", joints=1)
-    said = done("robot", "excite", logs / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50)
-    assert "condition number" in said
+    page = tmp_path / "motion.html"
+    said = done("robot", "excite", logs / "robot.urdf", "--seconds", 4, "--out", out, "--rate", 50, "--page", page)
+    assert "condition number" in said and "Condition number" in page.read_text()
     motion = np.genfromtxt(out, delimiter=",", names=True)
     assert len(motion) == 201
     assert motion["dq_joint_1"][[0, -1]] == pytest.approx(0.0, abs=1e-9)

@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 from pyoxigraph import Literal, NamedNode, Quad
-from tests import gap_cases, plants
+from tests import gap_cases, plants, synthetic
 from tests.gap_pages import page_of as gap_page
 from tests.report.robots import PageOf, six_axis
 from tests.screens import faults, is_dark, narrow_and_dark, on_screen
 
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_REASONED, term
+from irtwin.planning.plan import nominal_twin
+from irtwin.report import motion
 from irtwin.report.ontology.page import write_page
 from irtwin.report.plant import overview
 from irtwin.report.plant import page as plant_page
@@ -103,6 +105,18 @@ def test_the_gap_page(browser: Any, tmp_path: Path) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") == 400
     assert faults(page) == []
     assert on_screen(page, 1440, "light") == []
+    page.context.close()
+
+
+def test_the_page_of_a_motion(browser: Any, tmp_path: Path) -> None:
+    twin = nominal_twin(synthetic.arm(2))
+    motion.write_page(twin, synthetic.swing(twin.robot, 1, seconds=2.0), "swing", [], tmp_path / "swing.html")
+    page = opened(browser, tmp_path / "swing.html", 1440, "light")
+    page.wait_for_selector("#figure-power .scatterlayer .trace")
+    assert page.evaluate("document.documentElement.scrollWidth") == 1440
+    assert page.locator(".irtwin-scene canvas").is_visible()
+    assert faults(page) == []
+    assert narrow_and_dark(page) == []
     page.context.close()
 
 

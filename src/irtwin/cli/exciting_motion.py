@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from irtwin.cli.options import FILE, OUT, PLACE, Number, announce, say_unchecked, speech
+from irtwin.cli.options import FILE, OUT, PLACE, Number, announce, page_option, say_unchecked, speech
 
 _LONG = 30.0  # s: of less nothing is said before
 
@@ -18,6 +18,7 @@ _LONG = 30.0  # s: of less nothing is said before
 @click.argument("urdf", type=PLACE)
 @click.option("--seconds", type=Number(min=1.0), required=True, help="Duration of the motion, s.")
 @click.option("--out", type=FILE, required=True, help=OUT)
+@page_option
 @click.option("--rate", type=Number(min=1.0), default=100.0, show_default=True, help="Sampling rate, Hz.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Each seed gives another motion.")
 @click.option(
@@ -45,6 +46,7 @@ def excite(
     urdf: Path,
     seconds: float,
     out: Path,
+    page: Path | None,
     rate: float,
     seed: int,
     box: tuple[float, ...] | None,
@@ -67,8 +69,11 @@ def excite(
     from irtwin.robot.collision import CollisionModel
     from irtwin.robot.urdf import read_urdf
     from irtwin.signals.motion import Motion
+    from irtwin.storage.files import check_place
 
     modelling.check_plan_file(out)
+    if page is not None:
+        check_place(page)
     described = read_urdf(urdf)
     within = None
     if box is not None:
@@ -91,7 +96,14 @@ def excite(
         tasks=[motion for task in tasks for motion in modelling.motions_of(described, task)],
         progress=_excitation_progress(),
     )
-    modelling.write_motion(Motion(*motion.sample(), run=out.stem), described, out)
+    sampled = Motion(*motion.sample(), run=out.stem)
+    modelling.write_motion(sampled, described, out)
+    if page is not None:
+        from irtwin.planning.plan import nominal_twin
+        from irtwin.report.motion import write_page
+
+        facts = [("Condition number", f"{motion.condition_number:.1f}")]
+        write_page(nominal_twin(described), sampled, out.stem, facts, page)
     say_unchecked(checks_itself)
     ended = {motion.bounded: "The search reached its limit of work. ", motion.interrupted: "Stopped. "}.get(True)
     if ended or not speech.quiet:

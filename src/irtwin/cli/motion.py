@@ -21,6 +21,7 @@ from irtwin.cli.options import (
     graph_option,
     located,
     locating,
+    page_option,
     payload_com_option,
     payload_mass_option,
     say,
@@ -56,6 +57,7 @@ _kept = locating(
     "--via", metavar="POSE", multiple=True, help="Stand there on the way, in the order that takes least. Repeatable."
 )
 @click.option("--out", type=FILE, help=OUT)
+@page_option
 @click.option("--line", is_flag=True, help="Lead the flange along a straight line.")
 @click.option(
     "--box",
@@ -85,6 +87,7 @@ def plan(
     goal: str,
     via: tuple[str, ...],
     out: Path | None,
+    page: Path | None,
     boxes: tuple[tuple[float, ...], ...],
     objective: str,
     rate: float,
@@ -108,8 +111,11 @@ def plan(
     from irtwin.planning.plan import Task
     from irtwin.planning.poses import read_target
     from irtwin.robot.collision import Obstacle
+    from irtwin.storage.files import check_place
 
     _check_kept(location, name, out)
+    if page is not None:
+        check_place(page)
     twin = plans.robot_twin(source, location) if location else modelling.read_twin(Path(source))
     joints = len(twin.robot.joints)
     task = Task(
@@ -129,7 +135,14 @@ def plan(
     if made.tour is not None:
         click.echo(_tour_text(made.tour))
     clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
-    click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {(kept or made).price or _NO_POWER}")
+    cost = (kept or made).price
+    if page is not None:
+        from irtwin.report.motion import write_page
+
+        kept_off = "" if math.isinf(made.clearance) else f"{1000 * made.clearance:.1f} mm"
+        facts = [("Least clearance", kept_off), ("It takes", str(cost or ""))]
+        write_page(twin, made.motion, name or (out.stem if out else _PLAN), facts, page)
+    click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {cost or _NO_POWER}")
 
 
 @click.command()

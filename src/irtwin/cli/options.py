@@ -23,6 +23,10 @@ OUT = "File to write: .csv, .parquet, .script (URScript) or .src (KRL of KUKA)."
 FOLDER = click.Path(path_type=Path, file_okay=False)
 PLACE = click.Path(path_type=Path)  # of either
 
+page_option = click.option(
+    "--page", type=FILE, help="HTML file to write: the robot performs the motion, with its curves and limits."
+)
+
 
 class Number(click.FloatRange):
     """A finite number; a plain range lets NaN pass."""
