@@ -67,6 +67,16 @@ def test_what_cannot_be_played_is_said_in_a_line(tmp_path, change, words):
     assert words in irtwin_refuses(*play(model, data)).err
 
 
+@pytest.mark.parametrize("played", [["--play"], []])
+def test_a_model_that_is_unstable_is_said_in_a_line_and_leaves_no_file(tmp_path, monkeypatch, played):
+    data, model = logs(tmp_path)
+    model.write_text(model.read_text().replace('kp="15"', 'kp="1e9"'))
+    monkeypatch.chdir(tmp_path)
+    said = irtwin_refuses("diagnose", data, "--simulator", model, *played)
+    assert f"{model}: its simulation is unstable" in said.err
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
 def test_the_model_and_the_logs_are_not_written_over(tmp_path):
     data, model = logs(tmp_path)
     assert "stays as it is" in irtwin_refuses(*play(model, data, "--json", model)).err

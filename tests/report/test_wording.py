@@ -20,7 +20,14 @@ def test_number_keeps_significant_digits(value: float | None, text: str):
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(8900.0, "2.47 Wh"), (12.0, "3.33 mWh"), (3.6e6, "1.00 kWh"), (-150.0, "−0.0417 Wh"), (None, "–")],
+    [
+        (8900.0, "2.47 Wh"),
+        (12.0, "3.33 mWh"),
+        (3.6e6, "1.00 kWh"),
+        (-150.0, "−0.0417 Wh"),
+        (-1.8e-6, "0 mWh"),
+        (None, "–"),
+    ],
 )
 def test_energy_finds_its_unit(value: float | None, text: str):
     assert plain(wording.energy(value)) == text

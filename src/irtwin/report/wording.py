@@ -15,6 +15,7 @@ _MINUS = "\N{MINUS SIGN}"
 _POWER = re.compile(r"\^(-?\d+)")
 _LEAST_SHARE = 0.1  # per cent
 _ENERGY_UNITS = ((3.6e5, 3.6e6, "kWh"), (36.0, 3.6e3, "Wh"), (0.0, 3.6, "mWh"))  # J from which on, J of the unit
+_LEAST_ENERGY = 1e-4  # J: what less a sum comes to is rounding
 UNITS = {  # what a variable's name may end in, and how that unit is printed; it ends in the longest that fits
     "J": "J", "j": "J", "kJ": "kJ", "MJ": "MJ", "kWh": "kWh", "kwh": "kWh", "Wh": "Wh", "W": "W", "w": "W", "kW": "kW",
     "s": "s", "ms": "ms", "min": "min", "h": "h", "Hz": "Hz", "hz": "Hz", "m": "m", "mm": "mm", "m2": "m²", "m3": "m³",
@@ -107,6 +108,8 @@ def energy_unit(values: Iterable[float | None]) -> tuple[float, str]:
 
 def energy(value: float | None, digits: int = 3) -> str:
     """Write an energy (J) as a bill does: in kWh, in Wh below a tenth of one."""
+    if value is not None and abs(value) < _LEAST_ENERGY:
+        value = 0.0
     size, unit = energy_unit([value])
     return NONE if value is None else quantity(value / size, unit, digits)
 

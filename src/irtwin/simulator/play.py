@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
+from irtwin.errors import InputError
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
 from irtwin.simulator.engine import mujoco
@@ -138,23 +140,30 @@ def each(run: Run, seconds: float, most: int, pushes: tuple[Push, ...] = ()) -> 
     return [PlayedStretch(run, slice(*rows), float(begin), pushes) for rows, begin in zip(ends, begins, strict=True)]
 
 
-def play(servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]) -> list[list[np.ndarray]]:
+def play(
+    servos: Servos, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch], *, strict: bool = False
+) -> list[list[np.ndarray]]:
     """Return, for each set of numbers (k, n) and each stretch, what the model does at its samples, as `measured`.
 
-    Joints that the robot lacks are told zero.
+    Joints that the robot lacks are told zero. Where numbers make the simulation unstable MuJoCo begins it anew, and a
+    fit sees that it is far off; `strict`: raises InputError there.
     """
     needed = [servos.needs(number_set) for number_set in numbers]
     moved: list[list[np.ndarray]] = [[] for _ in numbers]
     for needs in dict.fromkeys(needed):
         places = [place for place, own in enumerate(needed) if own == needs]
-        played = _played(servos, servos.variant(needs), [numbers[place] for place in places], stretches)
+        played = _played(servos, servos.variant(needs), [numbers[place] for place in places], stretches, strict)
         for place in places:
             moved[place] = [next(played) for _ in stretches]
     return moved
 
 
 def _played(
-    servos: Servos, variant: PlayedModel, numbers: Sequence[np.ndarray], stretches: Sequence[PlayedStretch]
+    servos: Servos,
+    variant: PlayedModel,
+    numbers: Sequence[np.ndarray],
+    stretches: Sequence[PlayedStretch],
+    strict: bool,
 ) -> Iterator[np.ndarray]:
     """Yield, set by set and stretch by stretch, what the model does (N, c, n)."""
     from mujoco.rollout import rollout
@@ -193,9 +202,14 @@ def _played(
             told[row][:, compiled.nu + variant.speeds] = torque
             told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
         begun = np.array([states[pair] for pair in some])
-        reached, sensed = rollout(
-            [models[set_index] for set_index, _ in some], datas, begun, told, control_spec=int(inputs)
-        )
+        with _unlogged():
+            reached, sensed = rollout(
+                [models[set_index] for set_index, _ in some], datas, begun, told, control_spec=int(inputs)
+            )
+        if strict:
+            _check_stable(
+                servos, [stretches[place].run.name for _, place in some], reached[:, :, 0] - begun[:, :1], after
+            )
         for row, (set_index, place) in enumerate(some):
             time = stretches[place].time
             q = variant.measured(np.vstack([begun[row], reached[row]])[:, 1 : 1 + compiled.nq], on_links[set_index])
@@ -203,6 +217,28 @@ def _played(
             if stretches[place].run.signals.torque is not None:
                 played.append(_at(time, begin, sensed[row][:, efforts]))
             yield np.stack(played, axis=1)
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT where the user is: a fit tries numbers at which it is unstable."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda warning: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _check_stable(servos: Servos, runs: Sequence[str], clocks: np.ndarray, expected: np.ndarray) -> None:
+    """Raise InputError where a simulation's clock (M, N) is not the expected one (N,): MuJoCo began it anew."""
+    wrong = ~(np.abs(clocks - expected) < expected[0] / 2)  # NaN is wrong, too
+    for run, stopped in zip(runs, wrong, strict=True):
+        if stopped.any():
+            raise InputError(
+                f"{servos.model.file.path}: its simulation is unstable {expected[int(np.argmax(stopped))]:.3g} s into "
+                f"run {run}; give it a smaller timestep, lower gains, or more armature"
+            )
 
 
 def _at(time: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:

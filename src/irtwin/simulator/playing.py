@@ -158,8 +158,11 @@ def _stretches(runs: Sequence[Run], lasts: float) -> list[PlayedStretch]:
 
 
 def _falls(own: Servos, stretches: Sequence[PlayedStretch]) -> bool:
-    """Return whether the robot ends far from its model: too far for slopes to say which number does that."""
-    moved = play(own, [own.numbers], stretches)[0]
+    """Return whether the robot ends far from its model: too far for slopes to say which number does that.
+
+    Raises InputError where the model is unstable.
+    """
+    moved = play(own, [own.numbers], stretches, strict=True)[0]
     left = [stretch.q - played[:, 0] for stretch, played in zip(stretches, moved, strict=True)]
     return bool(max(np.sqrt((remainder**2).mean(axis=0)).max() for remainder in left) > _FALLEN)
 

@@ -109,7 +109,7 @@ def tracked(
     tracks = []
     for run in track(runs, lambda run: f"playing {run.name}"):
         every = whole(run, pushes)
-        measured, played = every.measured, play(own, [numbers[run.name]], [every])[0][0]
+        measured, played = every.measured, play(own, [numbers[run.name]], [every], strict=True)[0][0]
         left = measured - played
         some = slice(None, None, max(1, len(left) // _POSES))
         poses = every.q[some], (every.q - left[:, 0])[some]
