@@ -129,7 +129,7 @@ def test_the_twin_may_have_no_terms() -> None:
     found = evidence(Projection(own, NOISE, [*some, Variant(EFFECT, (2,), ())]), (2,), some)
     total = sum(one.of(np.arange(one.size)) for one in own.moments(NOISE))
     left = total[0, 0] - total[0, 2] ** 2 / (total[2, 2] + 1)
-    assert found.information[0][0, 0] == pytest.approx(left)
+    assert found.coefficients[0].information[0, 0, 0] == pytest.approx(left)
 
 
 def test_nothing_may_be_asked_for() -> None:

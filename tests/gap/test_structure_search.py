@@ -15,7 +15,7 @@ from irtwin.effects.effect import Term
 from irtwin.effects.friction import FrictionTurn
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
 from irtwin.gap.isolation.structure_search import _Search, attribute, judged
-from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
+from irtwin.gap.regression.evidence import Coefficients, HypothesisEvidence, evidence
 from irtwin.gap.regression.hypotheses import CHANGED, MISSING, CandidateColumn, Hypothesis, Variant, hypotheses
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
@@ -224,6 +224,11 @@ def test_groups_that_disagree_speak_against_an_effect():
     assert not mixed or mixed[0] < agreed / 2
 
 
+def coefficients(values):
+    """One of each variant, (V, 1), known to one."""
+    return Coefficients(np.arange(len(values)), values, values[:, None])
+
+
 def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it():
     """Five effects that explain the prior alone; on the last of them four groups disagree."""
     one = np.ones((5, 1))
@@ -231,9 +236,7 @@ def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it(
     term, every = Term("k", "1"), 60.0 * one[:, 0]
     variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(5))
     squares = every, 25.0 * np.ones((5, 4)), missed
-    seen = HypothesisEvidence(
-        variants, *squares, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, np.zeros(5), every
-    )
+    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, np.zeros(5), every)
     named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
     posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one[:, 0], DEFAULT.criterion)
     assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
@@ -245,9 +248,7 @@ def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
     variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(2))
     explained, of_power = np.array([900.0, 60.0]), np.array([890.0, 3.0])
     squares = explained, 25.0 * np.ones((2, 4)), np.zeros((2, 4))
-    seen = HypothesisEvidence(
-        variants, *squares, tuple(one), tuple(one[:, None]), np.full(4, 1e3), one, of_power, np.zeros(2)
-    )
+    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, of_power, np.zeros(2))
     loss, friction = (
         Hypothesis("loss", None, MISSING, variants[:1]),
         Hypothesis("friction", "j1", MISSING, variants[1:]),

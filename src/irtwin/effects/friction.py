@@ -191,6 +191,7 @@ class NonlinearViscousFriction(JointEffect):
 
     id: ClassVar[str] = "nonlinear_viscous_friction"
     family: ClassVar[str] = "friction"
+    alters: ClassVar[str | None] = "viscous_friction"
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (0.2, 3.0)}
 
     d: float = 2.0

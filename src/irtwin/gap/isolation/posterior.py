@@ -107,25 +107,24 @@ class Posterior:
     @cached_property
     def log_odds(self) -> np.ndarray:
         """(H,) log odds that a hypothesis is true beside the structure, against that nothing more is."""
-        by_shape = self._by_shape
-        return np.array([np.logaddexp.reduce(by_shape[own]) for own in self._shapes])
+        return np.asarray(np.logaddexp.reduceat(self._by_shape, self._firsts))
 
     @cached_property
     def log_prior(self) -> np.ndarray:
         """(H,) log odds that a hypothesis is true before the data speak."""
-        return np.array([np.logaddexp.reduce(self.prior[own]) for own in self._shapes])
+        return np.asarray(np.logaddexp.reduceat(self.prior, self._firsts))
 
     @cached_property
     def shape(self) -> np.ndarray:
         """(H,) the index of each hypothesis' likeliest variant."""
-        return np.array([own[np.argmax(self._beside_best(own)[0])] for own in self._shapes], dtype=int)
+        weights, _ = self._beside_best(np.arange(len(self.owner)), self._firsts)
+        return _largest(weights, self._firsts)
 
     @cached_property
     def _by_shape(self) -> np.ndarray:
         """(V,) log odds of each variant against nothing."""
-        counts = np.array([len(values) for values in self.evidence.values], dtype=int)
-        explained = self._explaining(self._told, counts)
-        return np.asarray(self.prior + explained - self._sizes(np.arange(len(counts)), self._scale))
+        explained = self._explaining(self._told, self._counts)
+        return np.asarray(self.prior + explained - self._sizes(np.arange(len(self.owner)), self._scale))
 
     @cached_property
     def _told(self) -> np.ndarray:
@@ -173,7 +172,7 @@ class Posterior:
     def cost(self, place: int) -> float:
         """Return how much less likely a hypothesis is than what it explains: its prior, and its freedom."""
         shape = int(self.shape[place])
-        own = self._explaining(self._told[shape], len(self.evidence.information[shape]))
+        own = self._explaining(self._told[shape], self._counts[shape])
         return float(own - self.log_odds[place])
 
     def index(self, hypothesis: Hypothesis) -> int:
@@ -202,19 +201,22 @@ class Posterior:
 
     def weights(self, near: Sequence[int]) -> tuple[np.ndarray, float]:
         """Return the log weights of hypotheses that compete for one place, and of none of them."""
-        return self._beside_best(self.shape[list(near)])
+        weights, none = self._beside_best(self.shape[list(near)], np.zeros(1, dtype=int))
+        return weights, float(none[0])
 
-    def _beside_best(self, places: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return the log weights of variants of which one is there, and of none of them.
+    def _beside_best(self, places: np.ndarray, firsts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the log weights of variants, (P,), and that none of them is there, of each lot of those that compete.
 
-        Each by what it leaves of what the best explains: the best tells how well that can be explained.
+        firsts (L,): where lots begin; one of each is there. Each is weighed by what it leaves of what the best of its
+        lot explains: the best tells how well that can be explained.
         """
-        seen = self.evidence
-        best = int(places[np.argmax(seen.explained[places])])
-        told, count = self._in_units_of(best, places), len(seen.information[best])
-        size = self._sizes(places, np.full(len(places), self._scale[best]))
-        left = -np.asarray(self._explaining(told.max() - told, count))
-        return self.prior[places] - size + left, -float(self._explaining(told.max(), count))
+        best = places[_largest(self.evidence.explained[places], firsts)]
+        lot = np.repeat(np.arange(len(firsts)), np.diff([*firsts, len(places)]))
+        told = self._in_units_of(best[lot], places)
+        most, counts = np.maximum.reduceat(told, firsts), self._counts[best]
+        left = -np.asarray(self._explaining(most[lot] - told, counts[lot]))
+        size = self._sizes(places, self._scale[best[lot]])
+        return self.prior[places] - size + left, -np.asarray(self._explaining(most, counts))
 
     def _explaining(self, told: np.ndarray | float, count: np.ndarray | int) -> np.ndarray | float:
         certainty = self.limits.certainty
@@ -223,26 +225,49 @@ class Posterior:
     def _sizes(self, places: np.ndarray, scale: np.ndarray) -> np.ndarray:
         """Return the log of what variants pay, (P,): the room that their coefficients have, and what these miss in it.
 
-        They are off what is expected by one of `_SIZES`, each as likely. Variants of one count are solved at once.
+        They are off what is expected by one of `_SIZES`, each as likely. Variants of one count are weighed at once.
         """
-        seen, paid = self.evidence, np.zeros(len(places))
-        counts = np.array([len(seen.values[place]) for place in places], dtype=int)
-        sizes = np.array(_SIZES)[:, None]
-        for count in np.unique(counts):
-            own = np.flatnonzero(counts == count)
-            information = np.stack([seen.information[place] for place in places[own]])
-            values = np.stack([seen.values[place] for place in places[own]])
-            squares, axes = np.linalg.eigh(information)
-            known = np.maximum(squares / scale[own, None], 0.0)
-            room = 1 + sizes[..., None] ** 2 * known
-            missed = (known * np.einsum("vij,vi->vj", axes, values) ** 2 / room).sum(axis=-1)
-            cost = 0.5 * (np.log(room).sum(axis=-1) + missed)
+        paid, (which, row, _) = np.zeros(len(places)), self._index[:, places]
+        sizes = np.array(_SIZES)[:, None, None]
+        for lot, (squares, off) in enumerate(self._axes):
+            own = np.flatnonzero(which == lot)
+            known = np.maximum(squares[row[own]] / scale[own, None], 0.0)
+            room = 1 + sizes**2 * known
+            cost = 0.5 * (np.log(room).sum(axis=-1) + (known * off[row[own]] / room).sum(axis=-1))
             paid[own] = np.log(len(_SIZES)) - np.logaddexp.reduce(-cost, axis=0)
         return paid
 
     @cached_property
-    def _shapes(self) -> list[np.ndarray]:
-        return [np.flatnonzero(self.owner == place) for place in range(len(self.hypotheses))]
+    def _axes(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of `evidence.coefficients` the squares of the information along its axes, and of values along these."""
+        lots = []
+        for _, values, information in self.evidence.coefficients:
+            squares, axes = np.linalg.eigh(information)
+            lots.append((squares, np.einsum("vij,vi->vj", axes, values) ** 2))
+        return lots
+
+    @cached_property
+    def _index(self) -> np.ndarray:
+        """(3, V) in which of `evidence.coefficients` a variant's are, which of these, and how many they are."""
+        index = np.zeros((3, len(self.owner)), dtype=int)
+        for lot, (places, values, _) in enumerate(self.evidence.coefficients):
+            index[0, places], index[1, places], index[2, places] = lot, range(len(places)), values.shape[1]
+        return index
+
+    @property
+    def _counts(self) -> np.ndarray:
+        return np.asarray(self._index[2])
+
+    @cached_property
+    def _firsts(self) -> np.ndarray:
+        """(H,) where the variants of each hypothesis begin."""
+        return np.flatnonzero(np.diff(self.owner, prepend=-1))
+
+
+def _largest(values: np.ndarray, firsts: np.ndarray) -> np.ndarray:
+    """Return (L,) the place of the largest value of each lot; firsts (L,): where lots begin."""
+    ends = [*firsts[1:], len(values)]
+    return np.array([first + np.argmax(values[first:end]) for first, end in zip(firsts, ends, strict=False)], dtype=int)
 
 
 def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvidence) -> np.ndarray:

@@ -12,6 +12,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,22 +25,32 @@ _NOTHING = 1e-12  # squares, in units of the noise: what adds less acts nowhere
 _FEW = 4.0  # groups' worth of weight that the spread of the other variants has beside a variant's own
 
 
+class Coefficients(NamedTuple):
+    """Those of n variants, at `places` (n,), that have k each: values (n, k), information (n, k, k).
+
+    Values are beyond what is expected, in units of the prior.
+    """
+
+    places: np.ndarray
+    values: np.ndarray
+    information: np.ndarray
+
+
 @dataclass(frozen=True)
 class HypothesisEvidence:
     """V variants beside a fit, G halves of groups (`System.halves`); squares in units of the noise.
 
-    explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; values (V, k each),
-    beyond what is expected, in units of the prior; information (V, k, k each); rows (G,); by_kind (V, `System.kinds`):
-    of what is explained; of_power (V,): of it, what power shows beside torque; of_prior (V,): what is none of rows:
-    with the variant those of the twin's numbers whose `prior_tells` are nearer to what is known of them.
+    explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; `coefficients`, those of
+    one number together; rows (G,); by_kind (V, `System.kinds`): of what is explained; of_power (V,): of it, what power
+    shows beside torque; of_prior (V,): what is none of rows: with the variant those of the twin's numbers whose
+    `prior_tells` are nearer to what is known of them.
     """
 
     variants: tuple[Variant, ...]
     explained: np.ndarray
     said: np.ndarray
     missed: np.ndarray
-    values: tuple[np.ndarray, ...]
-    information: tuple[np.ndarray, ...]
+    coefficients: tuple[Coefficients, ...]
     rows: np.ndarray
     by_kind: np.ndarray
     of_power: np.ndarray
@@ -56,8 +67,11 @@ class HypothesisEvidence:
     @cached_property
     def unnamed(self) -> np.ndarray:
         """(V,) squares that a variant explains where it is as large as any healthy robot may have it."""
-        shares = [[term.unnamed / term.spread for term in variant.terms] for variant in self.variants]
-        return np.array([np.diag(a) @ np.square(b) for a, b in zip(self.information, shares, strict=True)])
+        squares = np.zeros(len(self.variants))
+        for places, _, information in self.coefficients:
+            shares = np.array([self.variants[place].unnamed for place in places])
+            squares[places] = (np.diagonal(information, axis1=1, axis2=2) * shares**2).sum(axis=1)
+        return squares
 
     @cached_property
     def disagreement(self) -> np.ndarray:
@@ -78,8 +92,7 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
     system = projection.system
     (explained, nearer), (said, missed) = np.zeros((2, len(variants))), np.zeros((2, len(variants), len(system.parts)))
-    information: list[np.ndarray] = [np.zeros((0, 0))] * len(variants)
-    values: list[np.ndarray] = [np.zeros(0)] * len(variants)
+    coefficients = []
     known = {effect.id for effect, _ in system.terms} | {system.column(k).effect.id for k in chosen}
     beside = projection.beside(chosen)
     for places, columns, whole, parts in beside.batches(variants):
@@ -93,8 +106,7 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
         nearer[places] = beside.nearer(columns, fit)
         squares, measured = beside.in_parts(columns, parts, fit)
         said[places], missed[places] = squares.T, (measured - squares).T
-        for place, known_of, value in zip(places, products, fit - expected, strict=True):
-            information[place], values[place] = known_of, value
+        coefficients.append(Coefficients(places, fit - expected, products))
     by_kind = (said + 2 * missed).reshape(len(variants), len(system.kinds), system.groups).sum(axis=2)
     said, missed = (_in_halves(system, squares) for squares in (np.maximum(said, 0.0), missed))
     halves = product(system.halves, range(system.groups))
@@ -102,8 +114,7 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     shown = np.maximum(explained, 0.0), said, missed
     of_power = by_kind[:, 1] if system.beside_power else np.zeros(len(variants))
     of_prior = np.clip(nearer, 0.0, shown[0])
-    fitted = tuple(values), tuple(information)
-    return HypothesisEvidence(tuple(variants), *shown, *fitted, rows, by_kind, of_power, of_prior)
+    return HypothesisEvidence(tuple(variants), *shown, tuple(coefficients), rows, by_kind, of_power, of_prior)
 
 
 def _in_halves(system: System, squares: np.ndarray) -> np.ndarray:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
 
 from irtwin.effects.effect import Effect, Term
 from irtwin.robot.description import Robot
@@ -18,6 +21,11 @@ class Variant:
     effect: Effect
     columns: tuple[int, ...]
     terms: tuple[Term, ...]
+
+    @cached_property
+    def unnamed(self) -> np.ndarray:
+        """(k,) how large any healthy robot may have its coefficients, as a share of what the catalogue expects."""
+        return np.array([term.unnamed / term.spread for term in self.terms])
 
 
 @dataclass(frozen=True)
