@@ -42,6 +42,7 @@ CHANGING = (
 EITHER = ("load_dependent_friction", "asymmetric_friction", "cable_drag", "temperature_dependent_friction")
 UNKNOWN = ("friction of another joint's angle", "vibration while moving", "product of two speeds", "weakened field")
 WHOLE = ("base_tilt", "payload")
+SENSED = ("torque_constant_error", "torque_offset", "encoder_offset")  # what a reading has and the power does not
 FRICTIONS = {"coulomb_friction": 1.0, "asymmetric_friction": 0.5, "temperature_dependent_friction": 0.3}
 UNIT = {"encoder_offset": 0.01, "base_tilt": 0.02, "payload": 0.5, "time_delay": 4e-3, "joint_elasticity": 1e-4}
 
@@ -266,8 +267,12 @@ class Case:
     factors: list[np.ndarray]
     warmth: list[np.ndarray]
 
-    def run(self, index: int, effects: bool = True) -> tuple[Trace, np.ndarray]:
-        told = [change for change in self.changes if effects and change.acts(self.roles[index])]
+    def run(self, index: int, effects: bool = True, sensed: bool = True) -> tuple[Trace, np.ndarray]:
+        told = [
+            change
+            for change in self.changes
+            if effects and change.acts(self.roles[index]) and (sensed or change.effect not in SENSED)
+        ]
         return joined(self.arm, self.traces[index], told, self.warmth[index], self.factors[index])
 
     def left(self, effects: bool) -> np.ndarray:
@@ -387,7 +392,8 @@ def write(folder: Path, case: Case, named: bool, rng: np.random.Generator) -> No
     lines += ["[twin]", f"effects = {json.dumps(effects)}"]
     for index, role in enumerate(case.roles):
         (q, dq, _), tau = case.run(index)
-        given, tau = tau, shifted(tau, lag) if lag else tau
+        (_, turned, _), given = case.run(index, sensed=False)
+        tau = shifted(tau, lag) if lag else tau
         shown = slice(0, None, every)
         signals = {"q": np.round(q[shown] / encoder) * encoder}
         signals["tau"] = (
@@ -404,7 +410,7 @@ def write(folder: Path, case: Case, named: bool, rng: np.random.Generator) -> No
             f"{key}_{name}": part[:, k].copy() for key, part in signals.items() for k, name in enumerate(arm.joints)
         }
         if power:
-            drawn_power = 40 + (given * dq + resistance * given**2).sum(axis=1)[shown]
+            drawn_power = 40 + (given * turned + resistance * given**2).sum(axis=1)[shown]
             columns["power"] = np.round(drawn_power + 0.5 * rng.standard_normal(len(drawn_power)), 1)
         pq.write_table(pa.table(columns), folder / "runs" / f"run_{index:02d}.parquet")
         lines += ["[[run]]", f'file = "runs/run_{index:02d}.parquet"', f'role = "{role}"', "payload_mass = 0.0"]

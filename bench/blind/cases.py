@@ -55,10 +55,11 @@ SEEDS = {
     "test_12": 130_000_000,
     "test_13": 137_000_000,
     "test_14": 144_000_000,
+    "test_15": 155_000_000,
 }
 OF_THEIR_OWN = {"local": (LOCAL, (1.0, 3.0))}  # effects and levels of splits that do not draw from all
 # Splits that draw how dry friction turns at zero speed, the rate of the logs, and whether these name their repeats.
-DRAWN_LAWS = ("laws", "test_7", "test_8", "test_9", "test_10", "test_11", "test_12", "test_13", "test_14")
+DRAWN_LAWS = ("laws", "test_7", "test_8", "test_9", "test_10", "test_11", "test_12", "test_13", "test_14", "test_15")
 NARROWEST, WIDEST = 1e-3, 0.03  # rad/s, widths of that turn
 INTERVALS = (0.004, 0.008, 0.02)  # s
 LEVELS = (0.1, 0.3, 1.0, 3.0)

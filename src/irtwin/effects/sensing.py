@@ -26,6 +26,7 @@ from irtwin.signals.filter import lagged
 from irtwin.signals.motion import Motion
 
 _CONSTANTS = (0.4, 2.5)  # of a nominal torque constant that nobody vouches for: servos and desktop arms are off by two
+_CLASS = 0.005  # by how much meters of a common class, 0.5, are off (IEC 62053-22)
 _GAINS = (0.7, 1.4)  # of a meter
 _FARTHEST = 0.35  # rad or m, of a zero
 LONGEST_LAG = 5e-3  # s, of all joints' torque: filters of drives pass 100 Hz and more
@@ -246,7 +247,7 @@ class MeterGain(Effect):
 
     def terms(self, robot: Robot) -> tuple[Term, ...]:
         """Return g - 1."""
-        return (Term("g - 1", "1", spread=0.3, lowest=-1.0),)
+        return (Term("g - 1", "1", spread=0.3, lowest=-1.0, unnamed=_CLASS),)
 
     def columns(self, robot: Robot, motion: Motion, predicted: Predicted | None = None) -> np.ndarray:
         """Return (N, 1) the predicted power."""
