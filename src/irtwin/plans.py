@@ -12,6 +12,7 @@ from sqlalchemy import select
 from irtwin import modelling
 from irtwin.announce import Announce
 from irtwin.errors import InputError
+from irtwin.identification.progress import telling
 from irtwin.location import WORKSPACE, Location
 from irtwin.modelling import Expectation
 from irtwin.planning.cycle import Cycle, CycleTimes
@@ -231,7 +232,8 @@ def _keep(
         robot_id = find_robot(place, robot)
         check_run_name(place, robot_id, name)
         _, twin = load_twin(place, robot_id)
-        made, run = make(twin)
+        with telling(announce):
+            made, run = make(twin)
         with rewriting(place, announce) as graph:
             with staged(place, robot_id) as apart:
                 run_id = keep_run(apart, robot_id, twin.robot.joint_names, run)

@@ -108,6 +108,7 @@ def plan(
     Example: irtwin plan twin.json --from 0,-1.57,1.57,0,0,0 --to 1,-1,1,0,0,0 --objective energy --out plan.csv
     """
     from irtwin import modelling, plans
+    from irtwin.identification.progress import telling
     from irtwin.planning.plan import Task
     from irtwin.planning.poses import read_target
     from irtwin.robot.collision import Obstacle
@@ -127,7 +128,8 @@ def plan(
         **asked,
     )
     if location is None:
-        made, kept = modelling.plan(twin, task, out, rate), None
+        with telling(say):
+            made, kept = modelling.plan(twin, task, out, rate), None
     else:
         name = name or (out.stem if out else _PLAN)
         made, kept = plans.plan(source, task, location, name=name, out=out, rate=rate, announce=say)

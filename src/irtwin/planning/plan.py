@@ -13,6 +13,7 @@ from irtwin.effects.drive import RotorInertia
 from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.errors import InputError
+from irtwin.identification.progress import track
 from irtwin.planning.energy_optimal import Movement, Power, cheapest, keeps
 from irtwin.planning.order import best_order
 from irtwin.planning.path import LONGEST_SEARCH, joint_path, line_path
@@ -174,13 +175,14 @@ def _toured(twin: Twin, task: Task, rate: float) -> Plan:
 
     last = len(poses) - 1
     cost = np.full((last + 1, last + 1), np.inf)
-    for start, goal in permutations(range(last + 1), 2):
+    for start, goal in track(permutations(range(last + 1), 2), "moves between places planned"):
         if goal != 0 and start != last and not _are_one(poses[start], poses[goal]):
             quick = leg(start, goal, False)
             cost[start, goal] = twin.energy(quick.motion) if task.least_energy else quick.seconds
     order, given = best_order(cost), list(range(last + 1))
     made, was = (
-        _joined([leg(*ends, task.least_energy) for ends in pairwise(visits)], rate) for visits in (order, given)
+        _joined([leg(*ends, task.least_energy) for ends in track(pairwise(visits), "moves of an order timed")], rate)
+        for visits in (order, given)
     )
     saved = saving(twin, made.motion, was.motion) if twin.knows_power else None
     tour = Tour(tuple(order[1:-1]), saved, was.seconds - made.seconds)
