@@ -22,10 +22,18 @@ def run():
     return as_run(motion, temperature=np.full_like(motion.dq, 40.0))
 
 
-@pytest.mark.parametrize(("losses", "tried"), [((), False), (("copper_loss",), True)])
-def test_windings_are_warm_only_in_a_twin_that_has_their_resistance(run, losses, tried):
-    case = case_of(data_set(ROBOT, [run], (*BASELINE, *losses)), (), DEFAULT, None)
-    assert (WARM in {effect.id for effect in variants(case, "power")}) == tried
+WITHOUT_VISCOUS = tuple(effect for effect in BASELINE if effect != "viscous_friction")
+
+
+@pytest.mark.parametrize(("altering", "signal", "twin", "tried"), [
+    (WARM, "power", BASELINE, False),
+    (WARM, "power", (*BASELINE, "copper_loss"), True),
+    ("nonlinear_viscous_friction", "torque", WITHOUT_VISCOUS, False),
+    ("nonlinear_viscous_friction", "torque", BASELINE, True),
+])  # fmt: skip
+def test_what_alters_an_effect_is_tried_in_a_twin_that_has_it(run, altering, signal, twin, tried):
+    case = case_of(data_set(ROBOT, [run], twin), (), DEFAULT, None)
+    assert (altering in {effect.id for effect in variants(case, signal)}) == tried
 
 
 def test_an_effect_that_alters_what_the_twin_lacks_is_said(run):
