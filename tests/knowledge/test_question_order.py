@@ -19,11 +19,8 @@ REPORTS = {
     f"{file.parent.name}/{file.stem}": file.read_text(encoding="utf-8")
     for file in sorted(Path(folder("reports")).rglob("*.rq"))
 }
-MEASURED = {
-    "ledger_of_last_run",
-    "joint_state",
-    "energy/joints",
-}  # few rows stand before: 20 ms of 20 robots, or of one robot
+# Few rows stand before: 20 ms of 20 robots, or of one robot.
+MEASURED = {"ledger_of_last_run", "joint_state", "energy/joints"}
 
 
 def behind_an_optional(pattern: Any) -> Iterator[str]:

@@ -136,14 +136,14 @@ def plan(
     say_unchecked(made.checks_itself)
     if made.tour is not None:
         click.echo(_tour_text(made.tour))
-    clear = "" if math.isinf(made.clearance) else f", {1000 * made.clearance:.1f} mm least clearance"
+    kept_off = "" if math.isinf(made.clearance) else f"{1000 * made.clearance:.1f} mm"
     cost = (kept or made).price
     if page is not None:
         from irtwin.report.motion import write_page
 
-        kept_off = "" if math.isinf(made.clearance) else f"{1000 * made.clearance:.1f} mm"
         facts = [("Least clearance", kept_off), ("It takes", str(cost or ""))]
         write_page(twin, made.motion, name or (out.stem if out else _PLAN), facts, page)
+    clear = f", {kept_off} least clearance" if kept_off else ""
     click.echo(f"{_where(out, kept)}: {made.seconds:.3f} s{clear}; {cost or _NO_POWER}")
 
 

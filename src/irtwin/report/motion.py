@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from irtwin.effects.effect import force_unit
 from irtwin.report.colours import PALETTE
 from irtwin.report.page import report_page
 from irtwin.report.traces import Figure, axis, plain, trace
-from irtwin.report.wording import angle
+from irtwin.report.wording import angle, angular_speed
 from irtwin.resources import shipped
 from irtwin.robot.description import Joint
 from irtwin.signals.motion import Motion
@@ -61,7 +62,7 @@ def write_page(twin: Twin, motion: Motion, name: str, facts: Sequence[tuple[str,
         name=name,
         robot=twin.robot.name,
         seconds=float(motion.time[-1] - motion.time[0]),
-        facts=facts,
+        facts=list(facts),
         uses=[_use(*of) for of in zip(twin.robot.joints, motion.q.T, motion.dq.T, torque.T, strict=True)],
         electrical=twin.knows_power,
         bodies_alone=not twin.fitted,
@@ -76,11 +77,11 @@ def _use(joint: Joint, q: np.ndarray, dq: np.ndarray, torque: np.ndarray) -> Joi
         joint=joint.name,
         range=f"{angle(float(q.min()), joint.kind)} … {angle(float(q.max()), joint.kind)}",
         limits=f"{angle(joint.lower, joint.kind)} … {angle(joint.upper, joint.kind)}",
-        speed=f"{angle(speed, joint.kind)}/s",
+        speed=angular_speed(speed, joint.kind),
         speed_share=_share(speed, joint.velocity),
         torque=most,
         torque_share=_share(most, joint.effort),
-        unit="N" if joint.kind == "prismatic" else "N m",
+        unit=force_unit(joint),
     )
 
 
