@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self, TypeGuard
 
@@ -146,7 +146,7 @@ class Effect(ABC):
     others in each run. `prior_tells`: that its coefficients lie far from what is known of them is evidence by itself.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion,
-    `alters` an effect whose number it changes: where the twin lacks that, there is nothing to change.
+    `alters` an effect whose number it changes: where the twin lacks both, there is nothing to change.
     `bodies` marks the effect that is the robot's bodies, `within_bodies` one that is part of their last. Of power:
     `carries_torque` turns joint torque into power, an `electrical_loss` is turned into heat by the drives, one
     `of_every_drive` needs no proof, what is `drawn_at_rest` does not depend on the motion, and what `scales_power`
@@ -207,6 +207,10 @@ class Effect(ABC):
     def window(self) -> tuple[float, float] | None:
         """From when to when of a run's clock it acts, s; None: throughout."""
         return None
+
+    def has_what_it_alters(self, twin: Collection[str]) -> bool:
+        """Return whether a twin of these effects has what this one alters, or itself; True where it alters nothing."""
+        return self.alters is None or not {self.alters, self.id}.isdisjoint(twin)
 
     @abstractmethod
     def terms(self, robot: Robot) -> tuple[Term, ...]:

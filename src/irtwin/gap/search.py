@@ -222,7 +222,7 @@ def variants(case: Case, signal: str) -> list[Effect]:
         if effect.signal == signal
         and not effect.disturbance
         and (bodies or not effect.bodies)
-        and effect.alters in (None, *case.stack.ids)
+        and effect.has_what_it_alters(case.stack.ids)
         and can_show(effect, case.seen)
         for shape in (*effect.candidates(case.robot), *(effect.changes() if case.others else ()))
     ]

@@ -41,7 +41,7 @@ def untestable(
             whys[effect.id] = f"no {channel} was measured"
         elif not can_show(effect, motions):
             whys[effect.id] = f"no {' and no '.join(sorted(effect.requires))} was measured"
-        elif effect.alters not in (None, *inside):
+        elif not effect.has_what_it_alters(inside):
             whys[effect.id] = f"the twin has no {effect.alters}, which it alters"
         elif shown == 0:
             whys[effect.id] = "nothing in these runs brings it about"
