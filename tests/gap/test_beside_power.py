@@ -117,6 +117,17 @@ def test_the_estimate_stands_on_power_too():
     assert abs(finding.estimate.values[place] - true) < abs(alone - true) / 2
 
 
+@pytest.mark.parametrize(
+    ("made", "of"),
+    [({"real": 3.0}, "the gap of torque and power above the floor"), ({"cable": 6.0}, "the gap above the floor")],
+)
+def test_what_the_twin_imitates_in_torque_is_counted_in_torque_and_power(made, of):
+    finding = found(case(**made))
+    closing = finding.closing(finding.causes)
+    assert closing.share_of == of
+    assert closing.interval[0] > 0.5
+
+
 def test_an_offset_of_a_sensor_costs_none():
     assert names(found(case(shown=3.0))) == []
 

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, as_run, data_set, measure, swing
 
+from irtwin.document.document import Refused
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import NOTHING_STATED, Possible, Quantity, Stated
+from irtwin.gap.data.case import case_of
+from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.diagnosis import diagnose
-from irtwin.gap.isolation.refusal import _beyond
+from irtwin.gap.isolation.finding import find
+from irtwin.gap.isolation.refusal import NOTHING_REFUSED, _beyond, find_possible
+from irtwin.gap.search import Search
+from irtwin.gap.thresholds import DEFAULT
 
 pytestmark = pytest.mark.usefixtures("no_experiment")
 
@@ -42,6 +48,26 @@ def test_less_friction_than_none_is_refused_and_nothing_else_explains_it():
     assert first.why.endswith("would be left of it; at least 0 is possible")
     assert ("coulomb_friction", "joint_1") not in named(found)
     assert found.verdict == "unexplained"
+
+
+def test_what_one_look_refused_the_next_does_not_search_again():
+    one = case_of(logged(lambda dq, torque: torque), (), DEFAULT)
+    plain = Search(one).plain
+    finding = find("torque", one, plain, np.full(2, 0.3))
+    before = NOTHING_REFUSED.beside(
+        [Refused(effect="joint_elasticity", joints=("joint_2",), why="too soft")], finding, 3.5
+    )
+    asked = []
+
+    def search(without):
+        asked.append(without)
+        louder = replace(finding.attribution, noise=3 * finding.attribution.noise)
+        return replace(finding, attribution=louder), Floor(None, None, None)
+
+    *_, refusals = find_possible(one, search, frozenset({"backlash"}), before)
+    assert asked == [{"backlash", ("joint_elasticity", "joint_2")}]
+    assert [refusal.effect for refusal in refusals.refused] == ["joint_elasticity"]
+    assert refusals.unmatched  # what was refused left a third of it
 
 
 @pytest.mark.slow

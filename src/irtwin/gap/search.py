@@ -22,7 +22,7 @@ from irtwin.gap.isolation.beside_power import find_beside_power
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import ChannelFinding, estimate_of, find
-from irtwin.gap.isolation.refusal import Refusals, find_possible
+from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.candidate_columns import Below
@@ -48,11 +48,12 @@ def check_observed(system: System) -> None:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for the causes in a case: `unknown` are not known to it, `found` what one before it found."""
+    """The search for the causes in a case: `unknown` are not known to it; what one before it `found`, and `refused`."""
 
     case: Case
     unknown: Set[Without] = frozenset()
     found: tuple[Effect, ...] = ()
+    refused: Refusals = NOTHING_REFUSED
 
     @cached_property
     def stack(self) -> Stack:
@@ -124,13 +125,13 @@ class Search:
 
     def torque_causes(self, tried: Tried) -> tuple[ExplainedTorque, Floor, Refusals]:
         """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
-        case = self.case
+        case, known = self.case, (self.unknown, self.refused)
         if case.shows("power"):
-            possible = find_possible(case, lambda without: self._beside_power(tried, without), self.unknown)
+            possible = find_possible(case, lambda without: self._beside_power(tried, without), *known)
         else:
             about = case.with_torque, case.grouping, tried[0], self.below, case.shaken
             system = torque_system(self.stack, *about)
-            possible = find_possible(case, lambda without: self._of_torque(system, without), self.unknown)
+            possible = find_possible(case, lambda without: self._of_torque(system, without), *known)
         finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
@@ -145,7 +146,8 @@ class Search:
             torque, floor, refusals = search.torque_causes(tried(search))
             if not (known := search.knowing(torque.finding)):
                 break
-            search = replace(known, unknown=known.unknown | _NUISANCES) if look == _LOOKS - 2 else known
+            last = _NUISANCES if look == _LOOKS - 2 else frozenset()
+            search = replace(known, unknown=known.unknown | last, refused=refusals)
         return search, torque, floor, refusals
 
     def knowing(self, finding: ChannelFinding) -> Search | None:

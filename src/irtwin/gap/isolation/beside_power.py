@@ -79,7 +79,9 @@ def _find(case: Case, equations: JointEquations, floor: Floor, without: Set[With
     both = attributed(case, whole, steadied, np.concatenate(levels), without)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
-    beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), both.noise)
+    known = floor.torque is not None and floor.power is not None
+    within = steadied.within(np.concatenate(levels)) if known else None
+    beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), within)
     where = "torque", case.robot.joint_names, case.observed, torque, Steadied.of(case, torque)
     return finding_of(*where, _of_torque(both, equations), floor.torque, beside=beside)
 

@@ -21,18 +21,21 @@ class Closing:
     share: of the channel's gap above the floor, or of its mean square where no floor is known; below 0 where the fit is
     spoilt. interval: of the share, 95 %, over groups. floors: RMS that is closed in runs where the causes act, at the
     joint that gains most, in floors; None where none is known. size: mean squares closed, summed over joints, in
-    floors squared, or in what the causes leave where no floor is known: by it all channels' are put in order.
+    floors squared, or in what the causes leave where no floor is known: by it all channels' are put in order. both: of
+    torque and power together.
     """
 
     share: float
     interval: tuple[float, float]
     floors: float | None
     size: float
+    both: bool = False
 
     @property
     def share_of(self) -> str:
         """What the share is of, in words."""
-        return "the mean square, as no floor is known" if self.floors is None else "the gap above the floor"
+        of = " of torque and power" if self.both else ""
+        return f"the mean square{of}, as no floor is known" if self.floors is None else f"the gap{of} above the floor"
 
     def matters(self, limits: Matters, *, likely: bool = False) -> bool:
         """Return whether a person would miss it: enough of the gap, more than noise, and for sure more than nothing.

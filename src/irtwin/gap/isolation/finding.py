@@ -13,6 +13,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Coefficients, Quantity, Term, quantity
 from irtwin.gap.data.case import Case
 from irtwin.gap.isolation.apart import Apart, closed_squares, shares
+from irtwin.gap.isolation.both_channels import BothChannels, acting, observed_groups
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing, share_above
 from irtwin.gap.isolation.detectability import can_show
@@ -39,7 +40,8 @@ class ChannelFinding:
     groups left out, `counted` the same as `apart` counts it; `signal_floor` (g,) N m or W, of the measured signal, None
     where unknown; `estimate`: the twin's terms and the causes' columns, fitted together; `part`: of all that is closed
     theirs, beside what does not repeat; `plain`: power's equation on the torque of the twin as it is, where `system`
-    stands on torque that causes explain.
+    stands on torque that causes explain; `both`: what causes of torque close of both channels,
+    where both were searched.
     """
 
     name: str
@@ -55,6 +57,7 @@ class ChannelFinding:
     estimate: Estimate
     part: float = 1.0
     plain: System | None = None
+    both: BothChannels | None = None
 
     @property
     def floor(self) -> np.ndarray | None:
@@ -88,11 +91,17 @@ class ChannelFinding:
         return self.shares[self.causes.index(cause)] if self.shares else None
 
     def closing(self, causes: Sequence[FoundCause]) -> Closing:
-        """Return what some causes close of the channel's gap, beside the others."""
-        closed = self.closed_squares[[self.causes.index(cause) for cause in causes]].sum(axis=0)
-        runs = [variant.effect.runs for cause in causes for variant in cause.variants]
-        acting = np.array([None in runs or any(set(some or ()) & set(group) for some in runs) for group in self.groups])
-        return closing(closed, acting, self.counted, self.floor_within, self.attribution.noise)
+        """Return what some causes close of the channel's gap, beside the others.
+
+        What the twin's own terms imitate in torque closes nothing there; where both channels show it, both count.
+        """
+        places = [self.causes.index(cause) for cause in causes]
+        closed, where = self.closed_squares[places].sum(axis=0), acting(causes, self.groups)
+        own = closing(closed, where, self.counted, self.floor_within, self.attribution.noise)
+        if self.both is None or own.interval[0] > 0:
+            return own
+        of_both = self.both.closing(places, causes)
+        return of_both if of_both.interval[0] > 0 else own
 
     def closed_between(self, causes: Sequence[FoundCause]) -> tuple[float, tuple[float, float]] | None:
         """Return which share some causes close of what sets the other runs apart, with its 95 % interval.
@@ -157,11 +166,7 @@ class ChannelFinding:
     @property
     def groups(self) -> list[tuple[str, ...]]:
         """The runs of each observed group."""
-        system = self.system
-        return [
-            tuple(dict.fromkeys(system.blocks[k].run for k in np.flatnonzero(system.group == group)))
-            for group in np.flatnonzero(system.group_observed)
-        ]
+        return observed_groups(self.system)
 
 
 def find(
@@ -219,6 +224,7 @@ def finding_of(
         floor,
         fitted,
         plain=plain,
+        both=None if beside is None else beside.closing(attribution.causes),
     )
 
 
@@ -349,12 +355,12 @@ def _by_size(finding: ChannelFinding, causes: Sequence[FoundCause]) -> tuple[Fou
 class BesidePower:
     """Power beside torque: the `equations` of both, and what their search found of power.
 
-    columns: those of the causes of power, of `equations.whole`; noise: (n + 1,) what all causes left of each equation.
+    columns: those of the causes of power, of `equations.whole`; floor: (n + 1,) RMS, or None.
     """
 
     equations: JointEquations
     columns: tuple[int, ...]
-    noise: np.ndarray
+    floor: np.ndarray | None
 
     def estimate(self, chosen: Sequence[int]) -> Estimate:
         """Estimate the twin's terms of torque and `chosen` columns, as torque's equations count them, by both."""
@@ -362,6 +368,12 @@ class BesidePower:
         fitted = estimate_of(whole, self._columns(chosen))
         used = [*range(torque.base), *range(whole.base, whole.base + len(chosen))]
         return fitted.of(used, fitted.noise[: len(torque.pattern)])
+
+    def closing(self, causes: Sequence[FoundCause]) -> BothChannels:
+        """Return what causes of torque, in columns as torque's equations count them, close of both channels."""
+        of_torque = [list(map(self.equations.in_whole, cause.columns)) for cause in causes]
+        whole = with_offsets_held(self.equations.whole, [k for columns in of_torque for k in columns])
+        return BothChannels(Apart.of(whole, whole, [*of_torque, self.columns]), self.floor)
 
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         return [*map(self.equations.in_whole, chosen), *self.columns]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,39 +22,53 @@ _SEARCHES = 4  # a search without what was refused may name something else that 
 
 @dataclass(frozen=True)
 class Refusals:
-    """What was refused, and whether that which is named instead leaves far more: then nothing explains the data."""
+    """What was refused, and whether that which is named instead leaves far more: then nothing explains the data.
+
+    `least` (g,): the noise that the best of all searches leaves, whether or not it can be true.
+    """
 
     refused: tuple[Refused, ...] = ()
     unmatched: bool = False
+    least: np.ndarray | None = None
+
+    @property
+    def places(self) -> dict[tuple[str, str | None], Refused]:
+        """What was refused, by effect and joint."""
+        return {(refusal.effect, next(iter(refusal.joints), None)): refusal for refusal in self.refused}
 
     def __add__(self, other: Refusals) -> Refusals:
         return Refusals(self.refused + other.refused, self.unmatched or other.unmatched)
+
+    def beside(self, wrong: Sequence[Refused], finding: ChannelFinding, excess: float) -> Refusals:
+        """Return these and what is `wrong` of a finding, and whether that leaves more than the best by `excess`."""
+        noise = finding.attribution.noise
+        least = noise if self.least is None else np.minimum(self.least, noise)
+        more = (noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
+        return Refusals((*self.refused, *wrong), bool(more.max() > excess), least)
 
 
 NOTHING_REFUSED = Refusals()
 
 
 def find_possible(
-    case: Case, search: Callable[[Set[Without]], tuple[ChannelFinding, Floor]], without: Set[Without] = frozenset()
+    case: Case,
+    search: Callable[[Set[Without]], tuple[ChannelFinding, Floor]],
+    without: Set[Without] = frozenset(),
+    before: Refusals = NOTHING_REFUSED,
 ) -> tuple[ChannelFinding, Floor, Refusals]:
-    """Return what a search `without` some effects finds, where each cause can be true, and what was refused."""
-    refused: dict[tuple[str, str | None], Refused] = {}
-    least = np.inf
+    """Return what a search `without` some effects finds, where each cause can be true, and what was refused.
+
+    What an earlier look at the channel refused, `before`, stays refused: each refusal costs a search.
+    """
+    refusals = before
     for _ in range(_SEARCHES):
-        finding, floor = search(without | refused.keys())
-        least = np.minimum(least, finding.attribution.noise)
-        wrong = {
-            (refusal.effect, next(iter(refusal.joints), None)): refusal
-            for cause in finding.causes
-            for refusal in _of(case.robot, finding, cause, case.stated)
-        }
+        finding, floor = search(without | refusals.places.keys())
+        wrong = [refusal for cause in finding.causes for refusal in _of(case.robot, finding, cause, case.stated)]
+        refusals = refusals.beside(wrong, finding, case.thresholds.criterion.excess)
         if not wrong:
-            break
-        refused |= wrong
-    else:
-        finding, floor = search(without | {effect for effect, _ in refused})
-    more = (finding.attribution.noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
-    return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.criterion.excess))
+            return finding, floor, refusals
+    finding, floor = search(without | {effect for effect, _ in refusals.places})
+    return finding, floor, refusals.beside([], finding, case.thresholds.criterion.excess)
 
 
 def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated) -> list[Refused]:
