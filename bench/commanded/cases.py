@@ -1,7 +1,8 @@
 """Cases: the model of an arm with position servos, and logs of an arm that differs from it in ways that are known.
 
 The arm is moved at 500 Hz by MuJoCo's equations, its servos by those written here, not by what is measured. Its log is
-that of a controller: commands and positions at 100 Hz, with noise of encoders.
+that of a controller: commands and positions at 100 Hz, with noise of encoders. Some controllers have a feedforward, the
+torque that the model takes for the motion that they plan (computed torque).
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from scipy.spatial.transform import Rotation
 
 from closed_loop.machine import Machine, build
 from closed_loop.models import SOURCES, read_model
-from closed_loop.programmes import exciting, working
+from closed_loop.programmes import Programme, exciting, working
 
-SEED, DEVELOPMENT = 330_000_000, 770_000_000
+SEED, DEVELOPMENT, FED = 330_000_000, 770_000_000, 5_000_000
 STEP, EVERY = 0.002, 5  # s; steps from one sample of the log to the next
 SECONDS, RUNS, HELD_OUT = 8.0, 6, 2
 NOISE = 3e-4  # rad
@@ -101,16 +102,17 @@ class Case:
     count: int  # of differences
     torque: bool  # whether it is logged
     kinds: tuple[str, ...] = ()  # of these; none: of any
+    fed: bool = False  # whether its controller has a feedforward
 
 
-def plans(count: int, torque: bool, split: int = 0) -> Iterator[Case]:
+def plans(count: int, torque: bool, split: int = 0, *, fed: bool = False) -> Iterator[Case]:
     """Yield cases in an order that tells nothing: nulls, pairs, and else one difference."""
-    seed = SEED + 1_000_000 * torque + 10_000_000 * split
+    seed = SEED + 1_000_000 * torque + FED * fed + 10_000_000 * split
     rng = np.random.default_rng(seed)
     nulls, pairs = round(NULLS * count), round(PAIRS * count)
     counts = rng.permutation([0] * nulls + [2] * pairs + [1] * (count - nulls - pairs))
     for number, of in enumerate(counts):
-        yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of), torque)
+        yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of), torque, fed=fed)
 
 
 def of_kinds(kinds: tuple[str, ...], count: int, torque: bool) -> Iterator[Case]:
@@ -138,7 +140,9 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
     for part in ("data", "held_out"):
         (folder / case.name / part / "runs").mkdir(parents=True)
         (folder / case.name / part / "robot.urdf").write_text(machine.urdf, encoding="utf-8")
-        (folder / case.name / part / "dataset.toml").write_text(_described(machine, part == "data"), encoding="utf-8")
+        (folder / case.name / part / "dataset.toml").write_text(
+            _described(machine, part == "data", case.fed), encoding="utf-8"
+        )
     (folder / case.name / "model.xml").write_text(text, encoding="utf-8")
     model = mujoco.MjModel.from_xml_string(_mjcf(machine, robot))
     if robot.elasticity.any():
@@ -148,7 +152,8 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
         programme = (exciting if run % 2 else working)(machine, SECONDS, rng)
         every = round(STEP * EVERY / machine.step)
         told = programme.q[::every]
-        q, torque = simulate(model, robot, told, push if run in pushed else None)
+        added = _planned(mujoco.MjModel.from_xml_string(text), programme.every(every)) if case.fed else None
+        q, torque = simulate(model, robot, told, push if run in pushed else None, added)
         part = "data" if run < RUNS - HELD_OUT else "held_out"
         columns = {"time": np.arange(len(told)) * STEP * EVERY}
         for k, name in enumerate(machine.model.joints):
@@ -162,9 +167,12 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
 
 
 def simulate(
-    model: mujoco.MjModel, arm: Arm, told: np.ndarray, push: Push | None = None
+    model: mujoco.MjModel, arm: Arm, told: np.ndarray, push: Push | None = None, added: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and servos' torques (N, n) of an arm that is told commands (N, n), each until the next."""
+    """Return positions and servos' torques (N, n) of an arm that is told commands (N, n), each until the next.
+
+    With each comes the torque `added` (N, n) of a feedforward.
+    """
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION  # its servos are those below
     data, motors = mujoco.MjData(model), np.array([model.joint(k).name[-1] != "'" for k in range(model.njnt)])
     data.qpos[motors] = told[0]
@@ -181,6 +189,8 @@ def simulate(
         off = command - data.qpos[motors]
         off = np.sign(off) * np.maximum(np.abs(off) - arm.backlash, 0.0)
         torque = arm.stiffness * off - arm.servo_damping * data.qvel[motors]
+        if added is not None:
+            torque += added[np.maximum(row - late, 0) // EVERY, columns]
         applied[:] = 0.0
         applied[motors] = np.clip(torque, -arm.torque_limit, arm.torque_limit)
         if row >= 0 and row % EVERY == 0:
@@ -192,6 +202,18 @@ def simulate(
         data.qfrc_applied[:] = applied
         mujoco.mj_step(model, data)
     return found, torques
+
+
+def _planned(model: mujoco.MjModel, programme: Programme) -> np.ndarray:
+    """Return the torque (N, n) that a model's bodies and rotors take for a programme."""
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    model.dof_damping[:] = model.dof_frictionloss[:] = model.jnt_stiffness[:] = 0.0
+    data, torque = mujoco.MjData(model), np.empty_like(programme.q)
+    for row, state in enumerate(zip(programme.q, programme.dq, programme.ddq, strict=True)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = state
+        mujoco.mj_inverse(model, data)
+        torque[row] = data.qfrc_inverse
+    return torque
 
 
 def labels(found: dict[str, tuple[Case, list[Difference]]], joints: dict[str, tuple[str, ...]]) -> str:
@@ -326,8 +348,9 @@ def _keep_friction(model: mujoco.MjModel, rigid: mujoco.MjModel) -> None:
         model.dof_solimp[dof, :2] = odds / (1 + odds)
 
 
-def _described(machine: Machine, fitted: bool) -> str:
+def _described(machine: Machine, fitted: bool, fed: bool) -> str:
     runs = range(RUNS - HELD_OUT) if fitted else range(RUNS - HELD_OUT, RUNS)
     lines = ["[robot]", f'name = "{machine.model.name}"', 'urdf = "robot.urdf"', "simulated = true"]
+    lines += ['feedforward = "dynamics"'] if fed else []
     lines += [f'\n[[run]]\nfile = "runs/run_{run}.parquet"' for run in runs]
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1]`: make sealed cases, then judge them.
+"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1] [--feedforward]`: make sealed cases, then judge them.
 
 With `--kinds elasticity,offset` they are development cases that differ in these.
 
@@ -187,13 +187,18 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=24)
     parser.add_argument("--torque", action="store_true", help="log the servos' torque, too")
     parser.add_argument("--split", type=int, default=0, help="which cases: others by each number")
+    parser.add_argument("--feedforward", action="store_true", help="controllers add the torque of their own model")
     parser.add_argument("--kinds", default="", help="development cases of these kinds, as elasticity,offset")
     arguments = parser.parse_args()
     file = Path(f"{arguments.folder}_labels") / "labels.json"
     if not file.exists():
         count, torque = arguments.count, arguments.torque
         kinds = tuple(filter(None, arguments.kinds.split(",")))
-        cases = of_kinds(kinds, count, torque) if kinds else plans(count, torque, arguments.split)
+        cases = (
+            of_kinds(kinds, count, torque)
+            if kinds
+            else plans(count, torque, arguments.split, fed=arguments.feedforward)
+        )
         seal(arguments.models, arguments.folder, cases)
         return
     told, found = json.loads(file.read_text(encoding="utf-8")), {}

@@ -97,6 +97,8 @@ def diagnose(
     asked = _asked(data_set, lacking | {"an effect to withhold": withhold or None})
     if sysid_file is not None:
         _check_playable(data_set, model, asked, "a script for mujoco.sysid fits what is played")
+        if data_set.robot.feedforward:
+            raise InputError(f"{sysid_file}: the script plays no feedforward, which [robot] tells of the controller")
     if held_out:
         if sysid_file is not None:
             raise InputError(f"{sysid_file}: the script fits all runs; hold none out for it")

@@ -10,6 +10,10 @@ import pinocchio as pin
 
 from irtwin.robot.model import build_model, mean_inertia
 
+GRAVITY, DYNAMICS = "gravity", "dynamics"
+FEEDFORWARD = (GRAVITY, DYNAMICS)
+"""What a controller may add to its servos: torque of gravity at the commanded position, or of the commanded motion."""
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -58,7 +62,8 @@ class Link:
 class Robot:
     """A serial (or branched) robot of n moving joints, in the order of `q`.
 
-    `held`: joints that mimic others, as fingers of a gripper do; they stand still in the model.
+    `held`: joints that mimic others, as fingers of a gripper do; they stand still in the model. `feedforward`: of what
+    its controller adds torque, one of `FEEDFORWARD`.
     """
 
     name: str
@@ -69,6 +74,7 @@ class Robot:
     type: str | None = None
     weight: float | None = None  # kg
     held: tuple[str, ...] = ()
+    feedforward: str | None = None
 
     @cached_property
     def model(self) -> pin.Model:

@@ -44,6 +44,13 @@ def low_pass(signal: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
     return _convolved(padded, taps / taps.sum())
 
 
+def smoothed(values: np.ndarray, gap: float, lasts: float) -> list[np.ndarray]:
+    """Return values (N, ...), `gap` s apart, smoothed over `lasts` s by cubics, and their two derivatives."""
+    rows = min(2 * max(2, round(lasts / gap / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
+    order = min(3, rows - 1)
+    return [scipy.signal.savgol_filter(values, rows, order, deriv=deriv, delta=gap, axis=0) for deriv in range(3)]
+
+
 def lagged(values: np.ndarray, keep: float, before: float = 0.0) -> np.ndarray:
     """Return (N, ...) under a lag of first order: of each value `keep` is of the one before, the first's `before`."""
     bands = np.array([np.ones(len(values)), np.full(len(values), -keep)])

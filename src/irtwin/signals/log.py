@@ -10,7 +10,7 @@ from typing import Any
 
 from irtwin.errors import InputError
 from irtwin.input_file import checksum, real_path
-from irtwin.robot.description import Robot
+from irtwin.robot.description import FEEDFORWARD, Robot
 from irtwin.robot.urdf import read_urdf
 from irtwin.signals.channels import Signals
 from irtwin.signals.dh_table import robot_of_table
@@ -28,7 +28,7 @@ POWER_PLACES = ("mains", "dc_bus")
 DATA_SET_KEYS = ("robot", "run", "twin", "topics")
 ROBOT_KEYS = (
     "name", "urdf", "dh", "manufacturer", "type", "weight", "ambient_temperature", "power_at", "rated_payload",
-    "arm_movement_type", "simulated", "torque_scale_uncertainty", "joint", "joints",
+    "arm_movement_type", "simulated", "torque_scale_uncertainty", "feedforward", "joint", "joints",
 )  # fmt: skip
 RUN_KEYS = (
     "file", "role", "payload_mass", "payload_com", "repeat_of", "performs", "started", "product", "pieces", "cycles",
@@ -297,7 +297,15 @@ def _robot(folder: Path, table: TomlTable) -> Robot:
         manufacturer=table.text("manufacturer"),
         type=table.text("type"),
         weight=table.number("weight", least=0.0),
+        feedforward=_feedforward(table),
     )
+
+
+def _feedforward(table: TomlTable) -> str | None:
+    kind = table.text("feedforward")
+    if kind not in (None, *FEEDFORWARD):
+        raise table.fault("feedforward", f'= "{kind}"; use {" or ".join(FEEDFORWARD)}')
+    return kind
 
 
 def _metered(name: str, table: TomlTable) -> Robot:

@@ -15,6 +15,7 @@ import scipy
 
 from irtwin.identification.progress import track
 from irtwin.identification.two_processes import can_copy, shared
+from irtwin.signals.filter import smoothed
 from irtwin.signals.sampling import interval
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.payload import loaded
@@ -68,15 +69,30 @@ class Alone:
                 every = [stretch.commands(begin, self.step, without, lead, damps_error) for stretch in self.stretches]
                 known[asked] = np.stack(every, axis=1)
             commanded[:, place] = known[asked] + own[offset]
-        moved = self._moved(numbers, commanded)
+        moved = self._moved(numbers, commanded, self._fed(numbers, begin))
         at = [stretch.time / self.step for stretch in self.stretches]
         return [
             [_between(moved[:, :, set_index, place], at[place]) for place in range(len(self.stretches))]
             for set_index in range(len(numbers))
         ]
 
-    def _moved(self, numbers: np.ndarray, commanded: np.ndarray) -> np.ndarray:
-        """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n)."""
+    def _fed(self, numbers: np.ndarray, begin: np.ndarray) -> np.ndarray:
+        """Return the torque that the controller adds over steps that begin at times, (steps, v, p, n).
+
+        Of length 1 where it is the same for all: with no feedforward, or where no delay differs.
+        """
+        if (feedforward := self.servos.feedforward) is None:
+            return np.zeros((len(begin), 1, 1, 1))
+        delays = numbers[:, NAMES.index("delay")]
+        some = numbers[:1] if (delays == delays[:1]).all() else numbers
+        every = [[stretch.fed(feedforward, begin, own) for stretch in self.stretches] for own in some]
+        return np.moveaxis(np.array(every), 2, 0)
+
+    def _moved(self, numbers: np.ndarray, commanded: np.ndarray, fed: np.ndarray) -> np.ndarray:
+        """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n).
+
+        `fed`: the torque that their controller adds.
+        """
         compiled, servos, step = self.servos.model.compiled, self.servos, self.step
         at = servos.actuators
         own = np.moveaxis(numbers, 1, 0)[:, :, None, :]
@@ -98,7 +114,7 @@ class Alone:
             off = followed - q
             if banded:
                 off -= np.minimum(np.maximum(off, below), band)
-            force = np.minimum(np.maximum(stiffness * off - servo * v, least), most)
+            force = np.minimum(np.maximum(stiffness * off - servo * v + fed[row], least), most)
             moved[row, 1:] = force
             force -= joint * v + load[row]
             if springs[1]:
@@ -197,13 +213,6 @@ def _bodies(
         inertia[row] = np.diag(full)[dof]
         torque[row] = data.qfrc_inverse[dof] - inertia[row] * ddq[row]
     return torque, inertia
-
-
-def smoothed(values: np.ndarray, gap: float, lasts: float) -> list[np.ndarray]:
-    """Return values (N, ...), `gap` s apart, smoothed over `lasts` s by cubics, and their two derivatives."""
-    rows = min(2 * max(2, round(lasts / gap / 2)) + 1, (len(values) - 1) // 2 * 2 + 1)
-    order = min(3, rows - 1)
-    return [scipy.signal.savgol_filter(values, rows, order, deriv=deriv, delta=gap, axis=0) for deriv in range(3)]
 
 
 def _between(moved: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from irtwin.errors import InputError
 from irtwin.signals.log import Run
 from irtwin.signals.sampling import interval
 from irtwin.simulator.engine import mujoco
+from irtwin.simulator.feedforward import Feedforward
 from irtwin.simulator.model import EFFORT, Model
 from irtwin.simulator.servos import NAMES, Servos
 from irtwin.simulator.variant import PlayedModel
@@ -92,6 +93,10 @@ class PlayedStretch:
                 torque = push.force @ model.flange_jacobian(self.q[inside])
                 torques[rows] += share[rows, None] * _at(begin[rows], self.time[inside], torque)
         return torques
+
+    def fed(self, feedforward: Feedforward, begin: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """Return the torque (N, n) that a controller adds over steps that begin at times (N,), s, by numbers (k, n)."""
+        return feedforward.torque(self.run, self.begin + begin, numbers[NAMES.index("delay")])
 
     def commands(
         self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0,
@@ -201,6 +206,8 @@ def _played(
             torque = stretches[place].pushed(servos.model, begin, step)
             told[row][:, compiled.nu + variant.speeds] = torque
             told[row][:, compiled.nu + variant.behind] = torque[:, variant.soft]
+            if servos.feedforward:
+                told[row][:, variant.fed] = stretches[place].fed(servos.feedforward, begin, numbers[set_index])
         begun = np.array([states[pair] for pair in some])
         with _unlogged():
             reached, sensed = rollout(

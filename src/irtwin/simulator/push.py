@@ -14,8 +14,8 @@ import numpy as np
 from irtwin.effects.effect import NORMAL
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.identification.progress import tell_step
+from irtwin.signals.filter import smoothed
 from irtwin.signals.sampling import interval
-from irtwin.simulator.alone import smoothed
 from irtwin.simulator.choice import DifferingNumbers, certainty
 from irtwin.simulator.fit import Fit, Played
 from irtwin.simulator.play import PlayedStretch, Push, play

@@ -13,6 +13,7 @@ import scipy
 from irtwin.errors import InputError
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.engine import mujoco
+from irtwin.simulator.feedforward import Feedforward
 from irtwin.simulator.model import Model
 from irtwin.simulator.payload import load, loaded_tag
 from irtwin.simulator.variant import PlayedModel, variant
@@ -96,6 +97,11 @@ class Servos:
     def _of_links(self) -> np.ndarray:
         """How much of the inertia that each servo moves (n,) is the link's."""
         return np.asarray(self.model.links / (self.model.links + self.numbers[NAMES.index("armature")]))
+
+    @cached_property
+    def feedforward(self) -> Feedforward | None:
+        """What the robot's controller adds to its servos, None where it adds nothing."""
+        return Feedforward(self.model, self.model.feedforward) if self.model.feedforward else None
 
     @cached_property
     def can_differ(self) -> np.ndarray:
@@ -182,6 +188,7 @@ class Servos:
         if len(of.second):
             model.actuator_gainprm[of.second, 0], model.actuator_biasprm[of.second, 1] = -stiffness, stiffness
             model.actuator_forcerange[of.second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
+        if len(of.second) or len(of.fed):  # several actuators share what one motor can give
             model.actuator_forcelimited[at] = 0
             model.jnt_actfrclimited[of.joints], model.jnt_actfrcrange[of.joints] = 1, ends.T
         else:

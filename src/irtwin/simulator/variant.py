@@ -1,4 +1,4 @@
-"""A model with what its file does not say, to be played: dead bands of servos, and joints that are soft."""
+"""A model with what its file does not say, to be played: dead bands of servos, feedforward, and soft joints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Model, compiled_of
 
 DAMPED = 0.05  # of critical damping, in what is soft
-_SECOND, _BEHIND = " beside its servo", " behind its motor"
+_SECOND, _FED, _BEHIND = " beside its servo", " by its feedforward", " behind its motor"
 _FIRMEST = 0.9999  # impedance that MuJoCo takes
 
 
@@ -19,7 +19,8 @@ _FIRMEST = 0.9999  # impedance that MuJoCo takes
 class PlayedModel:
     """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
 
-    `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `soft`: places
+    `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `fed`: those of
+    the controller's feedforward, told their torque; none where there is none. `soft`: places
     among the robot's joints of those with a second joint behind the motor's, with the same axis; `behind`: its dof.
     `of`: the model as it is.
     """
@@ -28,6 +29,7 @@ class PlayedModel:
     compiled: mujoco.MjModel
     joints: np.ndarray
     second: np.ndarray
+    fed: np.ndarray
     soft: np.ndarray
     behind: np.ndarray
 
@@ -70,20 +72,26 @@ class PlayedModel:
 
 
 def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
-    """Return a model with second actuators where dead bands are played, and with joints soft behind their motors."""
+    """Return a model with second actuators where dead bands are played, and with joints soft behind their motors.
+
+    With those of a feedforward, too, where the robot's controller has one.
+    """
 
     def add(spec: mujoco.MjSpec) -> None:
         for joint in model.joints if banded else ():
             _add_second(spec, joint)
+        for joint in model.joints if model.feedforward else ():
+            spec.add_actuator(name=f"{joint}{_FED}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
         for joint in soft:
             _add_behind(spec, joint)
 
     compiled, *_ = compiled_of(model.file, model.gains, add)
     second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints] if banded else []
+    fed = [compiled.actuator(f"{joint}{_FED}").id for joint in model.joints] if model.feedforward else []
     behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
     joints = [compiled.joint(joint).id for joint in model.joints]
     places = [model.joints.index(joint) for joint in soft]
-    at = (np.array(indices, dtype=int) for indices in (joints, second, places, behind))
+    at = (np.array(indices, dtype=int) for indices in (joints, second, fed, places, behind))
     return PlayedModel(model, compiled, *at)
 
 
