@@ -115,11 +115,11 @@ def plans(count: int, torque: bool, split: int = 0, *, fed: bool = False) -> Ite
         yield Case(f"case_{number:03d}", ARMS[int(rng.integers(len(ARMS)))], seed + number, int(of), torque, fed=fed)
 
 
-def of_kinds(kinds: tuple[str, ...], count: int, torque: bool) -> Iterator[Case]:
+def of_kinds(kinds: tuple[str, ...], count: int, torque: bool, *, fed: bool = False) -> Iterator[Case]:
     """Yield development cases that differ in these kinds, arm after arm."""
     for number in range(count):
         arm = ARMS[number % len(ARMS)]
-        yield Case(f"case_{number:03d}", arm, DEVELOPMENT + number, len(kinds), torque, kinds)
+        yield Case(f"case_{number:03d}", arm, DEVELOPMENT + number, len(kinds), torque, kinds, fed)
 
 
 def make(case: Case, models: Path, folder: Path) -> list[Difference]:

@@ -1,6 +1,7 @@
-"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1] [--feedforward]`: make sealed cases, then judge them.
+"""`python -m commanded.run MODELS FOLDER [--count 24] [--torque] [--split 1]`: make sealed cases, then judge them.
 
-With `--kinds elasticity,offset` they are development cases that differ in these.
+With `--kinds elasticity,offset` they are development cases that differ in these; with `--feedforward` their controllers
+add the torque of the model.
 
 MODELS is where `pip download --no-deps robosuite gymnasium-robotics -d MODELS` put its wheels. The first call makes the
 cases, writes `labels.json` in FOLDER_labels and prints its SHA-256: commit that. The second diagnoses those that are
@@ -192,13 +193,9 @@ def main() -> None:
     arguments = parser.parse_args()
     file = Path(f"{arguments.folder}_labels") / "labels.json"
     if not file.exists():
-        count, torque = arguments.count, arguments.torque
+        count, torque, fed = arguments.count, arguments.torque, arguments.feedforward
         kinds = tuple(filter(None, arguments.kinds.split(",")))
-        cases = (
-            of_kinds(kinds, count, torque)
-            if kinds
-            else plans(count, torque, arguments.split, fed=arguments.feedforward)
-        )
+        cases = of_kinds(kinds, count, torque, fed=fed) if kinds else plans(count, torque, arguments.split, fed=fed)
         seal(arguments.models, arguments.folder, cases)
         return
     told, found = json.loads(file.read_text(encoding="utf-8")), {}
