@@ -2,7 +2,7 @@
 
 The arm is moved at 500 Hz by MuJoCo's equations, its servos by those written here, not by what is measured. Its log is
 that of a controller: commands and positions at 100 Hz, with noise of encoders. Some controllers have a feedforward, the
-torque that the model takes for the motion that they plan (computed torque).
+torque that the robot as drawn takes for the motion that they plan (computed torque).
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def make(case: Case, models: Path, folder: Path) -> list[Difference]:
         programme = (exciting if run % 2 else working)(machine, SECONDS, rng)
         every = round(STEP * EVERY / machine.step)
         told = programme.q[::every]
-        added = _planned(mujoco.MjModel.from_xml_string(text), programme.every(every)) if case.fed else None
+        added = _planned(machine, programme.every(every)) if case.fed else None
         q, torque = simulate(model, robot, told, push if run in pushed else None, added)
         part = "data" if run < RUNS - HELD_OUT else "held_out"
         columns = {"time": np.arange(len(told)) * STEP * EVERY}
@@ -204,16 +204,18 @@ def simulate(
     return found, torques
 
 
-def _planned(model: mujoco.MjModel, programme: Programme) -> np.ndarray:
-    """Return the torque (N, n) that a model's bodies and rotors take for a programme."""
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
-    model.dof_damping[:] = model.dof_frictionloss[:] = model.jnt_stiffness[:] = 0.0
-    data, torque = mujoco.MjData(model), np.empty_like(programme.q)
-    for row, state in enumerate(zip(programme.q, programme.dq, programme.ddq, strict=True)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = state
-        mujoco.mj_inverse(model, data)
-        torque[row] = data.qfrc_inverse
-    return torque
+def _planned(machine: Machine, programme: Programme) -> np.ndarray:
+    """Return the torque (N, n) that bodies of the robot's URDF and its rotors take for a programme."""
+    drawn = mujoco.MjModel.from_xml_string(machine.urdf)
+    drawn.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    drawn.dof_damping[:] = drawn.dof_frictionloss[:] = drawn.dof_armature[:] = 0.0
+    data, torque = mujoco.MjData(drawn), np.empty_like(programme.q)
+    dofs = [int(drawn.joint(name).dofadr[0]) for name in machine.model.joints]
+    for row, (q, dq, ddq) in enumerate(zip(programme.q, programme.dq, programme.ddq, strict=True)):
+        data.qpos[dofs], data.qvel[dofs], data.qacc[dofs] = q, dq, ddq
+        mujoco.mj_inverse(drawn, data)
+        torque[row] = data.qfrc_inverse[dofs]
+    return np.asarray(torque + machine.real.dof_armature * programme.ddq)
 
 
 def labels(found: dict[str, tuple[Case, list[Difference]]], joints: dict[str, tuple[str, ...]]) -> str:
@@ -353,4 +355,7 @@ def _described(machine: Machine, fitted: bool, fed: bool) -> str:
     lines = ["[robot]", f'name = "{machine.model.name}"', 'urdf = "robot.urdf"', "simulated = true"]
     lines += ['feedforward = "dynamics"'] if fed else []
     lines += [f'\n[[run]]\nfile = "runs/run_{run}.parquet"' for run in runs]
+    if fed:
+        rotors = zip(machine.model.joints, machine.real.dof_armature.tolist(), strict=True)
+        lines += [f"\n[robot.joint.{name}]\nrotor_inertia = {inertia!r}" for name, inertia in rotors]
     return "\n".join(lines) + "\n"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 from tests import servo_arm
 
 from irtwin.errors import InputError
 from irtwin.signals.log import read_data_set
 from irtwin.simulator.alone import alone
+from irtwin.simulator.feedforward import Feedforward
 from irtwin.simulator.model import read_model
 from irtwin.simulator.play import each, play, whole
 from irtwin.simulator.playing import diagnose
@@ -22,10 +23,12 @@ FRICTIONLESS = servo_arm.MODEL.replace('frictionloss="0.05"', 'frictionloss="0"'
 
 
 def fed(folder, commands, kind, text=FRICTIONLESS):
-    """Return a data set whose controller has a feedforward, and the servos of its model."""
+    """Return a data set whose controller has a feedforward and knows the rotors, and the servos of its model."""
     data, model = servo_arm.write(folder, commands, text)
     file = data / "dataset.toml"
-    file.write_text(file.read_text("utf-8").replace("[robot]", f'[robot]\nfeedforward = "{kind}"', 1), "utf-8")
+    told = file.read_text("utf-8").replace("[robot]", f'[robot]\nfeedforward = "{kind}"', 1)
+    rotors = "".join(f"[robot.joint.{joint}]\nrotor_inertia = 0.02\n" for joint in ("lift", "elbow"))
+    file.write_text(told + rotors, "utf-8")
     data_set = read_data_set(data, commanded=True)
     return data_set, servos(read_model(model, data_set.robot))
 
@@ -52,21 +55,25 @@ def test_a_model_that_knows_the_robot_follows_its_commands(tmp_path):
     assert missed["dynamics"] < 0.5 * missed["gravity"]  # each command is held until the next
 
 
-def test_the_torque_is_that_of_mujoco_s_inverse_dynamics(tmp_path):
-    _, own = fed(tmp_path, {"a": servo_arm.swings(4, 1)}, "dynamics")
-    states = np.random.default_rng(0).uniform(-1, 1, (3, 20, 2))
-    found, data = own.model.torque_of_bodies(*states), mujoco.MjData(own.model.compiled)
-    for row, (q, dq, ddq) in enumerate(zip(*states, strict=True)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q, dq, ddq
-        mujoco.mj_inverse(own.model.compiled, data)
-        np.testing.assert_allclose(found[row], data.qfrc_inverse, atol=1e-12)
+def test_the_torque_is_that_of_the_robot_as_drawn_its_rotors_and_its_told_load(tmp_path):
+    data_set, _ = fed(tmp_path, {"a": sines(6)}, "dynamics")
+    robot, (run,) = data_set.robot, data_set.runs
+    run = replace(run, payload_mass=0.5, payload_com=(0.0, 0.0, 0.1))
+    found = Feedforward(robot).torque(run, run.signals.time, np.zeros(2))
+    q, gap = run.signals.command, 1 / 50
+    dq, ddq = np.gradient(q, gap, axis=0), np.gradient(np.gradient(q, gap, axis=0), gap, axis=0)
+    model = robot.model.copy()
+    model.appendBodyToJoint(2, pin.Inertia(0.5, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3))), pin.SE3.Identity())
+    data = model.createData()
+    by_pinocchio = [pin.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)] + 0.02 * ddq
+    np.testing.assert_allclose(found[5:90], by_pinocchio[5:90], atol=0.01)
 
 
 def test_a_joint_by_itself_has_it_too(tmp_path):
     data_set, own = fed(tmp_path, {"a": sines(6, pace=0.25)}, "dynamics", servo_arm.MODEL)
     data_set = servo_arm.played(data_set, own, own.numbers, noise=0.0, torque_noise=0.0)
     stretches = each(data_set.runs[0], 2.0, 2)
-    blind = servos(replace(own.model, feedforward=None))
+    blind = servos(replace(own.model, robot=replace(own.model.robot, feedforward=None)))
     near, far = (
         max(np.abs(one.measured - played)[:, 0].max() for one, played in zip(stretches, single, strict=True))
         for single in (alone(arm, stretches, 0.005).play([own.numbers])[0] for arm in (own, blind))

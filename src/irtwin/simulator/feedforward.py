@@ -1,4 +1,4 @@
-"""Feedforward: the torque that a controller adds to its servos, by a model of its own."""
+"""Feedforward: the torque that a robot's controller adds to its servos, by its own model of the robot."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from irtwin.robot.description import GRAVITY
+from irtwin.effects.stack import Stack
+from irtwin.robot.description import GRAVITY, Robot
 from irtwin.signals.filter import smoothed
 from irtwin.signals.log import Run
+from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import interval
-from irtwin.simulator.model import Model
 
 _OVER = 0.06  # s, over which commands are smoothed for their speed and acceleration: some come in a servo's ticks
 
 
 @dataclass(frozen=True)
 class Feedforward:
-    """What the model, as it is given, takes for what is commanded: its bodies and rotors, without friction.
+    """What the robot's controller adds: the torque that bodies and rotors, as drawn, take for what is commanded.
 
-    Of `GRAVITY` at the commanded position, of `DYNAMICS` for the commanded motion (Khosla and Kanade 1988).
+    Its model is the data set's, whatever a simulator has: URDF, `rotor_inertia`, and the payload that it was told. Of
+    gravity alone at the commanded position, or of the commanded motion (computed torque, Khosla and Kanade 1988).
     """
 
-    model: Model
-    kind: str
+    robot: Robot
     known: dict[str, np.ndarray] = field(default_factory=dict)  # by run
 
     def torque(self, run: Run, times: np.ndarray, delay: np.ndarray) -> np.ndarray:
@@ -37,9 +38,14 @@ class Feedforward:
     def _of_commands(self, run: Run) -> np.ndarray:
         told, speed = run.signals.command, run.signals.command_speed
         assert told is not None
-        if self.kind == GRAVITY:
-            return self.model.torque_of_bodies(told, np.zeros_like(told), np.zeros_like(told))
-        step = interval(run.signals.time)
-        if speed is None:
-            return self.model.torque_of_bodies(told, *smoothed(told, step, _OVER)[1:])
-        return self.model.torque_of_bodies(told, speed, smoothed(speed, step, _OVER)[1])
+        step, still = interval(run.signals.time), np.zeros_like(told)
+        if self.robot.feedforward == GRAVITY:
+            dq, ddq = still, still
+        elif speed is None:
+            _, dq, ddq = smoothed(told, step, _OVER)
+        else:
+            dq, ddq = speed, smoothed(speed, step, _OVER)[1]
+        load, centre = run.payload_mass, run.payload_com
+        motion = Motion(run.signals.time, told, dq, ddq, run=run.name, payload_mass=load, payload_com=centre)
+        drawn = Stack(self.robot, ("rigid_body", "rotor_inertia"))
+        return drawn.real_torque(motion, np.array([term.expected for _, term in drawn.torque_terms]))

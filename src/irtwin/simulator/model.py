@@ -63,7 +63,7 @@ class Model:
     delays: np.ndarray  # (number of actuators,), s; the compiled model has none
     gears: np.ndarray  # (number of actuators,), of the file's; the compiled model's servos turn joints themselves
     gains: Gains  # of joints whose servos are not the file's
-    feedforward: str | None  # of the robot's controller
+    robot: Robot
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -159,20 +159,6 @@ class Model:
             torque[row] = data.qfrc_inverse[self.speeds]
         return np.asarray(torque + self.compiled.dof_frictionloss[self.speeds] * np.sign(dq))
 
-    def torque_of_bodies(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
-        """Return the (N, n) torque, N m, that bodies and armature alone take for a motion (N, n)."""
-        data, whole = mujoco.MjData(self.compiled), np.empty(self.compiled.nv)
-        armature, torque = self.compiled.dof_armature[self.speeds], np.empty(q.shape)
-        for row, (position, speed, acceleration) in enumerate(zip(q, dq, ddq, strict=True)):
-            data.qpos[self.positions], data.qvel[self.speeds] = position, speed
-            data.qacc[self.speeds] = acceleration
-            mujoco.mj_kinematics(self.compiled, data)
-            mujoco.mj_comPos(self.compiled, data)
-            mujoco.mj_comVel(self.compiled, data)
-            mujoco.mj_rne(self.compiled, data, 1, whole)
-            torque[row] = whole[self.speeds]
-        return np.asarray(torque + armature * ddq)
-
     @property
     def equalities(self) -> tuple[str, ...]:
         """The equality constraints that hold the robot's joints, by name or number: torque says nothing of them."""
@@ -215,7 +201,7 @@ def read_model(path: Path, robot: Robot, joints: Sequence[str] = ()) -> Model:
     places, others = joints_of(compiled, tuple(called.values()), str(path), _offered(compiled, robot))
     model = Model(
         file, compiled, called, compiled.jnt_qposadr[places], compiled.jnt_dofadr[places], others, delays, gears, gains,
-        robot.feedforward,
+        robot,
     )  # fmt: skip
     _check_joints(model, robot)
     return model

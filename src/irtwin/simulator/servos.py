@@ -101,7 +101,7 @@ class Servos:
     @cached_property
     def feedforward(self) -> Feedforward | None:
         """What the robot's controller adds to its servos, None where it adds nothing."""
-        return Feedforward(self.model, self.model.feedforward) if self.model.feedforward else None
+        return Feedforward(self.model.robot) if self.model.robot.feedforward else None
 
     @cached_property
     def can_differ(self) -> np.ndarray:

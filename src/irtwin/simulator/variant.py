@@ -80,14 +80,14 @@ def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
     def add(spec: mujoco.MjSpec) -> None:
         for joint in model.joints if banded else ():
             _add_second(spec, joint)
-        for joint in model.joints if model.feedforward else ():
+        for joint in model.joints if model.robot.feedforward else ():
             spec.add_actuator(name=f"{joint}{_FED}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
         for joint in soft:
             _add_behind(spec, joint)
 
     compiled, *_ = compiled_of(model.file, model.gains, add)
     second = [compiled.actuator(f"{joint}{_SECOND}").id for joint in model.joints] if banded else []
-    fed = [compiled.actuator(f"{joint}{_FED}").id for joint in model.joints] if model.feedforward else []
+    fed = [compiled.actuator(f"{joint}{_FED}").id for joint in model.joints] if model.robot.feedforward else []
     behind = [int(compiled.joint(f"{joint}{_BEHIND}").dofadr[0]) for joint in soft]
     joints = [compiled.joint(joint).id for joint in model.joints]
     places = [model.joints.index(joint) for joint in soft]
