@@ -35,8 +35,8 @@ _OVERLOAD = 2.0  # times it
 _STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
 _RESTS = (-0.5, 0.0, 0.5)  # rad (m), tried for a hose: between two of them both forms are alike
-_BALANCE = 1000.0  # N m that a balancer may bear in its first order,
-_FALLING = 1 / 3  # and in each further one of the order before: the nearer its anchors are to each other, the more
+_FALLING = 1 / 3  # of the order before, in a balancer's torque: the nearer its anchors are to each other, the more
+_GRAVITY, _UNKNOWN_LOAD = 9.81, 1000.0  # m/s^2; N m at a joint beyond which no mass is known
 _TURN = np.linspace(0, 2 * np.pi, 181)
 
 
@@ -46,6 +46,19 @@ def balanced_joint(robot: Robot) -> str:
     axes = pin.computeJointJacobians(robot.model, data, pin.neutral(robot.model))[3:]
     lying = np.abs(axes[2]) < _UPRIGHT
     return robot.joint_names[int(np.argmax(lying)) if lying.any() else 0]
+
+
+def borne(robot: Robot, joint: int) -> float:
+    """Return what bodies beyond a joint, as drawn, may ask of it, N m or N; 1000 where none has a mass."""
+    model, data = robot.model, robot.model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    own = model.getJointId(robot.joint_names[joint])
+    load = 0.0
+    for body in model.subtrees[own]:
+        mass = max(model.inertias[body].mass, 0.0)
+        away = data.oMi[body].act(model.inertias[body].lever) - data.oMi[own].translation
+        load += _GRAVITY * mass * (1.0 if robot.joints[joint].unit == "m" else float(np.linalg.norm(away)))
+    return load or _UNKNOWN_LOAD
 
 
 @dataclass(frozen=True)
@@ -123,11 +136,19 @@ class GravityCompensation(JointEffect):
         shapes = self.variants(orders=(1, 2, 3))
         return shapes if robot is None else tuple(shape.on(balanced_joint(robot)) for shape in shapes)
 
+    def terms(self, robot: Robot) -> tuple[Term, ...]:
+        """Return the torques of each joint's cosines and sines; one is built to bear what gravity asks there."""
+        return tuple(
+            replace(term, spread=term.spread * borne(robot, place))
+            for joint, place in zip(self.acting(robot), self.places(robot), strict=True)
+            for term in self.joint_terms(joint)
+        )
+
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:
-        """Return the torques that go with cosine and sine of each order of the angle."""
+        """Return the torques that go with cosine and sine of each order of the angle, for a joint that bears 1 N m."""
         unit = force_unit(joint)
         return tuple(
-            Term(f"{wave} {order}" if order > 1 else wave, unit, joint.name, spread=_BALANCE * _FALLING ** (order - 1))
+            Term(f"{wave} {order}" if order > 1 else wave, unit, joint.name, spread=_FALLING ** (order - 1))
             for order in range(1, self.orders + 1)
             for wave in ("cos", "sin")
         )

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from irtwin.effects.drive import RotorInertia
+from irtwin.effects.rigid_body import RigidBody
 from irtwin.effects.stack import Stack
 from irtwin.robot.description import GRAVITY, Robot
 from irtwin.signals.filter import smoothed
@@ -47,5 +49,5 @@ class Feedforward:
             dq, ddq = speed, smoothed(speed, step, _OVER)[1]
         load, centre = run.payload_mass, run.payload_com
         motion = Motion(run.signals.time, told, dq, ddq, run=run.name, payload_mass=load, payload_com=centre)
-        drawn = Stack(self.robot, ("rigid_body", "rotor_inertia"))
+        drawn = Stack(self.robot, (RigidBody(), RotorInertia()))
         return drawn.real_torque(motion, np.array([term.expected for _, term in drawn.torque_terms]))
