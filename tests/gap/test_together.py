@@ -26,8 +26,8 @@ LOAD = np.array([1.5, 0.0, 0.02, 0.1, 0, 0, 0, 0, 0, 0])
 FORCE = np.array([3.0, -4.0, 4.0])
 
 
-def screened(loaded, touched, still=()):
-    """What is tried of payloads and contacts, and in which runs."""
+def screened(loaded, touched, still=(), references=()):
+    """What is tried of payloads and contacts, and in which runs; some of the eight are references."""
     motions = []
     for seed in range(8):
         motion = replace(swing(ROBOT, seed, seconds=6.0, rate=50.0), run=f"run_{seed}")
@@ -39,8 +39,9 @@ def screened(loaded, touched, still=()):
             extra = extra + ExternalContact(2.0, 3.5).contribution(ROBOT, motion, FORCE)
         motions.append(replace(shown, torque=shown.torque + extra))
     names = frozenset(motion.run for motion in motions)
-    grouping = Grouping({name: name for name in names}, names)
-    case = SimpleNamespace(robot=ROBOT, with_torque=motions, observed=names, grouping=grouping, thresholds=DEFAULT)
+    observed = names - {f"run_{seed}" for seed in references}
+    grouping = Grouping({name: name for name in names}, observed)
+    case = SimpleNamespace(robot=ROBOT, with_torque=motions, observed=observed, grouping=grouping, thresholds=DEFAULT)
     stack = Stack(ROBOT, BASELINE)
     system = torque_system(stack, motions, grouping, (), None)
     noise = system.noise_before
@@ -59,6 +60,12 @@ def test_a_contact_and_a_payload_that_hide_each_other_are_both_tried(still):
     tried = screened(loaded=(1, 4, 5), touched=(1, 2, 6), still=still)
     assert of_runs(ExternalContact, (1, 2, 6)) in tried
     assert of_runs(Payload, (1, 4, 5)) in tried
+
+
+def test_a_contact_hides_behind_a_payload_of_all_observed_runs():
+    tried = screened(loaded=(4, 5, 6, 7), touched=(4, 6, 7), references=(0, 1, 2, 3))
+    assert of_runs(ExternalContact, (4, 6, 7)) in tried
+    assert of_runs(Payload, (4, 5, 6, 7)) not in tried  # as a change it is tried anyway
 
 
 def test_each_is_tried_where_it_is_alone():

@@ -21,7 +21,7 @@ _SWEEPS = 10  # over the runs, each moved to the other part
 
 
 def untold_payload(robot: Robot, system: System, noise: np.ndarray) -> Payload | None:
-    """Return the payload in some of the observed runs that explains most; None where they cannot be parted.
+    """Return the payload in some of the runs that explains most; None where they cannot be parted.
 
     system: of torque, with the twin's rigid bodies; noise: (n,) RMS of each joint's residual, N m.
     """
@@ -29,7 +29,7 @@ def untold_payload(robot: Robot, system: System, noise: np.ndarray) -> Payload |
     if parts is None:
         return None
     with_load = parts.carrying()
-    if with_load[parts.observed].all():
+    if with_load.all():
         return None
     return Payload(runs=tuple(run for run, carries in zip(parts.runs, with_load, strict=True) if carries))
 

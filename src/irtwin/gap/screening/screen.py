@@ -77,6 +77,7 @@ def each_beside_the_other(
 ) -> tuple[Effect, ...]:
     """Return the contacts and payloads to try: each by itself, and beside the other; `touch`: the contact by itself.
 
+    A payload in all observed runs is tried anyway, as a change; what hides behind it is a contact.
     system: of torque, with the twin's terms; noise: (n,) RMS of each joint's residual, N m.
     """
     tried: dict[Effect | None, None] = {touch: None, untold_payload(case.robot, system, noise): None}
@@ -88,7 +89,8 @@ def each_beside_the_other(
             break
         touch = contact(case.robot, left, _rms(left, noise))
         tried |= {payload: None, touch: None}
-    return tuple(effect for effect in tried if effect is not None)
+    anyway = [effect for effect in tried if isinstance(effect, Payload) and set(effect.runs or ()) >= case.observed]
+    return tuple(effect for effect in tried if effect is not None and effect not in anyway)
 
 
 def _apart_from(system: System, touch: ExternalContact | None) -> System:
