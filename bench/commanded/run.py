@@ -87,17 +87,14 @@ def called_back(own: Servos, said: Path, stretch: PlayedStretch) -> np.ndarray:
         data.qpos[own.model.positions], data.qvel[own.model.speeds] = stretch.state()
         steps = round(stretch.time[-1] / step)
         told = stretch.commands(np.arange(steps) * step, step, np.zeros_like(own.numbers))
-        added = (
-            stretch.fed(own.feedforward, np.arange(steps) * step, np.zeros_like(own.numbers)) if own.feedforward else 0
-        )
-        added = np.broadcast_to(added, told.shape)
+        if own.feedforward:  # as a servo's own, so that its limit holds for both
+            told += stretch.fed(own.feedforward, np.arange(steps) * step, np.zeros_like(own.numbers)) / own.numbers[0]
         for drive, first in zip(own.actuators, told[0], strict=True):
             if samples := int(compiled.actuator_history[drive, 0]):
                 mujoco.mj_initCtrlHistory(compiled, data, int(drive), None, np.full((samples, 1), first))
         moved = np.empty((steps + 1, len(told[0])))
         for row, each in enumerate(told):
             moved[row], data.ctrl[own.actuators] = data.qpos[own.model.positions], each
-            data.qfrc_applied[own.model.speeds] = added[row]
             mujoco.mj_step(compiled, data)
         moved[-1] = data.qpos[own.model.positions]
         return np.column_stack([np.interp(stretch.time, np.arange(steps + 1) * step, one) for one in moved.T])
