@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,29 +22,13 @@ _SEARCHES = 4  # a search without what was refused may name something else that 
 
 @dataclass(frozen=True)
 class Refusals:
-    """What was refused, and whether that which is named instead leaves far more: then nothing explains the data.
-
-    `least` (g,): the noise that the best of all searches leaves, whether or not it can be true.
-    """
+    """What was refused, and whether that which is named instead leaves far more: then nothing explains the data."""
 
     refused: tuple[Refused, ...] = ()
     unmatched: bool = False
-    least: np.ndarray | None = None
-
-    @property
-    def places(self) -> dict[tuple[str, str | None], Refused]:
-        """What was refused, by effect and joint."""
-        return {(refusal.effect, next(iter(refusal.joints), None)): refusal for refusal in self.refused}
 
     def __add__(self, other: Refusals) -> Refusals:
         return Refusals(self.refused + other.refused, self.unmatched or other.unmatched)
-
-    def beside(self, wrong: Sequence[Refused], finding: ChannelFinding, excess: float) -> Refusals:
-        """Return these and what is `wrong` of a finding, and whether that leaves more than the best by `excess`."""
-        noise = finding.attribution.noise
-        least = noise if self.least is None else np.minimum(self.least, noise)
-        more = (noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
-        return Refusals((*self.refused, *wrong), bool(more.max() > excess), least)
 
 
 NOTHING_REFUSED = Refusals()
@@ -60,15 +44,25 @@ def find_possible(
 
     What an earlier look at the channel refused, `before`, stays refused: each refusal costs a search.
     """
-    refusals = before
+    refused = {_place(refusal): refusal for refusal in before.refused}
+    least = np.inf
     for _ in range(_SEARCHES):
-        finding, floor = search(without | refusals.places.keys())
+        finding, floor = search(without | refused.keys())
+        least = np.minimum(least, finding.attribution.noise)
         wrong = [refusal for cause in finding.causes for refusal in _of(case.robot, finding, cause, case.stated)]
-        refusals = refusals.beside(wrong, finding, case.thresholds.criterion.excess)
         if not wrong:
-            return finding, floor, refusals
-    finding, floor = search(without | {effect for effect, _ in refusals.places})
-    return finding, floor, refusals.beside([], finding, case.thresholds.criterion.excess)
+            break
+        refused |= {_place(refusal): refusal for refusal in wrong}
+    else:
+        finding, floor = search(without | {effect for effect, _ in refused})
+    if len(refused) == len(before.refused):
+        return finding, floor, before
+    more = (finding.attribution.noise / np.maximum(least, finding.system.quietest)) ** 2 - 1
+    return finding, floor, Refusals(tuple(refused.values()), bool(more.max() > case.thresholds.criterion.excess))
+
+
+def _place(refusal: Refused) -> tuple[str, str | None]:
+    return refusal.effect, next(iter(refusal.joints), None)
 
 
 def _of(robot: Robot, finding: ChannelFinding, cause: FoundCause, stated: Stated) -> list[Refused]:
