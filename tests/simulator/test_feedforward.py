@@ -33,8 +33,11 @@ def fed(folder, commands, kind, text=FRICTIONLESS):
     return data_set, servos(read_model(model, data_set.robot))
 
 
-def test_gravity_that_is_added_leaves_no_sag(tmp_path):
-    data_set, own = fed(tmp_path, {"a": np.full((150, 2), 0.4)}, "gravity")
+@pytest.mark.parametrize("default", ["", '<motor gear="30" ctrlrange="-0.1 0.1" forcerange="-1e-3 1e-3"/>'])
+def test_gravity_that_is_added_leaves_no_sag(tmp_path, default):
+    text = FRICTIONLESS.replace("</default>", f"{default}</default>").replace("<position", '<position gear="1"')
+    text = text.replace('kv="0.6"', 'kv="0.6" forcerange="-8 8"')
+    data_set, own = fed(tmp_path, {"a": np.full((150, 2), 0.4)}, "gravity", text)
     q = play(own, [own.numbers], [whole(data_set.runs[0])])[0][0][-1, 0]
     np.testing.assert_allclose(q, 0.4, atol=1e-6)
 

@@ -36,7 +36,7 @@ _STEEPEST = 0.35  # rad: a base that leans more is no tilt, but mounted so
 _UPRIGHT = 0.7  # of an axis' length that is vertical
 _RESTS = (-0.5, 0.0, 0.5)  # rad (m), tried for a hose: between two of them both forms are alike
 _FALLING = 1 / 3  # of the order before, in a balancer's torque: the nearer its anchors are to each other, the more
-_GRAVITY, _UNKNOWN_LOAD = 9.81, 1000.0  # m/s^2; N m at a joint beyond which no mass is known
+_UNKNOWN_LOAD = 1000.0  # N m at a joint beyond which no mass is known
 _TURN = np.linspace(0, 2 * np.pi, 181)
 
 
@@ -52,13 +52,12 @@ def borne(robot: Robot, joint: int) -> float:
     """Return what bodies beyond a joint, as drawn, may ask of it, N m or N; 1000 where none has a mass."""
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
-    own = model.getJointId(robot.joint_names[joint])
-    load = 0.0
+    own, load = model.getJointId(robot.joint_names[joint]), 0.0
     for body in model.subtrees[own]:
         mass = max(model.inertias[body].mass, 0.0)
         away = data.oMi[body].act(model.inertias[body].lever) - data.oMi[own].translation
-        load += _GRAVITY * mass * (1.0 if robot.joints[joint].unit == "m" else float(np.linalg.norm(away)))
-    return load or _UNKNOWN_LOAD
+        load += mass * (1.0 if robot.joints[joint].unit == "m" else float(np.linalg.norm(away)))
+    return load * float(np.linalg.norm(model.gravity.linear)) or _UNKNOWN_LOAD
 
 
 @dataclass(frozen=True)

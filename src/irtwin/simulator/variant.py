@@ -20,9 +20,8 @@ class PlayedModel:
     """A model with what plays dead bands and soft joints, and where it has the robot's joints, (n,) each.
 
     `second`: actuators beside the servos, idle, told their commands; none where no dead band is played. `fed`: those of
-    the controller's feedforward, told their torque; none where there is none. `soft`: places
-    among the robot's joints of those with a second joint behind the motor's, with the same axis; `behind`: its dof.
-    `of`: the model as it is.
+    the controller's feedforward, told their torque; none where there is none. `soft`: places among the robot's joints
+    of those with a second joint behind the motor's, with the same axis; `behind`: its dof. `of`: the model as it is.
     """
 
     of: Model
@@ -81,7 +80,7 @@ def variant(model: Model, banded: bool, soft: Sequence[str]) -> PlayedModel:
         for joint in model.joints if banded else ():
             _add_second(spec, joint)
         for joint in model.joints if model.robot.feedforward else ():
-            spec.add_actuator(name=f"{joint}{_FED}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_motor()
+            _add_fed(spec, joint)
         for joint in soft:
             _add_behind(spec, joint)
 
@@ -102,6 +101,13 @@ def _add_second(spec: mujoco.MjSpec, joint: str) -> None:
     second.gaintype, second.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     second.gear, second.ctrllimited, second.ctrlrange = first.gear, first.ctrllimited, first.ctrlrange
     second.forcelimited, second.forcerange = True, (-1.0, 1.0)
+
+
+def _add_fed(spec: mujoco.MjSpec, joint: str) -> None:
+    """Put a motor beside a joint's servo, of the torque that it is told, whatever the file's actuators default to."""
+    fed = spec.add_actuator(name=f"{joint}{_FED}", target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    fed.set_to_motor()
+    fed.gear, fed.ctrllimited, fed.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, False
 
 
 def _add_behind(spec: mujoco.MjSpec, joint: str) -> None:
