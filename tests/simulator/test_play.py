@@ -50,6 +50,15 @@ def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(still):
     assert weak[1] > 0.5
 
 
+def test_a_limit_of_the_joint_holds_beside_a_dead_band(tmp_path):
+    weak = servo_arm.MODEL.replace('name="lift"', 'name="lift" actuatorfrclimited="true" actuatorfrcrange="-0.05 0.05"', 1)
+    data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((50, 2))}, weak))
+    numbers = [own.numbers, servo_arm.changed(own, dead_band=(0.0, 1e-6))]
+    plain, banded = (q[0][:, 0] for q in play(own, numbers, [whole(data_set.runs[0])]))
+    assert np.abs(plain[-1]).max() > 0.1
+    np.testing.assert_allclose(banded, plain, atol=1e-3)
+
+
 def test_stretches_do_not_overlap_and_are_spread(tmp_path):
     run = servo_arm.read(*servo_arm.write(tmp_path, {"a": servo_arm.swings(10, 1)}))[0].runs[0]
     assert [round(one.begin, 2) for one in each(run, 2.0, 2)] == [1.5, 6.49]

@@ -190,7 +190,10 @@ class Servos:
             model.actuator_forcerange[of.second] = (stiffness * band * np.array([[-1.0], [1.0]])).T
         if len(of.second) or len(of.fed):  # several actuators share what one motor can give
             model.actuator_forcelimited[at] = 0
-            model.jnt_actfrclimited[of.joints], model.jnt_actfrcrange[of.joints] = 1, ends.T
+            limited = model.jnt_actfrclimited[of.joints] == 1
+            least, most = np.where(limited, model.jnt_actfrcrange[of.joints].T, _UNLIMITED)
+            both = np.maximum(ends[0], least), np.minimum(ends[1], most)
+            model.jnt_actfrclimited[of.joints], model.jnt_actfrcrange[of.joints] = 1, np.transpose(both)
         else:
             model.actuator_forcelimited[at], model.actuator_forcerange[at] = 1, ends.T
         in_joint, in_servo = self.dampings(damping)
