@@ -51,7 +51,9 @@ def test_a_servo_with_a_dead_band_lets_its_joint_sag_by_it(still):
 
 
 def test_a_limit_of_the_joint_holds_beside_a_dead_band(tmp_path):
-    weak = servo_arm.MODEL.replace('name="lift"', 'name="lift" actuatorfrclimited="true" actuatorfrcrange="-0.05 0.05"', 1)
+    weak = servo_arm.MODEL.replace(
+        'name="lift"', 'name="lift" actuatorfrclimited="true" actuatorfrcrange="-0.05 0.05"', 1
+    )
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": np.zeros((50, 2))}, weak))
     numbers = [own.numbers, servo_arm.changed(own, dead_band=(0.0, 1e-6))]
     plain, banded = (q[0][:, 0] for q in play(own, numbers, [whole(data_set.runs[0])]))
