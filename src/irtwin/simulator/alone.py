@@ -25,6 +25,7 @@ from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
 _ASIDE = 0.01  # m from the flange, and rad, for what a payload's place and a tilt change
 _AT_ONCE = 12_000_000  # positions that are held at a time
+_STEPS = 64  # of which what does not depend on the motion is worked out together
 _LONG = 4_000_000  # positions, from which a copy of this process plays half of them
 
 
@@ -99,32 +100,57 @@ class Alone:
         stiffness, damping, friction, _, armature, _, _, limit, band, spring, *_ = own[: len(OF_JOINTS)]
         joint, servo = servos.dampings(damping)
         least, most = servos.limits(limit)
-        springs = compiled.qpos_spring[servos.model.positions], bool(spring.any())
+        rest = compiled.qpos_spring[servos.model.positions]
         filters = compiled.actuator_dynprm[at, 0] * (compiled.actuator_actnum[at] > 0)
         share = np.where(filters > 0, -np.expm1(-step / np.maximum(filters, 1e-9)), 1.0)
-        q, v = (np.broadcast_to(state, commanded.shape[1:]).copy() for state in self.begun)
         load, bodies = self._load(own[len(OF_JOINTS) :])
         soft, back = _dry(servos, own, step)
         lower, upper = self._stops()
-        followed, below, banded, lags = q, -band, bool(band.any()), bool((share < 1).any())
+        banded, lags, sprung = bool(band.any()), bool((share < 1).any()), bool(spring.any())
+        stopped, below = bool(np.isfinite([lower, upper]).any()), -band
         moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
+        q, v = (np.broadcast_to(state, commanded.shape[1:]).copy() for state in self.begun)
+        followed, off, force, held = q.copy(), *np.empty((3, *q.shape))
+        # of one shape and in place: at each step these take most of the time of a fit
+        stiffness, servo, joint, least, most, drive, friction = (
+            np.broadcast_to(of, q.shape).copy() for of in (stiffness, servo, joint, least, most, -friction, friction)
+        )
         moved[0, 0] = q
-        for row in range(len(commanded)):
-            followed = followed + share * (commanded[row] - followed) if lags else commanded[row]
-            off = followed - q
+        for row, asked in enumerate(commanded):
+            if (within := row % _STEPS) == 0:
+                inertia = bodies[row : row + _STEPS] + armature
+                firm = 1 / (1 + soft * inertia)
+                speed_held, gained = back * inertia * firm, step / (inertia + step * damping)
+            if lags:
+                followed += share * (asked - followed)
+                asked = followed
+            np.subtract(asked, q, out=off)
             if banded:
                 off -= np.minimum(np.maximum(off, below), band)
-            force = np.minimum(np.maximum(stiffness * off - servo * v + fed[row], least), most)
+            np.multiply(stiffness, off, out=force)
+            force -= np.multiply(servo, v, out=held)
+            force += fed[row]
+            np.maximum(force, least, out=force)
+            np.minimum(force, most, out=force)
             moved[row, 1:] = force
-            force -= joint * v + load[row]
-            if springs[1]:
-                force -= spring * (q - springs[0])
-            inertia = bodies[row] + armature
-            held = (force + back * inertia * v) / (1 + soft * inertia)
-            force -= np.minimum(np.maximum(held, -friction), friction)
-            v = v + step * force / (inertia + step * damping)
-            before, q = q, np.minimum(np.maximum(q + step * v, lower), upper)
-            v = (q - before) / step
+            force -= np.multiply(joint, v, out=held)
+            force -= load[row]
+            if sprung:
+                force -= spring * (q - rest)
+            np.multiply(speed_held[within], v, out=held)
+            held += np.multiply(force, firm[within], out=off)
+            np.maximum(held, drive, out=held)
+            force -= np.minimum(held, friction, out=held)
+            force *= gained[within]
+            v += force
+            np.multiply(v, step, out=off)
+            if stopped:
+                before = q.copy()
+                q += off
+                np.minimum(np.maximum(q, lower, out=q), upper, out=q)
+                v = (q - before) / step
+            else:
+                q += off
             moved[row + 1, 0] = q
         moved[-1, 1:] = moved[-2, 1:]
         return moved
