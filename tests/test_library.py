@@ -49,6 +49,7 @@ def test_effects_go_by_name():
     assert irtwin.catalogue()["stribeck_friction"].family == "friction"
 
 
+@pytest.mark.slow
 def test_a_faulty_model_has_one_rotor_with_half_its_inertia(demo, tmp_path):
     twin = irtwin.identify(demo, ["rigid_body", "rotor_inertia"])
     modelling.write_model(twin, "mjcf", tmp_path / "right.xml")
@@ -110,6 +111,7 @@ def test_paths_as_text_are_read_and_written(demo, tmp_path):
         irtwin.diagnose("none", json_file=str(tmp_path / "gap.json"), report=str(tmp_path / "gap.html"))
 
 
+@pytest.mark.slow
 def test_a_workspace_that_cannot_be_used_is_refused_before_a_diagnosis(demo, tmp_path, monkeypatch):
     (tmp_path / "workspace").mkdir()
     (tmp_path / "workspace" / "irtwin.db").write_bytes(b"no database" * 1000)

@@ -60,6 +60,7 @@ def test_a_sham_keeps_what_noise_remembers_and_loses_what_is_missing():
     assert not diagnose(nothing_missing).causes
 
 
+@pytest.mark.slow
 def test_a_centred_sham_has_no_mean_of_its_own():
     healthy = logged()
     full = fitted(healthy)
@@ -68,6 +69,7 @@ def test_a_centred_sham_has_no_mean_of_its_own():
         assert left.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_an_effect_matters_where_the_fit_gets_worse_without_it():
     dry = np.array([0.0, truth(ROBOT)["Fc"][1]])  # joint 2 without its friction
     assert where_it_matters(logged(), "coulomb_friction") == ("joint_1", "joint_2")

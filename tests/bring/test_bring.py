@@ -109,6 +109,7 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
     assert_same(read_data_set(tmp_path / "set"), "q torque")
 
 
+@pytest.mark.slow
 def test_a_motion_without_torque_asks_which_columns_are_it(tmp_path: Path) -> None:
     columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
     log = write_text(tmp_path / "run.csv", columns)
@@ -236,6 +237,7 @@ def test_a_joint_that_mimics_another_is_held_already(tmp_path: Path) -> None:
     assert with_fixed(described, ("finger*",)).joint_names == robot().joint_names
 
 
+@pytest.mark.slow
 def test_commands_without_torque_are_for_a_simulators_model(tmp_path: Path) -> None:
     commands = {f"cmd_joint_a{k}": good()[f"q_joint_a{k}"] + 0.01 for k in range(1, 7)}
     columns = {name: values for name, values in good().items() if name[:2] in ("ti", "q_")} | commands

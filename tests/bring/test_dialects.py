@@ -136,6 +136,7 @@ def test_a_log_in_a_dialect_comes_back_in_si_units(
     assert_same(brought(form(tmp_path), options), fields)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["run.bag", "run.mcap", "run"])
 def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
     write(tmp_path / form, *of_run(robot(), signals(good())))

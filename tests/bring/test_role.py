@@ -43,6 +43,7 @@ def test_a_role_of_nothing_is_refused(said, message):
         roles(FILES, [said])
 
 
+@pytest.mark.slow
 def test_a_simulators_logs_are_brought_beside_the_robots(tmp_path):
     columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "trq{}")
     files = [write_text(tmp_path / f"{name}.csv", columns) for name in ("robot", "sim")]

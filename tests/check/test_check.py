@@ -74,6 +74,7 @@ def test_a_healthy_log_has_no_fault():
     assert found(healthy()) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [0, *(pytest.param(joint, marks=pytest.mark.nightly) for joint in (1, 2)), 3])
 @pytest.mark.parametrize(
     ("field", "change", "fault", "prefix"),
@@ -95,6 +96,7 @@ def test_a_fault_of_one_joint_is_found_there_and_nowhere_else(field, change, fau
     assert (fault, f"{prefix}_joint_{joint + 1}") in found(spoilt(healthy(), one(field, joint, change)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "b"), [(0, 1), (1, 2), (2, 3), (0, 3)])
 @pytest.mark.parametrize(("field", "prefix"), [("torque", "tau"), ("dq", "dq")])
 def test_exchanged_columns_are_named_both(field, prefix, a, b):
@@ -102,6 +104,7 @@ def test_exchanged_columns_are_named_both(field, prefix, a, b):
     assert found(spoilt_set) == {("swap", f"{prefix}_joint_{a + 1} <-> {prefix}_joint_{b + 1}")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [1, 2])  # gravity tells the sign of these from that of their torque
 def test_a_reversed_position_is_no_reversed_torque(joint):
     change = one("q", joint, np.negative)
@@ -153,6 +156,7 @@ def test_torque_without_its_sign_has_to_be_cured():
     assert finding.say.startswith("tau_JOINT has no sign: it is never below zero, though each joint moves both ways")
 
 
+@pytest.mark.slow
 def test_a_sign_is_mended_and_a_dead_channel_stops():
     torque = healthy().runs[0].signals.torque
     mended = checked(spoilt(healthy(), one("torque", 2, np.negative))).data_set
@@ -177,6 +181,7 @@ def test_held_torques_are_joined_by_lines():
     assert np.abs(mended - smooth)[:, 1].mean() < before
 
 
+@pytest.mark.slow
 def test_what_stands_is_not_joined_over():
     def stands(signals: Signals) -> Signals:
         torque = np.array(signals.torque)
@@ -192,6 +197,7 @@ def test_a_robot_that_stands_has_nothing_to_say():
     assert found(still) == set()
 
 
+@pytest.mark.slow
 def test_the_command_writes_its_findings_and_ends_with_2(tmp_path: Path):
     faulty = spoilt(healthy(), one("torque", 2, np.zeros_like))
     folder, out = write(tmp_path / "set", ROBOT, faulty.runs), tmp_path / "found.json"

@@ -114,6 +114,7 @@ def test_beside_torque_nothing_has_to_be_cured():
     assert [finding.stops for finding in of_commands(turned)] == [False] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SO101.exists(), reason="the measured logs are not here")
 def test_measured_commands_are_left_alone_and_each_exchange_is_told():
     found = read_data_set(SO101, commanded=True)

@@ -41,6 +41,7 @@ def test_the_number_of_a_fault(
     assert not finding.stops
 
 
+@pytest.mark.slow
 def test_a_zero_that_is_off():
     robot = arm(6)
     motion = measure(robot, swing(robot, 0), noise=0.05)
@@ -65,6 +66,7 @@ def test_another_payload_is_no_fault():
     assert check(replace(data_set, runs=(*data_set.runs, loaded))).findings == ()
 
 
+@pytest.mark.slow
 def test_two_reversed_torques_are_both_mended():
     faulty = spoilt(spoilt(healthy(), one("torque", 1, np.negative)), one("torque", 3, np.negative))
     assert found(faulty) == {("sign", "tau_joint_2"), ("sign", "tau_joint_4")}

@@ -75,6 +75,7 @@ def test_the_torque_of_a_pendulum_is_printed(pendulum):
     assert r"\ddot{q}_{1}" in done("robot", "equations", pendulum, "--joint", "swing", "--latex")
 
 
+@pytest.mark.slow
 def test_the_torque_of_six_joints_is_a_list_of_short_formulas():
     pytest.importorskip("sympy")
     said = done("robot", "equations", KR6)

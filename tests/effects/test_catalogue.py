@@ -38,6 +38,7 @@ def texts(file: Path) -> set[str]:
     return {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 
 
+@pytest.mark.slow
 def test_no_other_room_knows_an_effect_by_its_id():
     files = {file.relative_to(SOURCE).as_posix(): file for file in SOURCE.rglob("*.py")}
     others = {name: file for name, file in files.items() if not name.startswith("effects/")}

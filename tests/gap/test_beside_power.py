@@ -100,6 +100,7 @@ def test_power_at_rest_is_that_of_the_torque_which_friction_left_there():
     assert names(found(one)) == []
 
 
+@pytest.mark.slow
 def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     finding = found(case(real=3.0))
     assert names(finding) == ["asymmetric_friction missing joint_2"]
@@ -108,6 +109,7 @@ def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     assert offset == pytest.approx(truth(ROBOT)["c"][1], abs=0.3)  # of the sensor alone
 
 
+@pytest.mark.slow
 def test_the_estimate_stands_on_power_too():
     finding = found(case(real=3.0, cable=6.0))
     assert sorted(names(finding)) == ["asymmetric_friction missing joint_2", "cable_drag missing joint_1"]
@@ -117,6 +119,7 @@ def test_the_estimate_stands_on_power_too():
     assert abs(finding.estimate.values[place] - true) < abs(alone - true) / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made", "of"),
     [({"real": 3.0}, "the gap of torque and power above the floor"), ({"cable": 6.0}, "the gap above the floor")],
@@ -132,6 +135,7 @@ def test_an_offset_of_a_sensor_costs_none():
     assert names(found(case(shown=3.0))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made", "effect"), [({"real": 3.0}, "asymmetric_friction"), ({"shown": 3.0}, "torque_offset")]
 )

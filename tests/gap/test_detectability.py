@@ -28,6 +28,7 @@ def run():
 WITHOUT_VISCOUS = tuple(effect for effect in BASELINE if effect != "viscous_friction")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("altering", "signal", "twin", "tried"), [
     (WARM, "power", BASELINE, False),
     (WARM, "power", (*BASELINE, "copper_loss"), True),
@@ -47,6 +48,7 @@ def test_an_effect_that_alters_what_the_twin_lacks_is_said(run):
     assert (said.effect, said.why) == (WARM, "the twin has no copper_loss, which it alters")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain", "told"), [(1.003, False), (1.03, True)])
 def test_a_meter_that_is_off_by_less_than_its_class_is_no_cause(gain, told):
     robot, runs = with_constants(arm(2)), []

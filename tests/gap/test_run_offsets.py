@@ -72,6 +72,7 @@ def diagnosed(folder: Path, changed: float) -> Document:
     return diagnose(read_data_set(write(folder / "set", arm(2), runs))).document
 
 
+@pytest.mark.slow
 def test_an_offset_that_changed_by_more_than_runs_differ_is_told_and_closes_the_gap(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 1.0)
     assert [(cause.effect, cause.joints, cause.scope) for cause in found.causes] == [
@@ -81,5 +82,6 @@ def test_an_offset_that_changed_by_more_than_runs_differ_is_told_and_closes_the_
     assert found.shrink.closed_fraction.value > 0.8
 
 
+@pytest.mark.slow
 def test_offsets_that_differ_from_run_to_run_are_no_change(tmp_path: Path) -> None:
     assert diagnosed(tmp_path, 0.0).verdict == "no_gap"

@@ -42,11 +42,13 @@ def one_moving(seed: int, joint: int) -> Motion:
     return replace(motion, q=share * motion.q, dq=share * motion.dq, ddq=share * motion.ddq)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", range(0, 6, 2))
 def test_references_that_move_one_joint_are_of_the_robot(joint: int) -> None:
     checked([run("reference", one_moving(seed, joint)) for seed in (1, 2)])
 
 
+@pytest.mark.slow
 def test_references_of_other_bodies_are_refused() -> None:
     with pytest.raises(InputError, match="is nothing like that of the observed runs"):
         checked([run("reference", swing(DRAWN, seed), heavier(DRAWN, 6.0)) for seed in (1, 2)])

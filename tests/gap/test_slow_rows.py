@@ -47,11 +47,13 @@ def causes(folder: Path, width: float, stronger: float = 1.0) -> dict[str, tuple
     return {cause.effect: tuple(cause.joints) for cause in found.causes if cause.confidence >= 0.5}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.004, pytest.param(0.025, marks=pytest.mark.nightly)])
 def test_a_turn_over_another_speed_is_no_change_of_friction(tmp_path: Path, width: float) -> None:
     assert causes(tmp_path, width) == {}
 
 
+@pytest.mark.slow
 def test_a_change_of_dry_friction_is_told_beside_a_turn_over_another_speed(tmp_path: Path) -> None:
     assert causes(tmp_path, 0.025, stronger=1.3) == {"coulomb_friction": ("joint_1",)}
 
@@ -68,6 +70,7 @@ def diagnosed(folder: Path, law: Callable[[np.ndarray], np.ndarray], way: float 
     return diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "way"),
     [(lambda dq: np.tanh(dq / 0.008), 0.03), (lambda dq: np.arctan(dq / 0.015) * 2 / np.pi, 0.2)],
@@ -79,6 +82,7 @@ def test_a_turn_that_few_blocks_show_or_no_width_describes_is_no_cause(tmp_path:
     assert found.causes == ()
 
 
+@pytest.mark.slow
 def test_friction_that_falls_with_speed_is_told_beside_a_turn(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, lambda dq: np.tanh(dq / 0.01) * (1 + 0.4 * np.exp(-((dq / 0.05) ** 2))))
     assert [(cause.effect, sorted(cause.joints)) for cause in found.causes] == [

@@ -29,12 +29,14 @@ def diagnosed(folder: Path, lags: tuple[float, ...]) -> Document:
     return diagnose(read_data_set(write(folder / "set", ROBOT, runs))).document
 
 
+@pytest.mark.slow
 def test_a_lag_of_all_joints_is_taken_out_and_said(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, (1.5e-3,) * 3)
     assert found.causes == ()
     assert "1.5 ms later than positions" in found.cutoff.why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lags", "joints"),
     [((0.0, 4e-3, 0.0), {"joint_2"}), ((20e-3,) * 3, {"joint_1", "joint_2", "joint_3"})],

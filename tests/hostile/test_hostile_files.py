@@ -76,6 +76,7 @@ def _cases(names: list[str]) -> list[object]:
     return [pytest.param(name, marks=[marks[name]] if name in marks else [], id=name) for name in names]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", _cases(sorted(FILES.keys() - {"10000 columns.parquet"})))  # which is read below
 def test_each_is_refused_in_a_line_or_read(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
@@ -90,6 +91,7 @@ def test_each_is_refused_in_a_line_or_read(name: str, tmp_path: Path) -> None:
     assert re.match(REFUSED[name], said.removeprefix(str(path))), said
 
 
+@pytest.mark.slow
 def test_time_grows_with_columns_and_not_with_their_square(tmp_path: Path) -> None:
     path = tmp_path / "run.parquet"
     FILES["10000 columns.parquet"](path)

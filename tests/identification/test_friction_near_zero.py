@@ -45,6 +45,7 @@ def left(robot: Robot, motions: list[Motion]) -> np.ndarray:
     return fit_torque(Stack(robot, EFFECTS), motions)[1].noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.006, 0.02])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_soft_law_is_followed_and_its_friction_found(law: str, width: float) -> None:

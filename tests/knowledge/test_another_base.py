@@ -28,6 +28,7 @@ from irtwin.serve.pool import AnswerHead
 from irtwin.serve.protocol import Refusal
 from irtwin.storage.database import Workspace
 
+pytestmark = pytest.mark.slow
 PLANT = "https://plant.example/energy/"
 # What has blank nodes, and which database and statements the rest was made of.
 UNLIKE = (GRAPH_ONTOLOGY, f"{GRAPH_SOURCE}version", GRAPH_REASONED)

@@ -62,6 +62,7 @@ def beside(ontology: set[Triple], facts: set[Triple]) -> set[Triple] | None:
         return None
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.lists(st.sampled_from(AXIOMS), unique=True), st.lists(st.sampled_from(FACTS), unique=True, max_size=12))
 @example(
@@ -77,6 +78,7 @@ def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
         assert found is None or any(one.predicate.value.endswith("#sameAs") for one in found)
 
 
+@pytest.mark.slow
 def test_facts_that_come_later(two_robots: list[Quad]) -> None:
     ontology, facts = ontology_graph().triples(), sorted((quad.triple for quad in two_robots), key=str)
     schema = Schema(ontology)

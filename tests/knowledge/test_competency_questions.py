@@ -68,6 +68,7 @@ def test_forty_questions_that_people_ask_need_what_is_concluded() -> None:
     assert len([question for question in needy if question.theme in PEOPLE_ASK]) >= 40
 
 
+@pytest.mark.slow
 def test_a_question_needs_the_conclusions_that_it_names_and_no_others(graph: KnowledgeGraph) -> None:
     """Its header names them: without any one of these it answers otherwise; one that names none answers the same."""
     answers = {name: list(ask(graph, name)) for name in QUESTIONS}
@@ -223,6 +224,7 @@ def test_effects_and_joints_add_up_to_the_modelled_energy(graph: KnowledgeGraph)
     assert joules(ask(graph, "energy_per_joint")) == pytest.approx(joules(of_joints))
 
 
+@pytest.mark.slow
 def test_a_ledger_that_is_not_whole_is_told(graph: KnowledgeGraph) -> None:
     assert [str(one) for one in validate(graph)] == []
     lost = {

@@ -59,6 +59,7 @@ def found(store: Store, rule: Path) -> set[str]:
     return {row["term"].value.rsplit("#")[-1] for row in store.query(rule.read_text(encoding="utf-8"))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.stem)
 def test_the_ontology_keeps_the_rule(ontology: Store, rule: Path) -> None:
     assert found(ontology, rule) == set(), rule.read_text(encoding="utf-8").splitlines()[0]

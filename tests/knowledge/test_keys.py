@@ -24,6 +24,7 @@ def said(text: str) -> list[Quad]:
     return list(in_graph(turtle(HERE + text), GRAPH_ASSERTED))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "same"),
     [
@@ -42,6 +43,7 @@ def test_a_key_says_what_is_the_same(graph: KnowledgeGraph, text: str, same: str
     assert [row["other"] for row in rows] == ([f"{ID}{same}"] if same else [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "why"),
     [

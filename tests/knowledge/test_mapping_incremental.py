@@ -264,6 +264,7 @@ def fleet(database_url: str | None, tmp_path: Path) -> Iterator[Workspace]:
         yield place
 
 
+@pytest.mark.slow
 def test_a_workspace_is_followed(fleet: Workspace) -> None:
     documents = [file.path for file in fleet.resources.of("mappings")]
     with KnowledgeGraph() as graph:

@@ -63,6 +63,7 @@ def test_what_a_robot_takes_while_it_waits(graph: KnowledgeGraph) -> None:
     assert of(graph, "robot/Arm_D", "Waiting_Energy") is None  # no twin
 
 
+@pytest.mark.slow
 def test_without_an_interval_of_standby_there_is_none_of_the_saving(graph: KnowledgeGraph) -> None:
     with_one = [name for name in ("Arm_A", "Arm_B") if of(graph, f"robot/{name}", "Yearly_Saving_Lower") is not None]
     assert with_one == ["Arm_A", "Arm_B"]

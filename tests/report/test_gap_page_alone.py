@@ -32,6 +32,7 @@ def data_set() -> DataSet:
     return DataSet(Path("arm"), robot, tuple(runs), None, 20.0, "dc_bus", simulated=False, notes={})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "verdict",
     [

@@ -110,6 +110,7 @@ my:Night_Run a owl:Class ; rdfs:subClassOf irt:IR_RunProcess ; rdfs:comment "Mad
 """
 
 
+@pytest.mark.slow
 def test_what_extends_a_workspace_stands_on_the_page(tmp_path: Path) -> None:
     (tmp_path / "ontology").mkdir()
     (tmp_path / "ontology/shifts.ttl").write_text(OWN)

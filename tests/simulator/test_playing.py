@@ -200,6 +200,7 @@ def stuck(table):
     return table.set_column(place, "q_lift", pa.array(np.radians(told) + jitter))
 
 
+@pytest.mark.slow
 def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     data, model = logs(tmp_path, change=stuck)
     irtwin_does("diagnose", data, "--simulator", model)
@@ -258,6 +259,7 @@ def test_torque_without_its_sign_is_said_and_left_out(tmp_path):
     assert said.err.count("tau_abs_JOINT is torque without its sign") + said.out.count("without its sign") == 1
 
 
+@pytest.mark.slow
 def test_commands_that_the_model_clips_and_joints_that_the_robot_lacks_are_said(tmp_path):
     text = servo_arm.MODEL.replace("-1.5 1.5", "-0.8 0.8", 1)
     door = '<body><joint name="door"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'

@@ -157,6 +157,7 @@ def test_a_file_without_a_model_is_refused(tmp_path):
         read(tmp_path, "<sdf version='1.9'/>")
 
 
+@pytest.mark.slow
 def test_long_chains_and_large_files_are_refused(tmp_path):
     links = "".join(f'<link name="l{k}"/>' for k in range(3000))
     joints = "".join(

@@ -44,6 +44,7 @@ def test_nobody_but_the_gate_makes_a_path_of_a_workspace() -> None:
     assert makers == ["files.py"]
 
 
+@pytest.mark.slow
 def test_a_path_of_a_workspace_is_made_of_names_that_stand_in_the_code() -> None:
     # A name that comes from a row, an archive or the graph goes through `Workspace.file` or `files.inside`.
     source = Path(files.__file__).parents[1]

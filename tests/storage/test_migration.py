@@ -129,6 +129,7 @@ def test_rows_that_another_program_wrote_are_not_migrated(tmp_path: Path, later:
         assert migration.revision(connection) == BEFORE
 
 
+@pytest.mark.slow
 def test_killed_in_the_middle_it_leaves_the_old_tables(tmp_path: Path, later: Path) -> None:
     with Workspace(tmp_path / "place") as place:
         older(place)

@@ -27,12 +27,14 @@ def of_stribeck(effects):
     return [one for one in effects if isinstance(one, Effect) and one.id == "stribeck_friction"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_named_gets_the_shape_that_the_motions_show():
     effects = shaped(ROBOT, [[sticking(1), sticking(2)]], [*BASELINE, "stribeck_friction"])
     assert set(BASELINE) <= set(effects)
     assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(effects))
 
 
+@pytest.mark.slow
 def test_a_shape_lies_between_those_that_are_tried_where_motions_say_so():
     side = [sticking(seed, 0.14, 1.4) for seed in (1, 2)]
     effects = of_stribeck(shaped(ROBOT, [side], [*BASELINE, "stribeck_friction"]))
@@ -40,6 +42,7 @@ def test_a_shape_lies_between_those_that_are_tried_where_motions_say_so():
     assert all(one.vs == pytest.approx(0.14, rel=0.1) and one.d == pytest.approx(1.4, rel=0.1) for one in effects)
 
 
+@pytest.mark.slow
 def test_sides_of_other_friction_share_the_shape_that_one_of_them_shows():
     never_sticks = replace(measure(ROBOT, swing(ROBOT, 3), noise=0.1, seed=3), power=None)
     found = of_stribeck(shaped(ROBOT, [[never_sticks], [sticking(1)]], [*BASELINE, "stribeck_friction"]))
@@ -56,6 +59,7 @@ def test_motions_without_torque_leave_shapes_open():
     assert shaped(ROBOT, [[silent]], ["stribeck_friction"]) == ("stribeck_friction",)
 
 
+@pytest.mark.slow
 def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
     def curved(seed):
         motion = sticking(seed, speed=0.1)
@@ -67,6 +71,7 @@ def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
         assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(found))
 
 
+@pytest.mark.slow
 def test_sides_whose_power_was_measured_share_a_shape_of_power():
     sides = [[measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed)] for seed in (1, 2)]
     found = shaped(ROBOT, sides, [*BASELINE, "meter_lag"])
