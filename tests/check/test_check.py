@@ -254,7 +254,7 @@ def test_a_measured_log_is_not_of_another_robot(log: str, robot: str):
 @pytest.mark.parametrize(
     ("name", "joint"),
     [
-        (name, joint)
+        pytest.param(name, joint, marks=() if joint in (1, 3) else pytest.mark.nightly)
         for name in ("panda_gaz", "staubli_tx40", "ur10", "franka_panda")
         for joint in range(7 if "panda" in name else 6)
         if (name, joint) != ("franka_panda", 4)  # whose friction and gravity say too little

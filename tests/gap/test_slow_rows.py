@@ -73,8 +73,10 @@ def diagnosed(folder: Path, law: Callable[[np.ndarray], np.ndarray], way: float 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "way"),
-    [(lambda dq: np.tanh(dq / 0.008), 0.03), (lambda dq: np.arctan(dq / 0.015) * 2 / np.pi, 0.2)],
-    ids=["a joint that hardly moves", "long tails"],
+    [
+        pytest.param(lambda dq: np.tanh(dq / 0.008), 0.03, id="a joint that hardly moves"),
+        pytest.param(lambda dq: np.arctan(dq / 0.015) * 2 / np.pi, 0.2, id="long tails", marks=pytest.mark.nightly),
+    ],
 )
 def test_a_turn_that_few_blocks_show_or_no_width_describes_is_no_cause(tmp_path: Path, law, way: float) -> None:
     found = diagnosed(tmp_path, law, way)

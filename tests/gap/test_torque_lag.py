@@ -39,8 +39,12 @@ def test_a_lag_of_all_joints_is_taken_out_and_said(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("lags", "joints"),
-    [((0.0, 4e-3, 0.0), {"joint_2"}), ((20e-3,) * 3, {"joint_1", "joint_2", "joint_3"})],
-    ids=["of one joint", "longer than filters make it"],
+    [
+        pytest.param((0.0, 4e-3, 0.0), {"joint_2"}, id="of one joint"),
+        pytest.param(
+            (20e-3,) * 3, {"joint_1", "joint_2", "joint_3"}, id="longer than filters make it", marks=pytest.mark.nightly
+        ),
+    ],
 )
 def test_another_delay_is_told(tmp_path: Path, lags: tuple[float, ...], joints: set[str]) -> None:
     found = diagnosed(tmp_path, lags)

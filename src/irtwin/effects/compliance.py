@@ -68,9 +68,8 @@ def _mass_matrices(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray
     rows = np.arange(-motion.start % every, len(motion.time), every)
     known = np.empty((len(rows), model.nv, model.nv))
     for row, q in enumerate(motion.q[rows]):
-        upper = np.triu(pin.crba(model, data, q))
-        known[row] = upper + np.triu(upper, 1).T
-    return rows, known
+        known[row] = pin.crba(model, data, q)  # whose lower half is left as it was
+    return rows, np.triu(known) + np.triu(known, 1).swapaxes(1, 2)
 
 
 def _dragged(robot: Robot, motion: Motion, acting: Sequence[int], predicted: Predicted | None) -> np.ndarray:
