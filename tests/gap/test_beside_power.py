@@ -12,7 +12,7 @@ from irtwin.effects.catalogue import BASELINE, catalogue
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
-from irtwin.gap.isolation.beside_power import find_beside_power
+from irtwin.gap.isolation.beside_power import SearchBesidePower
 from irtwin.gap.isolation.finding import estimate_of, find
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
 from irtwin.gap.regression.channel_equations import torque_system
@@ -64,7 +64,7 @@ def found(one: Case, *, power: bool = True):
         return find("torque", one, system, FLOOR.torque)
     drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
     before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
-    return find_beside_power(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR)[0]
+    return SearchBesidePower(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR).find()[0]
 
 
 def names(finding) -> list[str]:

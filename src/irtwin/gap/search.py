@@ -18,7 +18,7 @@ from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
-from irtwin.gap.isolation.beside_power import find_beside_power
+from irtwin.gap.isolation.beside_power import SearchBesidePower
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import ChannelFinding, estimate_of, find
@@ -127,10 +127,10 @@ class Search:
         """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
         case, known = self.case, (self.unknown, self.refused)
         if case.shows("power"):
-            possible = find_possible(case, lambda without: self._beside_power(tried, without), *known)
+            about = self.below, self.twin.torque, self.before
+            possible = find_possible(case, SearchBesidePower(case, self.stack, tried, *about, self.floor).find, *known)
         else:
-            about = case.with_torque, case.grouping, tried[0], self.below, case.shaken
-            system = torque_system(self.stack, *about)
+            system = torque_system(self.stack, case.with_torque, case.grouping, tried[0], self.below, case.shaken)
             possible = find_possible(case, lambda without: self._of_torque(system, without), *known)
         finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
@@ -172,10 +172,6 @@ class Search:
         tell(f"Trying every effect on torque again, as {' and '.join(reasons)}")
         found = tuple(added(self.case, causes))
         return replace(self, case=case.with_friction_near_zero(found), unknown=unknown, found=found)
-
-    def _beside_power(self, tried: Tried, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-        about = self.below, self.twin.torque, self.before
-        return find_beside_power(self.case, self.stack, tried, *about, self.floor, without=without)
 
     def _of_torque(self, system: System, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
         first = find("torque", self.case, system, self.floor.torque, without)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, attributed
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without
 from irtwin.gap.regression.candidate_columns import Below
-from irtwin.gap.regression.channel_equations import Torque
+from irtwin.gap.regression.channel_equations import Pairs, Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.identification.power_line import power_slope
@@ -25,39 +26,54 @@ from irtwin.identification.power_line import power_slope
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
 
-def find_beside_power(
-    case: Case,
-    stack: Stack,
-    effects: tuple[Sequence[Effect], Sequence[Effect]],
-    below: Below,
-    predicted: Torque,
-    before: TwinPower,
-    floor: Floor,
-    *,
-    without: Set[Without] = frozenset(),
-) -> tuple[ChannelFinding, Floor]:
-    """Find the causes of torque, `without` some effects; return them with the floor that they leave.
+@dataclass(frozen=True)
+class SearchBesidePower:
+    """The search for the causes of torque that explain power, too.
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
-    `predicted` the joint torque by the twin, `before` the power that it takes. Where real torque was found, the search
-    is repeated with the floor that is left, and with power linear about that torque if losses, which grow with its
-    square, make a difference.
+    `predicted` the joint torque by the twin, `before` the power that it takes.
     """
 
-    def about(torque: Torque, power: TwinPower, level: Floor) -> ChannelFinding:
-        both = joint_equations(stack, case.measured, case.grouping, effects, below, torque, power, case.shaken)
-        return _find(case, both, level, without)
+    case: Case
+    stack: Stack
+    effects: tuple[Sequence[Effect], Sequence[Effect]]
+    below: Below
+    predicted: Torque
+    before: TwinPower
+    floor: Floor
 
-    first = about(predicted, before, floor)
-    if not any(cause.carries_power for cause in first.causes):
-        return first, floor
-    explained = ExplainedTorque(stack, first, below)
-    power = TwinPower(stack, case.with_power, case.grouping, explained)
-    left = floor_left(case, floor, explained, power)
-    if _bend(case, stack, (predicted, before), (explained, power)) > _STRAIGHT * power.system.noise_before[0]:
-        return about(explained, power, left), left
-    return replace(first, signal_floor=left.torque), left
+    @cached_property
+    def equations(self) -> JointEquations:
+        """Both equations, power linear about the twin's torque: worked out once, however often is searched."""
+        return self._about(self.predicted, self.before, self.case.shaken)
+
+    def find(self, without: Set[Without] = frozenset()) -> tuple[ChannelFinding, Floor]:
+        """Find the causes of torque, `without` some effects; return them with the floor that they leave.
+
+        Where real torque was found, the search is repeated with the floor that is left, and with power linear about
+        that torque if losses, which grow with its square, make a difference.
+        """
+        case, stack = self.case, self.stack
+        first = _find(case, self.equations, self.floor, without)
+        if not any(cause.carries_power for cause in first.causes):
+            return first, self.floor
+        explained = ExplainedTorque(stack, first, self.below)
+        power = TwinPower(stack, case.with_power, case.grouping, explained)
+        left = floor_left(case, self.floor, explained, power)
+        if (
+            _bend(case, stack, (self.predicted, self.before), (explained, power))
+            > _STRAIGHT * power.system.noise_before[0]
+        ):
+            again = self._about(explained, power).with_noise_of(self.equations)
+            return _find(case, again, left, without), left
+        return replace(first, signal_floor=left.torque), left
+
+    def _about(self, torque: Torque, power: TwinPower, shaken: Pairs = ()) -> JointEquations:
+        case = self.case
+        return joint_equations(
+            self.stack, case.measured, case.grouping, self.effects, self.below, torque, power, shaken
+        )
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:

@@ -38,6 +38,11 @@ class JointEquations:
         ]
         return replace(variant, columns=tuple(moved))
 
+    def with_noise_of(self, other: JointEquations) -> JointEquations:
+        """Return them with what noise of positions does to others of the same columns."""
+        whole = replace(self.whole, shaken=other.whole.shaken, shaken_twin=other.whole.shaken_twin)
+        return JointEquations(whole, replace(self.torque, shaken_twin=other.torque.shaken_twin))
+
     def in_whole(self, column: int) -> int:
         """Return the index of a candidate column of torque alone among those of both."""
         if column < self.torque.changed:
