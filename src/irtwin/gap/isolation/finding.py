@@ -59,12 +59,12 @@ class ChannelFinding:
     plain: System | None = None
     both: BothChannels | None = None
 
-    @property
+    @cached_property
     def floor(self) -> np.ndarray | None:
         """(g,) the noise floor, RMS."""
         return self.steadied.floor(self.signal_floor)
 
-    @property
+    @cached_property
     def floor_within(self) -> np.ndarray | None:
         """(g,) the same within a run, where no dry friction turns."""
         return self.steadied.within(self.signal_floor)
