@@ -112,7 +112,7 @@ class Alone:
         q, v = (np.broadcast_to(state, commanded.shape[1:]).copy() for state in self.begun)
         followed, off, force, held = q.copy(), *np.empty((3, *q.shape))
         # of one shape and in place: at each step these take most of the time of a fit
-        stiffness, servo, joint, least, most, drive, friction = (
+        stiffness, servo, joint, least, most, negative, friction = (
             np.broadcast_to(of, q.shape).copy() for of in (stiffness, servo, joint, least, most, -friction, friction)
         )
         moved[0, 0] = q
@@ -139,7 +139,7 @@ class Alone:
                 force -= spring * (q - rest)
             np.multiply(speed_held[within], v, out=held)
             held += np.multiply(force, firm[within], out=off)
-            np.maximum(held, drive, out=held)
+            np.maximum(held, negative, out=held)
             force -= np.minimum(held, friction, out=held)
             force *= gained[within]
             v += force
