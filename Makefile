@@ -26,10 +26,10 @@ coverage:
 test: $(VENV)/test
 	$(MAKE) -j2 lint suite
 
-# Three processes a core: many tests wait for a server, a browser or a clock. A module is one process's, so that what its
+# Five processes for two cores: many tests wait for a server, a browser or a clock. A module is one process's, so that what its
 # tests share is made once; the next is taken in the order of tests/conftest.py.
 suite: $(VENV)/test
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 3 )) --dist loadfile --no-loadscope-reorder -m "not nightly"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(( $$(nproc) * 5 / 2 )) --dist loadfile --no-loadscope-reorder -m "not nightly"
 
 # What repeats at length what other tests hold in short.
 nightly: $(VENV)/test
