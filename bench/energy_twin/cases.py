@@ -52,15 +52,18 @@ class Case:
     plant: Callable[[PlantMotion, PlantPayload, np.random.Generator], np.ndarray]
 
 
-def cases(seeds: Sequence[int], only: str = "") -> Iterator[Case]:
-    """Yield each robot of each plant, with and without what is more than losses of drives; `only` in their names."""
+def cases(seeds: Sequence[int], only: str = "", *, motor_current: bool = False) -> Iterator[Case]:
+    """Yield each robot of each plant, with and without what is more than losses of drives; `only` in their names.
+
+    `motor_current`: torque is logged as that of the motors, none while brakes are closed.
+    """
     for exact, robot, more, seed in product((True, False), ROBOTS, (False, True), seeds):
         name = f"{'exact' if exact else 'plant'} {ROBOTS[robot]}{' more' if more else ''} {seed}"
         if only in name:
-            yield _case(name, robot, seed, exact=exact, more=more)
+            yield _case(name, robot, seed, exact=exact, more=more, motor_current=motor_current)
 
 
-def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
+def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool, motor_current: bool) -> Case:
     drawings = replace(read_drawings(robot), step=STEP)
     machine = build(drawings, 300 + seed)
     rng = np.random.default_rng([7, seed, exact, more])
@@ -95,7 +98,7 @@ def _case(name: str, robot: str, seed: int, *, exact: bool, more: bool) -> Case:
         if more:
             parts["holding_brakes"] = BRAKES * (released if exact else brakes_released(replace(traces, dq=told), STEP))
             drawn = drawn + parts["holding_brakes"]
-        return traces, drawn, parts
+        return (driven if motor_current else traces), drawn, parts
 
     traces, drawn, parts = executed(motions, PlantPayload(), rng)
     sensed = shown(traces, machine, (), STEP)[::STRIDE]

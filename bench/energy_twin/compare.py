@@ -167,10 +167,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--only", default="", help="cases whose name has this word")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=[one for one in METHODS if one != FIGAROH])
+    parser.add_argument("--motor-current", action="store_true", help="torque is logged as that of the motors")
     parser.add_argument("--figaroh", metavar="PYTHON", default="", help="the python that has figaroh, for its method")
     arguments = parser.parse_args()
     kinds: dict[str, dict[str, list[Row]]] = {}
-    for case in cases(arguments.seeds, arguments.only):
+    for case in cases(arguments.seeds, arguments.only, motor_current=arguments.motor_current):
         kind = f"{case.name.split()[0]}{', more' if ' more ' in case.name else ''}"
         for name, row in methods(case, arguments.methods, arguments.figaroh).items():
             kinds.setdefault(kind, {}).setdefault(name, []).append(row)
