@@ -55,16 +55,22 @@ def case(
     return Case(ROBOT, (*BASELINE, "copper_loss"), tuple(runs), motions, (ROBOT, motions), DEFAULT)
 
 
-def found(one: Case, *, power: bool = True):
+def searching(one: Case) -> SearchBesidePower:
     stack = Stack(ROBOT, one.effects)
     plain = LeftOut(stack, torque_system(stack, one.with_torque, one.grouping, (), None))
-    tried = [shape for name in TRIED for shape in catalogue()[name].candidates(ROBOT)]
-    if not power:
-        system = torque_system(stack, one.with_torque, one.grouping, tried, plain.below)
-        return find("torque", one, system, FLOOR.torque)
-    drawn = [shape for name in DRAWN for shape in catalogue()[name].candidates(ROBOT)]
+    tried, drawn = (
+        [shape for name in some for shape in catalogue()[name].candidates(ROBOT)] for some in (TRIED, DRAWN)
+    )
     before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
-    return SearchBesidePower(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR).find()[0]
+    return SearchBesidePower(one, stack, (tried, drawn), plain.below, plain.torque, before, FLOOR)
+
+
+def found(one: Case, *, power: bool = True):
+    search = searching(one)
+    if power:
+        return search.find()[0]
+    system = torque_system(search.stack, one.with_torque, one.grouping, search.effects[0], search.below)
+    return find("torque", one, system, FLOOR.torque)
 
 
 def names(finding) -> list[str]:
@@ -100,7 +106,6 @@ def test_power_at_rest_is_that_of_the_torque_which_friction_left_there():
     assert names(found(one)) == []
 
 
-@pytest.mark.slow
 def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     finding = found(case(real=3.0))
     assert names(finding) == ["asymmetric_friction missing joint_2"]
@@ -109,7 +114,20 @@ def test_friction_that_an_offset_of_the_twin_imitates_costs_power():
     assert offset == pytest.approx(truth(ROBOT)["c"][1], abs=0.3)  # of the sensor alone
 
 
-@pytest.mark.slow
+def test_a_search_without_what_was_refused_works_no_equation_out_anew(monkeypatch: pytest.MonkeyPatch):
+    made = []
+
+    def counted(*about):
+        made.append(about)
+        return joint_equations(*about)
+
+    monkeypatch.setattr("irtwin.gap.isolation.beside_power.joint_equations", counted)
+    search = searching(case(shown=3.0, changed=True))
+    assert names(search.find()[0]) == ["torque_offset changed joint_2"]
+    assert names(search.find({"torque_offset"})[0]) != ["torque_offset changed joint_2"]
+    assert len(made) == 1
+
+
 def test_the_estimate_stands_on_power_too():
     finding = found(case(real=3.0, cable=6.0))
     assert sorted(names(finding)) == ["asymmetric_friction missing joint_2", "cable_drag missing joint_1"]
@@ -119,7 +137,6 @@ def test_the_estimate_stands_on_power_too():
     assert abs(finding.estimate.values[place] - true) < abs(alone - true) / 2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made", "of"),
     [({"real": 3.0}, "the gap of torque and power above the floor"), ({"cable": 6.0}, "the gap above the floor")],
