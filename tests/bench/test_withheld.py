@@ -60,7 +60,6 @@ def test_a_sham_keeps_what_noise_remembers_and_loses_what_is_missing():
     assert not diagnose(nothing_missing).causes
 
 
-@pytest.mark.slow
 def test_a_centred_sham_has_no_mean_of_its_own():
     healthy = logged()
     full = fitted(healthy)

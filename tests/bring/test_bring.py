@@ -109,7 +109,6 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
     assert_same(read_data_set(tmp_path / "set"), "q torque")
 
 
-@pytest.mark.slow
 def test_a_motion_without_torque_asks_which_columns_are_it(tmp_path: Path) -> None:
     columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
     log = write_text(tmp_path / "run.csv", columns)

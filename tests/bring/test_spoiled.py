@@ -111,7 +111,6 @@ def written(folder: Path, spoiled: Spoiled) -> tuple[Path, Path]:
     return log, data_set
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fault", TWELVE)
 def test_check_says_what_is_wrong(tmp_path: Path, fault: str) -> None:
     spoiled = TWELVE[fault]
@@ -120,7 +119,6 @@ def test_check_says_what_is_wrong(tmp_path: Path, fault: str) -> None:
     assert said.status == (2 if spoiled.stops else 0)
 
 
-@pytest.mark.slow
 def test_check_says_which_key_of_the_robot_is_misspelt_and_what_it_dropped(tmp_path: Path) -> None:
     _, data_set = written(tmp_path, TWELVE["a stamp twice"])
     file = data_set / "dataset.toml"

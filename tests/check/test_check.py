@@ -181,7 +181,6 @@ def test_held_torques_are_joined_by_lines():
     assert np.abs(mended - smooth)[:, 1].mean() < before
 
 
-@pytest.mark.slow
 def test_what_stands_is_not_joined_over():
     def stands(signals: Signals) -> Signals:
         torque = np.array(signals.torque)
@@ -197,7 +196,6 @@ def test_a_robot_that_stands_has_nothing_to_say():
     assert found(still) == set()
 
 
-@pytest.mark.slow
 def test_the_command_writes_its_findings_and_ends_with_2(tmp_path: Path):
     faulty = spoilt(healthy(), one("torque", 2, np.zeros_like))
     folder, out = write(tmp_path / "set", ROBOT, faulty.runs), tmp_path / "found.json"

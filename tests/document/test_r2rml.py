@@ -53,7 +53,6 @@ def _individual(table: Table) -> str:
     return table.individual.name
 
 
-@pytest.mark.slow
 def test_the_ontology_declares_each_property(ontology: Store) -> None:
     missing = [one for one in sorted(set(properties())) if not declared(ontology, *one)]
     assert missing == [], "declare these, of their class and with their range, in ontology/gap.ttl"

@@ -27,7 +27,6 @@ def test_odd_robots_and_spoilt_logs_come_to_an_answer_or_to_one_line(tmp_path: P
     assert fault is None, f"{fault.kind}\n{fault.said}\n{case.to_json()}"
 
 
-@pytest.mark.slow
 @settings(max_examples=50)
 @given(cases())
 def test_a_case_that_is_kept_reads_as_it_was(case: Case):

@@ -80,7 +80,6 @@ def test_one_run_is_held_at_a_time():
     assert asked == [MOTION.run, "other"]
 
 
-@pytest.mark.slow
 def test_gaps_are_moved_once_in_each_piece_of_a_run(monkeypatch):
     moved = []
 

@@ -87,7 +87,6 @@ def test_oil_that_thins_needs_no_proof_where_joints_were_logged_cold_and_warm():
     assert "temperature_dependent_friction" not in begin([cold, cold])
 
 
-@pytest.mark.slow
 def test_runs_that_show_nothing_leave_the_effects_of_every_robot():
     data, motions = logged()
     short = replace(data, runs=tuple(replace(run, signals=run.signals.rows(np.arange(60))) for run in data.runs[:1]))

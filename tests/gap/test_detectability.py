@@ -28,7 +28,6 @@ def run():
 WITHOUT_VISCOUS = tuple(effect for effect in BASELINE if effect != "viscous_friction")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("altering", "signal", "twin", "tried"), [
     (WARM, "power", BASELINE, False),
     (WARM, "power", (*BASELINE, "copper_loss"), True),

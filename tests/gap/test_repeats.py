@@ -60,7 +60,6 @@ def wandering(count, memory, rng):
     return found / found.std()
 
 
-@pytest.mark.slow
 def test_all_motions_have_the_cutoff_that_is_stated_or_found():
     found = repeated()
     assert not found.cutoff.stated
@@ -71,7 +70,6 @@ def test_all_motions_have_the_cutoff_that_is_stated_or_found():
     assert stated.cutoff.hz == 7.25 != found.cutoff.hz
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [0.5, 2.9, 12.0, 30.0])
 def test_a_torque_that_swings_is_a_line_at_its_joint(frequency):
     case = repeated(lambda k, t: in_joint_2(3.0 * np.sin(2 * np.pi * frequency * t + 2.0 * k)))
@@ -130,7 +128,6 @@ def test_phases_of_a_line_are_in_the_interval_of_its_amplitude(apart):
     assert said["A"].lower < 3.0 < said["A"].upper
 
 
-@pytest.mark.slow
 def test_a_slow_line_is_no_drift_that_runs_share():
     case = repeated(lambda k, t: in_joint_2(9.0 * np.sin(2 * np.pi * 0.32 * t + 0.3 * k)))
     assert [one.kind for one in disturbances(case)] == ["line"]
@@ -159,7 +156,6 @@ def test_an_offset_that_both_runs_share_repeats():
     assert disturbances(repeated(lambda k, t: in_joint_2(4.0 + 0 * t))) == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("times", "count"), [(0.4, 0), (1.2, 1)])
 def test_an_offset_matters_from_half_of_the_noise_on(times, count):
     quiet = repeated()

@@ -72,7 +72,6 @@ def diagnosed(folder: Path, changed: float) -> Document:
     return diagnose(read_data_set(write(folder / "set", arm(2), runs))).document
 
 
-@pytest.mark.slow
 def test_an_offset_that_changed_by_more_than_runs_differ_is_told_and_closes_the_gap(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 1.0)
     assert [(cause.effect, cause.joints, cause.scope) for cause in found.causes] == [

@@ -68,7 +68,6 @@ def test_a_contact_hides_behind_a_payload_of_all_observed_runs():
     assert of_runs(Payload, (4, 5, 6, 7)) not in tried  # as a change it is tried anyway
 
 
-@pytest.mark.slow
 def test_each_is_tried_where_it_is_alone():
     assert of_runs(Payload, (1, 4, 5)) in screened(loaded=(1, 4, 5), touched=())
     assert of_runs(ExternalContact, (1, 2, 6)) in screened(loaded=(), touched=(1, 2, 6))

@@ -102,7 +102,6 @@ def test_factors_of_blocks_combine_to_that_of_all_rows():
     np.testing.assert_allclose(whole.T @ whole, np.insert(np.insert(rows.T @ rows, 1, 0, 0), 1, 0, 1), atol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.95])
 def test_intervals_cover_the_truth_though_samples_are_correlated(correlation):
     """Slow regressors under slow noise: intervals that take samples as independent would cover a third of the time."""

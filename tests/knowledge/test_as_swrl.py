@@ -66,7 +66,6 @@ def test_the_shipped_rules_say_the_same_in_swrl(graph: KnowledgeGraph) -> None:
     assert left_out["dominant joint"] == "SWRL has no subqueries or VALUES"
 
 
-@pytest.mark.slow
 def test_the_limits_are_those_of_the_graph(graph: KnowledgeGraph) -> None:
     limit, value = NamedNode(LIMIT + "idle_share"), NamedNode(term("Limit_Value"))
     said = (one for one in graph.triples(GRAPH_ONTOLOGY) if (one.subject, one.predicate) != (limit, value))

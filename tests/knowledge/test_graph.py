@@ -61,7 +61,6 @@ def test_many_new_quads_go_into_files_of_their_own_and_count_once(tmp_path: Path
         assert total(graph) == 10_000.0
 
 
-@pytest.mark.slow
 def test_files_of_several_loads_are_merged(tmp_path: Path) -> None:
     def files() -> int:
         return len(list((tmp_path / "graph").glob("*.sst")))

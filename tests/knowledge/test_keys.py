@@ -24,7 +24,6 @@ def said(text: str) -> list[Quad]:
     return list(in_graph(turtle(HERE + text), GRAPH_ASSERTED))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "same"),
     [
@@ -43,7 +42,6 @@ def test_a_key_says_what_is_the_same(graph: KnowledgeGraph, text: str, same: str
     assert [row["other"] for row in rows] == ([f"{ID}{same}"] if same else [])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "why"),
     [

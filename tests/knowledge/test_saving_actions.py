@@ -11,8 +11,6 @@ from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.shacl.validation import validate
 from irtwin.knowledge.store.graph import KnowledgeGraph
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def graph(plant_place: Path) -> KnowledgeGraph:

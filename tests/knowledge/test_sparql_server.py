@@ -36,7 +36,6 @@ def served(server_url: str, two_robots: list[Quad]) -> KnowledgeGraph:
     return graph
 
 
-@pytest.mark.slow
 def test_every_question_has_the_answer_of_the_embedded_store(served: KnowledgeGraph, graph: KnowledgeGraph) -> None:
     assert served.graphs() == graph.graphs()
     for name in named_questions():

@@ -69,7 +69,6 @@ def test_what_breaks_a_constraint_is_suspected(said: str) -> None:
     assert kept or said in (SHAPES["two"], SHAPES["list of numbers"], *UNKNOWN)
 
 
-@pytest.mark.slow
 def test_each_shape_that_ships_is_known():
     graph = ontology_graph()
     by_hand = [triple for file in graph.resources.of("shapes") for triple in read_turtle(file.path)]

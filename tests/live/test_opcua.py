@@ -167,7 +167,6 @@ def test_a_node_that_hangs_while_its_status_is_good_is_refused(served: ServedRob
     assert it.said == []
 
 
-@pytest.mark.slow
 def test_a_connection_that_is_lost_is_made_again(served: ServedRobot) -> None:
     with Followed(served) as it:
         it.until(lambda: len(it.states) > 10)

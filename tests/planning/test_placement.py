@@ -25,7 +25,6 @@ def swing(amplitude: float, joints: int = 6, seconds: float = 2.0) -> Motion:
     return Motion(time, q, dq, ddq, run="weld")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("joints", [6, 7])  # an arm of seven has many ways to follow
 def test_the_flange_keeps_its_way_and_the_energy_falls(joints: int) -> None:
     known, was = twin(joints=joints), swing(0.4, joints=joints)

@@ -39,7 +39,6 @@ def test_one_that_is_not_installed_is_told(graph: KnowledgeGraph) -> None:
         check_effects(graph)
 
 
-@pytest.mark.slow
 def test_nothing_is_stored_of_a_run_whose_effects_are_not_described(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

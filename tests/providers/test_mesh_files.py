@@ -52,7 +52,6 @@ def test_the_graph_gives_back_the_meshes_without_the_data_set(tmp_path: Path) ->
         assert len(meshes[ARM].faces) > 100
 
 
-@pytest.mark.slow
 def test_a_mesh_that_was_changed_replaces_the_old_one(tmp_path: Path) -> None:
     data_set = mesh_robots.write(tmp_path / "data")
     with Workspace(tmp_path / "w") as workspace:

@@ -124,7 +124,6 @@ def test_a_cutoff_that_a_data_set_states_is_that_of_all_motions(workspace: Works
     assert {motion.cutoff for motion in after.motions.values()} == {7.25}
 
 
-@pytest.mark.slow
 def test_nothing_is_kept_of_a_workspace_that_is_gone(tmp_path: Path) -> None:
     gc.collect()
     kept = len(motions._kept)

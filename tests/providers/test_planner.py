@@ -63,7 +63,6 @@ def test_what_is_said_by_an_inverse_counts(graph):
     assert ends(ready(graph)["identification"]) == ["B"]
 
 
-@pytest.mark.slow
 def test_what_waits_says_what_it_lacks_and_why(graph):
     reason(graph)
     assert waiting(graph) == {("B.1", "energy", "has_Twin")}

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 
 from irtwin.providers import identification
@@ -45,12 +44,10 @@ def parts(folder: Path, roles: list[str]) -> dict[str, str]:
     return {row.run_id[-1]: row.part for row in made.rows if isinstance(row, schema.TwinRun)}
 
 
-@pytest.mark.slow
 def test_a_simulators_runs_stay_apart_from_the_robots_twin(tmp_path: Path) -> None:
     assert parts(tmp_path, ["observed", "observed", "simulated"]) == {"0": "both", "1": "both", "2": "apart"}
 
 
-@pytest.mark.slow
 def test_a_robot_known_by_its_simulator_alone_has_a_twin_of_that(tmp_path: Path) -> None:
     assert set(parts(tmp_path, ["simulated", "simulated"]).values()) == {"both"}
 
@@ -83,7 +80,6 @@ def weighed(folder: Path, **said: object) -> tuple[schema.TwinRow, list[schema.P
     return row, [row for row in made.rows if isinstance(row, schema.ParameterRow)], json.loads(document)
 
 
-@pytest.mark.slow
 def test_a_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path: Path) -> None:
     row, parameters, document = weighed(tmp_path, notes={"torque_scale_uncertainty": 0.05})
     assert row.torque_scale_uncertainty == document["torque_scale"]["uncertainty"] == 0.05
@@ -96,14 +92,12 @@ def test_a_twin_says_how_sure_the_scale_of_its_torque_is(tmp_path: Path) -> None
     assert (written["lower"], written["upper"]) == (friction.lower, friction.upper)
 
 
-@pytest.mark.slow
 def test_a_twin_says_a_cutoff_that_was_stated(tmp_path: Path) -> None:
     row, _, document = weighed(tmp_path, cutoff=7.25)
     assert row.cutoff_hz == document["cutoff"] == 7.25
     assert row.cutoff_why == "stated"
 
 
-@pytest.mark.slow
 def test_a_simulators_torque_has_a_scale_that_is_exact(tmp_path: Path) -> None:
     row, parameters, _ = weighed(tmp_path, simulated=True)
     assert row.torque_scale_uncertainty == 0.0

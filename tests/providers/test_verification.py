@@ -163,7 +163,6 @@ def told(graph: KnowledgeGraph) -> dict[str, Any]:
     return dict(row)
 
 
-@pytest.mark.slow
 def test_what_is_done_is_verified_and_anew_with_each_run(opened: tuple[Workspace, KnowledgeGraph]) -> None:
     place, graph = opened
     update(opened, DONE)
@@ -185,7 +184,6 @@ def test_what_is_done_is_verified_and_anew_with_each_run(opened: tuple[Workspace
     assert told(graph)["result"] == "too few runs"
 
 
-@pytest.mark.slow
 def test_it_is_anew_with_what_is_asserted_and_goes_with_it(opened: tuple[Workspace, KnowledgeGraph]) -> None:
     place, graph = opened
     take(place, "after_2", "2026-04-11", 90.0)

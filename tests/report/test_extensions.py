@@ -59,7 +59,6 @@ def test_an_added_question_is_answered_on_the_page(graph: KnowledgeGraph, tmp_pa
     assert '<a href="#added">Further questions</a>' in page
 
 
-@pytest.mark.slow
 def test_a_template_of_a_workspace_is_kept_in_a_sandbox(graph: KnowledgeGraph, tmp_path: Path) -> None:
     shipped = (folder("reports") / "energy" / "page.html.jinja").read_text(encoding="utf-8")
     attack = "{{ ''.__class__.__mro__[1].__subclasses__() }}"

@@ -36,7 +36,6 @@ def test_a_run_cut_in_time_has_no_constant_power_beside_it(graph: KnowledgeGraph
     assert "constant" not in lead.trust(found)
 
 
-@pytest.mark.slow
 def test_switching_off_while_waiting_has_an_interval_or_is_not_said(graph: KnowledgeGraph) -> None:
     factory = six_axis(graph)  # 150 W of standby, 0.1 W up or down; a quarter of 120 s at rest
     reason(graph)

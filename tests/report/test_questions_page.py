@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
 from tests.data_sets import done
 
 from irtwin.knowledge.questions.queries import THEMES, named_questions
@@ -15,7 +14,6 @@ from irtwin.report.wording import shown
 from irtwin.resources import shipped
 
 
-@pytest.mark.slow
 def test_each_question_has_its_place_its_words_and_its_query(tmp_path: Path) -> None:
     out = tmp_path / "questions.html"
     ontology = tmp_path / "ontology.html"

@@ -14,7 +14,6 @@ from irtwin.resources import folder, resources_of
 from irtwin.serve.page import FOLDER
 
 
-@pytest.mark.slow
 def test_a_template_that_changed_is_compiled_again(tmp_path: Path) -> None:
     template = tmp_path / "reports" / "energy" / "mine.html.jinja"
     template.parent.mkdir(parents=True)

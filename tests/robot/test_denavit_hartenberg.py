@@ -83,7 +83,6 @@ def check_same(robot: Robot, convention: str, tip: str | None = None) -> ChainTa
     return table
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("convention", "matrix"), [("standard", standard), ("modified", modified)])
 @given(q=st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_the_flange_is_where_the_product_of_matrices_puts_it(convention, matrix, q):

@@ -93,7 +93,6 @@ def test_poses_of_work_are_free_and_those_in_which_it_hits_itself_are_not(shapes
     assert hits(shapes, q) == hit
 
 
-@pytest.mark.slow
 def test_few_of_all_poses_hit(shapes):
     draws = np.random.default_rng(0).uniform(ROBOT.model.lowerPositionLimit, ROBOT.model.upperPositionLimit, (500, 6))
     assert 0.02 < np.mean([hits(shapes, q) for q in draws]) < 0.15

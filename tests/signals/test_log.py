@@ -202,7 +202,6 @@ def test_repair_drops_bad_samples_and_says_which(tmp_path):
     assert any("line 51" in line for line in said)
 
 
-@pytest.mark.slow
 @given(bad=st.sets(st.integers(0, 49), max_size=20), value=st.sampled_from([math.nan, math.inf, -math.inf, 1e282]))
 def test_repair_keeps_exactly_the_good_samples(tmp_path_factory, bad, value):
     signals = columns()

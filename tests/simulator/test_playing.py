@@ -200,7 +200,6 @@ def stuck(table):
     return table.set_column(place, "q_lift", pa.array(np.radians(told) + jitter))
 
 
-@pytest.mark.slow
 def test_commands_of_a_joint_that_is_stuck_are_not_taken_for_degrees(tmp_path):
     data, model = logs(tmp_path, change=stuck)
     irtwin_does("diagnose", data, "--simulator", model)

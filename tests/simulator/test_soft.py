@@ -44,7 +44,6 @@ def test_a_soft_joint_is_found_in_place_of_what_stands_for_it(tmp_path, row, beg
     assert found.numbers[STIFFNESS, 0] == pytest.approx(own.numbers[STIFFNESS, 0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("robots", [{}, {"stiffness": (19.0, 15.0)}])
 def test_a_robot_that_is_not_soft_keeps_its_numbers(tmp_path, robots):
     _, before = chosen(tmp_path, robots, robots)

@@ -112,7 +112,6 @@ def test_gains_that_are_told_are_fitted_too_and_written_as_servos(tmp_path, caps
     assert found[:2] == pytest.approx(np.array(list(robot.values())), rel=0.03)
 
 
-@pytest.mark.slow
 def test_mujocos_own_fit_ends_at_the_robots_numbers(arm, tmp_path, capsys):
     """It begins a fifth beside them, and is told that the model lacks a dead band."""
     pytest.importorskip("tabulate", reason="mujoco[sysid] is not installed")

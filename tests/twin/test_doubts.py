@@ -32,7 +32,6 @@ def test_a_twin_that_fits_has_none():
     assert doubts(fitted()) == ()
 
 
-@pytest.mark.slow
 def test_a_contact_is_said_with_its_run_time_and_joint_and_moves_no_number():
     motions = [measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed) for seed in (1, 2)]
     plain = identify(ROBOT, motions)
@@ -59,7 +58,6 @@ def test_a_joint_that_stands_is_said_with_what_cures_it():
     assert said.startswith("the runs hardly move joint_2, so") and "irtwin robot excite" in said
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("ohm", "denied"), [(0.6, False), (1.4, False), (500.0, True), (0.1, True)])
 def test_a_data_sheet_that_the_runs_deny_is_said(ohm, denied):
     first, second = ROBOT.joints

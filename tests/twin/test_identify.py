@@ -44,7 +44,6 @@ def test_truth_is_found_under_wrong_inertias(robot):
     np.testing.assert_allclose(twin.joint_torque(new), twin.torque(new) - values(twin, "torque_offset"), atol=1e-9)
 
 
-@pytest.mark.slow
 def test_power_is_found_on_top_of_torque():
     robot = arm(4)
     motions = [measure(robot, swing(robot, seed), noise=0.3, seed=seed) for seed in range(3)]
@@ -60,7 +59,6 @@ def test_power_is_found_on_top_of_torque():
     assert twin.unidentified == ()
 
 
-@pytest.mark.slow
 def test_friction_that_the_twin_lacks_is_no_heat_of_drives():
     robot, true = with_constants(arm(4)), truth(arm(4))
 
@@ -221,7 +219,6 @@ def test_power_tells_friction_from_an_offset():
     assert friction.value == pytest.approx(2.0, abs=0.6)  # gravity is constant too, nearly
 
 
-@pytest.mark.slow
 def test_power_tells_a_torque_constant_that_is_off():
     robot = with_constants(arm(3))
     motions = [both_signals(robot, seed, gain=1.1) for seed in (1, 2)]
@@ -265,7 +262,6 @@ def test_nothing_to_fit():
         identify(robot, [measure(robot, swing(robot, 1))], ["stiction"])
 
 
-@pytest.mark.slow
 def test_a_long_log_says_the_same_read_in_part_first(monkeypatch):
     robot = with_constants(arm(3))
     motions = [replace(measure(robot, swing(robot, seed), noise=0.3, seed=seed), cutoff=20.0) for seed in range(3)]

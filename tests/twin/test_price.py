@@ -20,7 +20,6 @@ def fitted(noise: float, seed: int = 0):
     return identify(ROBOT, [measure(ROBOT, swing(ROBOT, of, seconds=10.0), noise, seed=seed) for of in (1, 2)])
 
 
-@pytest.mark.slow
 def test_energy_is_the_integral_of_power_and_runs_add_up():
     twin, first, second = fitted(0.1), swing(ROBOT, 7), swing(ROBOT, 8)
     one, other, both = price(twin, [first]), price(twin, [second]), price(twin, [first, second])
@@ -78,7 +77,6 @@ def test_what_was_never_seen_has_no_price():
     assert price(identify(ROBOT, motions), [swing(ROBOT, 7)]) is None
 
 
-@pytest.mark.slow
 def test_what_effects_leave_of_power_is_in_the_interval():
     """Runs that take more or less than each other, for no reason that a twin knows, take no less from then on."""
     motions = [measure(ROBOT, swing(ROBOT, of, seconds=10.0), 0.1, seed=of) for of in range(6)]

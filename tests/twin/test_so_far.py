@@ -36,7 +36,6 @@ def fed(of: EnergySoFar, samples: dict[str, np.ndarray], size: int) -> list:
     return stretches
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.nightly), 7, 100, 10**6])
 def test_in_pieces_it_takes_what_it_takes_as_a_whole(size: int) -> None:
     so_far = EnergySoFar(ROBOT.joint_names, TWIN)
@@ -110,7 +109,6 @@ def test_stamps_that_are_no_robot_s_make_no_filter_of_millions_of_samples() -> N
     assert fed(EnergySoFar(ROBOT.joint_names, TWIN), few, 50) == []
 
 
-@pytest.mark.slow
 def test_a_few_samples_are_no_energy_yet() -> None:
     so_far = EnergySoFar(ROBOT.joint_names, TWIN)
     assert fed(so_far, {name: values[:15] for name, values in columns().items()}, 5) == []

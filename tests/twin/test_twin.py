@@ -118,7 +118,6 @@ def test_a_twin_cannot_be_changed():
         TWIN.cutoff = 3.0
 
 
-@pytest.mark.slow
 def test_measured_torque_is_current_times_constant_where_no_torque_was_logged():
     motion = measure(ROBOT, swing(ROBOT, 1))
     np.testing.assert_array_equal(TWIN.measured_torque(motion), motion.torque)

@@ -34,7 +34,6 @@ def test_the_model_is_judged_in_the_band_of_the_measurement():
     assert blind.torque_rmse.min() > 0.1  # friction jumps where the filtered one does not
 
 
-@pytest.mark.slow
 def test_a_motion_that_was_not_measured_has_only_a_modelled_energy():
     (fit,) = validate(TWIN, [swing(ROBOT, 5)])
     assert fit.modelled_energy > 0
