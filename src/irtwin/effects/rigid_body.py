@@ -165,18 +165,24 @@ def last_body_columns(robot: Robot, motion: Motion) -> np.ndarray:
     return _regressor(robot, motion)[:, :, 10 * (carrier - 1) : 10 * carrier]
 
 
-# The last regressor, of a robot and a motion: bodies and payload ask for that of the same part of a run in turn.
-_last: list[tuple[ReferenceType[Robot], ReferenceType[Motion], np.ndarray]] = []
+# The last regressors, by robot and states: bodies, payload and each look at a run ask for those of the same samples.
+_kept: dict[tuple[object, ...], tuple[tuple[ReferenceType[np.ndarray], ...], np.ndarray]] = {}
+_MOST_KEPT = 8_000_000  # numbers
 
 
 def _regressor(robot: Robot, motion: Motion) -> np.ndarray:
     """Return the (N, n, 10 n) torque regressor of all bodies, not to be written to."""
-    for of_robot, of_motion, regressor in tuple(_last):
-        if of_robot() is robot and of_motion() is motion:
-            return regressor
-    regressor = body_regressor(robot.model, motion.q, motion.dq, motion.ddq)
-    regressor.flags.writeable = False
-    _last[:] = [(ref(robot), ref(motion, lambda _: _last.clear()), regressor)]
+    states = motion.q, motion.dq, motion.ddq
+    key = robot.urdf, *((state.ctypes.data, state.shape, state.strides) for state in states)
+    owners, regressor = _kept.pop(key, ((), None))
+    if regressor is None or any(owner() is None for owner in owners):
+        regressor = body_regressor(robot.model, *states)
+        regressor.flags.writeable = False
+        memory = (state.base if isinstance(state.base, np.ndarray) else state for state in states)
+        owners = tuple(ref(own, lambda _: _kept.pop(key, None)) for own in memory)  # others may come to lie there
+    _kept[key] = owners, regressor
+    while sum(own.size for _, own in list(_kept.values())) > _MOST_KEPT and len(_kept) > 1:
+        _kept.pop(next(iter(list(_kept))), None)
     return regressor
 
 

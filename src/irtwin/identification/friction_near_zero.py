@@ -218,8 +218,8 @@ def _best(
 
     _, friction = beside(list(sure), [])
     alone = beside(range(own), factors)[0]
-    bent = [beside([*range(own), law], factors)[0] for law in range(end, end + laws)]
-    both = [alone, *sorted(bent, key=lambda left: float(left[0].sum()))[:1]]
+    bent = [(float(beside([*range(own), law], [whole])[0][0].sum()), law) for law in range(end, end + laws)]
+    both = [alone, *(beside([*range(own), law], factors)[0] for _, law in sorted(bent)[:1])]
     best = [int(np.argmin(left.sum(axis=1))) for left in both]
     if _everywhere(alone[best[0]] - both[-1][0]):
         both.reverse()

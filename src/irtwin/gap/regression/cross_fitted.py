@@ -68,7 +68,7 @@ class TwinPower:
         ones = [effect for effect in catalogue().values() if effect.drawn_at_rest]
         self.system = power_system(stack, motions, grouping, ones, torque, none)
         self.values = np.array([term.expected for _, term in stack.power_terms], dtype=float)
-        total = Summed(self.system.moments(self.system.noise_before))
+        total = self.system.total(self.system.noise_before)
         self.values[~stack.fixed] = twin_values(self.system, self.system.solution((), total))
         self._at_rest = np.array([effect.drawn_at_rest for effect, _ in stack.power_terms], dtype=bool)
 

@@ -77,6 +77,22 @@ class Products:
         products *= scale[:, None] * scale
         return cls(places.spread, np.pad(products, (missing, missing)), False)
 
+    @classmethod
+    def summed(cls, several: Sequence[Products]) -> Products:
+        """Return the products over several groups' rows of an equation."""
+        first = several[0]
+        if len(several) == 1:
+            return first
+        if all(own.as_rows for own in several):
+            rows = np.concatenate([own.held for own in several])
+            if _few(*rows.shape):
+                return cls(first.places, rows, True)
+            return cls(first.places, rows.T @ rows, False)
+        held = np.zeros_like(next(own.held for own in several if not own.as_rows))
+        for own in several:
+            held += own.held.T @ own.held if own.as_rows else own.held
+        return cls(first.places, held, False)
+
     @cached_property
     def diagonal(self) -> np.ndarray:
         """(u,) the squares of what is held."""

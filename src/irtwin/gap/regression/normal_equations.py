@@ -17,7 +17,7 @@ from irtwin.effects.effect import Effect, Term
 from irtwin.errors import InputError
 from irtwin.gap.regression.cholesky import factored, solved
 from irtwin.gap.regression.hypotheses import CandidateColumn
-from irtwin.gap.regression.moments import Moments, Places, Products, Summed, numbers
+from irtwin.gap.regression.moments import Moments, Places, Products, numbers
 from irtwin.identification.accumulate import Block
 
 _NO_NOISE = 1e-9  # N m or W: an equation without rows leaves nothing
@@ -251,6 +251,15 @@ class System:
             for group in range(self.groups)
         ]
 
+    @cached_property
+    def _all_products(self) -> list[list[Products]]:
+        """Per equation, over all groups: of runs that are observed and of those that are not, if there are any."""
+        kinds = [np.flatnonzero(self.group_observed == observed) for observed in (False, True)]
+        return [
+            [Products.summed([self._products[group][equation] for group in own]) for own in kinds if len(own)]
+            for equation in range(len(self.pattern))
+        ]
+
     def _products_of(self, blocks: np.ndarray, equation: int) -> Products:
         """Return an equation's products over a group's blocks."""
         places = self._places[bool(self.observed[blocks[0]])][equation]
@@ -302,6 +311,13 @@ class System:
         weights = np.maximum(noise, self.quietest) ** -2.0
         return [Moments(list(zip(own, weights.tolist(), strict=True))) for own in self._products]
 
+    def total(self, noise: np.ndarray) -> Moments:
+        """Return the products of columns over all groups, equations weighted as by `moments`."""
+        weights = np.maximum(noise, self.quietest) ** -2.0
+        return Moments(
+            [(own, weight) for both, weight in zip(self._all_products, weights.tolist(), strict=True) for own in both]
+        )
+
     @property
     def parts(self) -> list[tuple[slice, int]]:
         """The kinds of equations of the groups, (P,): of which equations, and of which group."""
@@ -343,7 +359,9 @@ class System:
 
         Of an equation without rows, a joint that never moves, nothing is known: it is given the largest of the others'.
         """
-        left = self.rms(chosen, noise, range(self.groups), range(self.groups))
+        weights = np.append(-self.solution(chosen, self.total(noise)), 1.0)
+        squares = np.array([sum(own.squares(weights) for own in both) for both in self._all_products])
+        left = np.sqrt(np.maximum(squares, 0.0) / np.maximum(self.rows.sum(axis=0), 1))
         left = np.where(self.rows.any(axis=0), left, left.max(initial=0.0))
         if self.apart:  # few rows are fitted easily: no law is known better where friction turns
             fast, slow = np.split(left, 2)
@@ -369,7 +387,7 @@ class System:
         left = self.noise_before
         if self.shaken_twin is None or not self.apart:
             return np.zeros_like(left)
-        solution = self.solution((), Summed(self.group_moments(left)))
+        solution = self.solution((), self.total(left))
         coefficients = np.append(-solution, 1.0)
         squares = []
         for equation, products in enumerate(self.shaken_twin):
@@ -401,7 +419,7 @@ class System:
 
         Dry friction that turns by a negative share is none: it would imitate friction that falls with speed.
         """
-        kept, total = list(chosen), self._together(range(self.groups), noise)
+        kept, total = list(chosen), self.total(noise)
         while own := [k for k in kept if self.column(k).effect.nuisance]:
             values = self.solution(kept, total)
             terms = [self.all_terms[k] for k in own]

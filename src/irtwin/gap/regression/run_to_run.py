@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from irtwin.effects.sensing import OffsetOfRun
-from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.identification.accumulate import Block
 from irtwin.robot.description import Robot
@@ -84,7 +83,7 @@ class RunToRun:
         alone, runs = system.with_columns(())[0], set().union(*sides)
         apart, count = alone.by_speed, len(alone.pattern)
         noise = apart.residual_rms((), apart.noise_before)
-        values = twin_values(apart, apart.solution((), Summed(apart.group_moments(noise))))
+        values = twin_values(apart, apart.solution((), apart.total(noise)))
         slow = (noise[:count] / noise[-count:]) ** 2
         frictions = tuple(_friction(alone, k, values, runs, float(slow[k])) for k in range(count))
         of_torque = frictions[: len(frictions) - system.beside_power]
@@ -209,7 +208,7 @@ def share_of_offsets(system: System, robot: Robot, sides: Sequence[Set[str]]) ->
 
     Twice what runs of one of the `sides` differ by; each run of the system but the first has an `OffsetOfRun`.
     """
-    vector = system.solution((), Summed(system.group_moments(system.noise_before)))
+    vector = system.solution((), system.total(system.noise_before))
     values = twin_values(system, vector)
     offsets = {block.run: np.zeros(len(robot.joints)) for block in system.blocks}
     for value, (effect, term) in zip(values, system.terms, strict=True):
@@ -235,7 +234,7 @@ def with_offsets_held(system: System, chosen: Sequence[int]) -> System:
     if not chosen or not any(isinstance(effect, OffsetOfRun) for effect, _ in system.terms):
         return system
     noise = system.residual_rms(chosen, system.noise_before)
-    values = twin_values(system, system.solution(chosen, Summed(system.group_moments(noise))))
+    values = twin_values(system, system.solution(chosen, system.total(noise)))
     held = tuple(
         (effect, replace(term, expected=float(value), spread=_HELD * term.spread))
         if isinstance(effect, OffsetOfRun)

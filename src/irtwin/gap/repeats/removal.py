@@ -14,7 +14,6 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Effect, Quantity, quantity
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
-from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.gap.regression.residuals import as_filtered, torque_residual
 from irtwin.gap.repeats.disturbances import LINE, SWITCHING, Disturbance
@@ -55,7 +54,7 @@ def removed(
     effects = {effect.disturbance: effect for effect in catalogue().values() if effect.disturbance}
     taken: list[Removed] = []
     if plain is not None:
-        values = twin_values(plain, plain.solution((), Summed(plain.moments(plain.noise_before))))
+        values = twin_values(plain, plain.solution((), plain.total(plain.noise_before)))
         steady = [
             disturbance for disturbance in disturbances if disturbance.kind == LINE and disturbance.channel == "torque"
         ]

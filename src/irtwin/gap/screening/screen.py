@@ -15,7 +15,6 @@ from irtwin.effects.stack import Stack
 from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.data.case import Case
 from irtwin.gap.regression.hypotheses import Variant
-from irtwin.gap.regression.moments import Summed
 from irtwin.gap.regression.normal_equations import System, twin_values
 from irtwin.gap.screening.contact import contact
 from irtwin.gap.screening.local import local_effects
@@ -49,7 +48,7 @@ class Screened:
 def screen(case: Case, stack: Stack, system: System) -> Screened:
     """Search the runs' torque; system: its equations, with the terms of the twin at least."""
     noise = system.noise_before
-    values = twin_values(system, system.solution((), Summed(system.moments(noise))))
+    values = twin_values(system, system.solution((), system.total(noise)))
     left = remainders(case, stack, values)
     in_contact = begun(lambda: contact(case.robot, left, noise), worth=case.long)
     known = [effect for effect in catalogue().values() if isinstance(effect, LocalEffect)]
