@@ -23,6 +23,7 @@ from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import ChannelFinding, estimate_of, find
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.candidate_columns import Below
@@ -48,12 +49,16 @@ def check_observed(system: System) -> None:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for the causes in a case: `unknown` are not known to it; what one before it `found`, and `refused`."""
+    """The search for the causes in a case: `unknown` are not known to it; what one before it `found` and `refused`.
+
+    `shortlist`: what that one tried, and what of it is worth trying again.
+    """
 
     case: Case
     unknown: Set[Without] = frozenset()
     found: tuple[Effect, ...] = ()
     refused: Refusals = NOTHING_REFUSED
+    shortlist: Shortlist = NO_SEARCH
 
     @cached_property
     def stack(self) -> Stack:
@@ -126,11 +131,13 @@ class Search:
     def torque_causes(self, tried: Tried) -> tuple[ExplainedTorque, Floor, Refusals]:
         """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
         case, known = self.case, (self.unknown, self.refused)
+        some = self.shortlist.among(tried[0]), self.shortlist.among(tried[1])
         if case.shows("power"):
             about = self.below, self.twin.torque, self.before
-            possible = find_possible(case, SearchBesidePower(case, self.stack, tried, *about, self.floor).find, *known)
+            beside = SearchBesidePower(case, self.stack, some, *about, self.floor, self.shortlist)
+            possible = find_possible(case, beside.find, *known)
         else:
-            system = torque_system(self.stack, case.with_torque, case.grouping, tried[0], self.below, case.shaken)
+            system = torque_system(self.stack, case.with_torque, case.grouping, some[0], self.below, case.shaken)
             possible = find_possible(case, lambda without: self._of_torque(system, without), *known)
         finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
@@ -139,7 +146,7 @@ class Search:
         """Find the causes of torque, and with them the search that knows what is nobody's fault.
 
         Joints in which dry friction turns otherwise than the twin's have that in the twin, a lag of all torque is taken
-        out, and all is tried anew.
+        out, and every effect is tried anew, in the shapes that the data spoke for.
         """
         search = self
         for look in range(_LOOKS):
@@ -171,10 +178,11 @@ class Search:
                 unknown = unknown | {cause.effect}
         tell(f"Trying every effect on torque again, as {' and '.join(reasons)}")
         found = tuple(added(self.case, causes))
-        return replace(self, case=case.with_friction_near_zero(found), unknown=unknown, found=found)
+        case, shortlist = case.with_friction_near_zero(found), finding.attribution.shortlist
+        return replace(self, case=case, unknown=unknown, found=found, shortlist=shortlist)
 
     def _of_torque(self, system: System, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-        first = find("torque", self.case, system, self.floor.torque, without)
+        first = find("torque", self.case, system, self.floor.torque, without, before=self.shortlist)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
         return replace(first, signal_floor=left.torque), left

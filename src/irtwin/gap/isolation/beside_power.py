@@ -15,6 +15,7 @@ from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
 from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, attributed, finding_of
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without
 from irtwin.gap.regression.candidate_columns import Below
@@ -32,7 +33,7 @@ class SearchBesidePower:
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
-    `predicted` the joint torque by the twin, `before` the power that it takes.
+    `predicted` the joint torque by the twin, `before` the power that it takes; `shortlist`: what a search before tried.
     """
 
     case: Case
@@ -42,11 +43,12 @@ class SearchBesidePower:
     predicted: Torque
     before: TwinPower
     floor: Floor
+    shortlist: Shortlist = NO_SEARCH
 
     @cached_property
     def equations(self) -> JointEquations:
         """Both equations, power linear about the twin's torque: worked out once, however often is searched."""
-        return self._about(self.predicted, self.before, self.case.shaken)
+        return self._about(self.effects, self.predicted, self.before, self.case.shaken)
 
     def find(self, without: Set[Without] = frozenset()) -> tuple[ChannelFinding, Floor]:
         """Find the causes of torque, `without` some effects; return them with the floor that they leave.
@@ -55,7 +57,7 @@ class SearchBesidePower:
         that torque if losses, which grow with its square, make a difference.
         """
         case, stack = self.case, self.stack
-        first = _find(case, self.equations, self.floor, without)
+        first = _find(case, self.equations, self.floor, without, self.shortlist)
         if not any(cause.carries_power for cause in first.causes):
             return first, self.floor
         explained = ExplainedTorque(stack, first, self.below)
@@ -65,15 +67,17 @@ class SearchBesidePower:
             _bend(case, stack, (self.predicted, self.before), (explained, power))
             > _STRAIGHT * power.system.noise_before[0]
         ):
-            again = self._about(explained, power).with_noise_of(self.equations)
-            return _find(case, again, left, without), left
+            shortlist = first.attribution.shortlist
+            some = shortlist.among(self.effects[0]), shortlist.among(self.effects[1])
+            again = self._about(some, explained, power).with_noise_of(self.equations)
+            return _find(case, again, left, without, shortlist), left
         return replace(first, signal_floor=left.torque), left
 
-    def _about(self, torque: Torque, power: TwinPower, shaken: Pairs = ()) -> JointEquations:
+    def _about(
+        self, effects: tuple[Sequence[Effect], Sequence[Effect]], torque: Torque, power: TwinPower, shaken: Pairs = ()
+    ) -> JointEquations:
         case = self.case
-        return joint_equations(
-            self.stack, case.measured, case.grouping, self.effects, self.below, torque, power, shaken
-        )
+        return joint_equations(self.stack, case.measured, case.grouping, effects, self.below, torque, power, shaken)
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
@@ -87,12 +91,14 @@ def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tup
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _find(case: Case, equations: JointEquations, floor: Floor, without: Set[Without]) -> ChannelFinding:
+def _find(
+    case: Case, equations: JointEquations, floor: Floor, without: Set[Without], before: Shortlist
+) -> ChannelFinding:
     """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
     levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
     steadied = Steadied.of(case, whole)
-    both = attributed(case, whole, steadied, np.concatenate(levels), without)
+    both = attributed(case, whole, steadied, np.concatenate(levels), without, before)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     known = floor.torque is not None and floor.power is not None
@@ -121,4 +127,5 @@ def _of_torque(both: Attribution, equations: JointEquations) -> Attribution:
         ),
         both.visible[inside],
         both.log_odds[inside],
+        both.shortlist,
     )

@@ -17,6 +17,7 @@ from irtwin.gap.isolation.both_channels import BothChannels, acting, observed_gr
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing, share_above
 from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
 from irtwin.gap.regression.held_out import HeldOut, held_out
@@ -177,15 +178,17 @@ def find(
     without: Set[Without] = frozenset(),
     plain: System | None = None,
     telling: System | None = None,
+    before: Shortlist = NO_SEARCH,
 ) -> ChannelFinding:
     """Find the causes in the equations of a channel, "torque" or "power", `without` some effects; floor: (g,) RMS.
 
-    `plain` as a finding's. `telling`: the same equations on what was logged, by which the causes are found.
+    `plain` as a finding's. `telling`: the same equations on what was logged, by which the causes are found. `before`:
+    what was tried by a search before.
     """
     places = (None,) if name == "power" else case.robot.joint_names
     steadied = Steadied.of(case, system)
     if telling is None:
-        attribution = attributed(case, system, steadied, floor, without)
+        attribution = attributed(case, system, steadied, floor, without, before)
     else:
         attribution = attributed(case, telling, Steadied.of(case, telling), floor, without)
         attribution = replace(attribution, noise=_left(system, attribution))
@@ -229,7 +232,12 @@ def finding_of(
 
 
 def attributed(
-    case: Case, system: System, steadied: Steadied, floor: np.ndarray | None, without: Set[Without] = frozenset()
+    case: Case,
+    system: System,
+    steadied: Steadied,
+    floor: np.ndarray | None,
+    without: Set[Without] = frozenset(),
+    before: Shortlist = NO_SEARCH,
 ) -> Attribution:
     """Attribute the gap of a system, `without` some effects; floor: (g,) RMS, 0 or None where unknown.
 
@@ -240,7 +248,7 @@ def attributed(
     apart, level = steadied.system.by_speed, steadied.within(floor)
     if level is not None:
         level = np.tile(level, len(apart.halves))
-    attribution = attribute(apart, candidates, case.thresholds.criterion, level, without)
+    attribution = attribute(apart, candidates, case.thresholds.criterion, level, without, before)
     return replace(attribution, noise=_left(system, attribution))
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -35,18 +35,27 @@ _SCREENED = 128  # places, or choices of runs, out of which a screening takes on
 
 @dataclass(frozen=True)
 class HypothesisPrior:
-    """The prior of hypotheses: `effects` in each scope are as likely as others, at any of their `joints`, so many."""
+    """The prior of hypotheses: `effects` in each scope are as likely as others, at any of their `joints`, so many.
+
+    `shapes`: how many a hypothesis was tried in, by its place, where these are more than it has.
+    """
 
     effects: int
     joints: Mapping[tuple[str, str], int]
+    shapes: Mapping[tuple[str, str, str | None], int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, candidates: Sequence[Hypothesis]) -> HypothesisPrior:
+    def of(
+        cls, candidates: Sequence[Hypothesis], shapes: Mapping[tuple[str, str, str | None], int] | None = None
+    ) -> HypothesisPrior:
         """Take it from all candidates of a search."""
         effects = {(candidate.effect, candidate.scope) for candidate in candidates}
-        return cls(
-            len(effects), Counter((candidate.effect, candidate.scope) for candidate in candidates if candidate.joint)
-        )
+        joints = Counter((candidate.effect, candidate.scope) for candidate in candidates if candidate.joint)
+        return cls(len(effects), joints, shapes or {})
+
+    def tried(self, hypothesis: Hypothesis) -> int:
+        """Return in how many shapes a hypothesis was tried, each as likely."""
+        return max(self.shapes.get(hypothesis.place, 0), len(hypothesis.variants))
 
     def log_odds(self, hypothesis: Hypothesis, structure: Sequence[Hypothesis]) -> float:
         """Return the log odds of a hypothesis beside those that were found; a nuisance's are even."""
@@ -91,10 +100,15 @@ class Posterior:
         variants = [variant for candidate in candidates for variant in candidate.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(candidate.variants) for candidate in candidates])
         known, chosen = found
-        odds = [prior.log_odds(candidate, known) - np.log(len(candidate.variants)) for candidate in candidates]
+        shapes = [prior.tried(candidate) for candidate in candidates]
+        odds = [
+            prior.log_odds(candidate, known) - np.log(count)
+            for candidate, count in zip(candidates, shapes, strict=True)
+        ]
         screened = [variant.effect.screened for variant in variants]
         log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)
-        seen = evidence(projection, chosen, variants)
+        stand_for = np.round(np.array(shapes) / [len(candidate.variants) for candidate in candidates]).astype(int)
+        seen = evidence(projection, chosen, variants, stand_for[owner])
         own = np.sqrt(_where_it_explains(projection.system, misfit, seen))
         return cls(tuple(candidates), owner, log_prior, seen, own, limits)
 
@@ -119,6 +133,11 @@ class Posterior:
         """(H,) the index of each hypothesis' likeliest variant."""
         weights, _ = self._beside_best(np.arange(len(self.owner)), self._firsts)
         return _largest(weights, self._firsts)
+
+    @property
+    def spoken(self) -> np.ndarray:
+        """(V,) by how much the data speak for each variant, against nothing: log odds less those before the data."""
+        return np.asarray(self._by_shape - self.prior)
 
     @cached_property
     def _by_shape(self) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior, overlap
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
@@ -31,7 +32,7 @@ Without = str | tuple[str, str | None]
 class Attribution:
     """The causes found, ranked by gain; `noise` (g,) what they leave; `visible` (H, 2) of each hypothesis before any:
     what it adds beyond what the twin imitates, as a mean square in units of the noise, and as a part of all it adds;
-    `log_odds` (H,) that it is there beside the causes.
+    `log_odds` (H,) that it is there beside the causes; `shortlist`: what to try where the search is repeated.
     """
 
     causes: tuple[FoundCause, ...]
@@ -39,6 +40,7 @@ class Attribution:
     hypotheses: tuple[Hypothesis, ...]
     visible: np.ndarray
     log_odds: np.ndarray
+    shortlist: Shortlist = NO_SEARCH
 
 
 def attribute(
@@ -47,25 +49,26 @@ def attribute(
     limits: Criterion,
     floor: np.ndarray | None = None,
     without: Set[Without] = frozenset(),
+    before: Shortlist = NO_SEARCH,
 ) -> Attribution:
     """Find the effects that the data show beyond the twin's: the likeliest structure, and how sure each of it is.
 
     Hypotheses are added one by one, everything refitted; what is less likely than nothing is dropped; then each in turn
     is taken out and looked for anew, and so are two of one joint together. floor: (g,) RMS, 0 or None where unknown;
-    what is tried `without` some effects is no likelier for that.
+    what is tried `without` some effects, or in few shapes as a search `before` says, is no likelier for that.
     """
     every = in_scope(candidates, both=system.both)
     candidates = [
         candidate for candidate in every if not {candidate.effect, (candidate.effect, candidate.joint)} & without
     ]
-    search = _Search(system, candidates, HypothesisPrior.of(every), limits, floor)
+    search = _Search(system, candidates, HypothesisPrior.of(every, before.counts), limits, floor)
     noise = np.ones(len(system.pattern))
     for _ in track(range(2), "looks at what the twin leaves"):
         noise = system.residual_rms((), noise)
-    before = search.beside((), noise)
-    shapes = [before.variant(place) for place in range(len(before.hypotheses))]
+    first = search.beside((), noise)
+    shapes = [first.variant(place) for place in range(len(first.hypotheses))]
     visible = search.projection(noise).visible(shapes)
-    structure, noise = search.settled(*search.pruned(*search.forward(before, noise)))
+    structure, noise = search.settled(*search.pruned(*search.forward(first, noise)))
     structure, noise = search.likeliest(*search.pruned(*search.paired(structure, noise)))
     after = search.beside(structure, noise)
     odds = {hypothesis.place: float(after.log_odds[k]) for k, hypothesis in enumerate(after.hypotheses)}
@@ -73,7 +76,9 @@ def attribute(
     beside = np.array([odds.get(candidate.place, -np.inf) for candidate in candidates])
     named = [k for k, candidate in enumerate(candidates) if not candidate.nuisance]
     hypotheses = tuple(candidates[k] for k in named)
-    return Attribution(search.causes(structure, noise), noise, hypotheses, visible[named], beside[named])
+    causes = search.causes(structure, noise)
+    shortlist = Shortlist.of(search.tried.values(), candidates, before)
+    return Attribution(causes, noise, hypotheses, visible[named], beside[named], shortlist)
 
 
 def judged(

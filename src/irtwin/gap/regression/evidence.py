@@ -43,7 +43,7 @@ class HypothesisEvidence:
     explained (V,); said, missed (V, G): what each adds there, and the score that this leaves; `coefficients`, those of
     one number together; rows (G,); by_kind (V, `System.kinds`): of what is explained; of_power (V,): of it, what power
     shows beside torque; of_prior (V,): what is none of rows: with the variant those of the twin's numbers whose
-    `prior_tells` are nearer to what is known of them.
+    `prior_tells` are nearer to what is known of them; stand_for (V,): for how many shapes of a hypothesis each stands.
     """
 
     variants: tuple[Variant, ...]
@@ -55,6 +55,7 @@ class HypothesisEvidence:
     by_kind: np.ndarray
     of_power: np.ndarray
     of_prior: np.ndarray
+    stand_for: np.ndarray
 
     @cached_property
     def rows_that_speak(self) -> np.ndarray:
@@ -83,13 +84,18 @@ class HypothesisEvidence:
         more = np.maximum(speaks.sum(axis=1) - 1, 0)
         squares = np.where(speaks, self.missed**2 / np.maximum(self.said, 1e-300), 0.0).sum(axis=1)
         own = squares / np.maximum(more, 1)
-        known = own[more >= 2]
+        known = np.repeat(own, np.where(more >= 2, self.stand_for, 0))
         typical = max(float(np.median(known)), 1.0) if len(known) else 1.0
         return np.asarray(np.maximum((more * own + _FEW * typical) / (more + _FEW), 1.0))
 
 
-def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[Variant]) -> HypothesisEvidence:
-    """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted."""
+def evidence(
+    projection: Projection, chosen: Sequence[int], variants: Sequence[Variant], stand_for: np.ndarray | None = None
+) -> HypothesisEvidence:
+    """Return what variants explain beside the twin's terms and the `chosen` columns, everything refitted.
+
+    stand_for: (V,) as `HypothesisEvidence` has it; None: each for itself.
+    """
     system = projection.system
     (explained, nearer), (said, missed) = np.zeros((2, len(variants))), np.zeros((2, len(variants), len(system.parts)))
     coefficients = []
@@ -114,7 +120,8 @@ def evidence(projection: Projection, chosen: Sequence[int], variants: Sequence[V
     shown = np.maximum(explained, 0.0), said, missed
     of_power = by_kind[:, 1] if system.beside_power else np.zeros(len(variants))
     of_prior = np.clip(nearer, 0.0, shown[0])
-    return HypothesisEvidence(tuple(variants), *shown, tuple(coefficients), rows, by_kind, of_power, of_prior)
+    each = np.ones(len(variants), dtype=int) if stand_for is None else stand_for
+    return HypothesisEvidence(tuple(variants), *shown, tuple(coefficients), rows, by_kind, of_power, of_prior, each)
 
 
 def _in_halves(system: System, squares: np.ndarray) -> np.ndarray:

@@ -39,8 +39,17 @@ class JointEquations:
         return replace(variant, columns=tuple(moved))
 
     def with_noise_of(self, other: JointEquations) -> JointEquations:
-        """Return them with what noise of positions does to others of the same columns."""
-        whole = replace(self.whole, shaken=other.whole.shaken, shaken_twin=other.whole.shaken_twin)
+        """Return them with what noise of positions does to others, which have these columns and more."""
+        own, theirs = self.whole, other.whole
+        at = {(id(column.effect), column.index): k for k, column in enumerate(theirs.columns, start=theirs.base)}
+        places = np.array([*range(own.base), *(at[id(column.effect), column.index] for column in own.columns)])
+        shaken = []
+        for equation, products in enumerate(theirs.shaken or ()):
+            row = equation % len(own.pattern)
+            held = np.flatnonzero(theirs.pattern[row])
+            kept = np.append(np.searchsorted(held, places[own.pattern[row]]), len(held))
+            shaken.append(products[np.ix_(kept, kept)])
+        whole = replace(own, shaken=tuple(shaken) or None, shaken_twin=theirs.shaken_twin)
         return JointEquations(whole, replace(self.torque, shaken_twin=other.torque.shaken_twin))
 
     def in_whole(self, column: int) -> int:
