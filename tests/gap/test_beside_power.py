@@ -9,16 +9,17 @@ import pytest
 from tests.synthetic import arm, measure, swing, truth, with_constants, with_torque
 
 from irtwin.effects.catalogue import BASELINE, catalogue
+from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.beside_power import SearchBesidePower
 from irtwin.gap.isolation.finding import estimate_of, find
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
-from irtwin.gap.regression.channel_equations import torque_system
+from irtwin.gap.regression.channel_equations import Pairs, torque_system
 from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
-from irtwin.gap.regression.joint_equations import joint_equations
+from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.channels import Signals
@@ -186,3 +187,24 @@ def test_what_power_alone_tells_of_a_sensor_is_no_surer_than_power_is_explained(
     told = {(each.effect, each.joint): size**2 for each, size in zip(named, beside.misfit, strict=True)}
     assert told["cable_drag", "joint_1"] < 2 * misfit["torque"]  # both tell that
     assert told["torque_constant_error", "joint_2"] > 5 * misfit["torque"]
+
+
+def test_what_noise_of_positions_does_is_picked_of_more_columns() -> None:
+    one, random = case(gain=1.1, cable=6.0), np.random.default_rng(0)
+    stack = Stack(ROBOT, one.effects)
+    plain = LeftOut(stack, torque_system(stack, one.with_torque, one.grouping, (), None))
+    before = TwinPower(stack, one.with_power, one.grouping, plain.torque)
+    shaken = [(m, replace(m, dq=m.dq + 1e-3 * random.standard_normal(m.dq.shape))) for m in one.measured[:2]]
+    of_torque = [catalogue()[name] for name in ("torque_offset", "cable_drag", "viscous_friction", "joint_elasticity")]
+    of_power = [catalogue()[name] for name in ("meter_gain", "iron_loss")]
+
+    def both(*effects: list[Effect], pairs: Pairs = ()) -> JointEquations:
+        about = plain.below, plain.torque, before, pairs
+        return joint_equations(stack, one.measured, one.grouping, effects, *about)  # type: ignore[arg-type]
+
+    of_all = both(of_torque, of_power, pairs=shaken)
+    few = of_torque[1::2], of_power[1:]
+    picked, worked_out = both(*few).with_noise_of(of_all), both(*few, pairs=shaken)
+    for own, other in zip(picked.whole.shaken or (), worked_out.whole.shaken or (), strict=True):
+        np.testing.assert_allclose(own, other, rtol=1e-6, atol=1e-9 * np.abs(other).max(initial=0.0))
+    assert len(picked.whole.shaken or ()) == 2 * (len(ROBOT.joints) + 1)

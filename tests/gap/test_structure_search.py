@@ -236,7 +236,8 @@ def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it(
     term, every = Term("k", "1"), 60.0 * one[:, 0]
     variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(5))
     squares = every, 25.0 * np.ones((5, 4)), missed
-    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, np.zeros(5), every)
+    alike = np.ones(5, dtype=int)
+    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, np.zeros(5), every, alike)
     named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
     posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one[:, 0], DEFAULT.criterion)
     assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
@@ -248,7 +249,8 @@ def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
     variants = tuple(Variant(EFFECT, (k,), (term,)) for k in range(2))
     explained, of_power = np.array([900.0, 60.0]), np.array([890.0, 3.0])
     squares = explained, 25.0 * np.ones((2, 4)), np.zeros((2, 4))
-    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, of_power, np.zeros(2))
+    rows, alike = np.full(4, 1e3), np.ones(2, dtype=int)
+    seen = HypothesisEvidence(variants, *squares, (coefficients(one),), rows, one, of_power, np.zeros(2), alike)
     loss, friction = (
         Hypothesis("loss", None, MISSING, variants[:1]),
         Hypothesis("friction", "j1", MISSING, variants[1:]),

@@ -20,6 +20,7 @@ from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
+from irtwin.gap.isolation.beside_power import Tried
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
@@ -42,7 +43,7 @@ from irtwin.gap.rehearsal import channel_equations
 from irtwin.gap.repeats.disturbances import Disturbance, disturbances
 from irtwin.gap.repeats.removal import Removed, removed
 from irtwin.gap.screening.screen import screen
-from irtwin.gap.search import Search, Tried, check_observed, variants
+from irtwin.gap.search import Search, check_observed, variants
 from irtwin.gap.thresholds import DEFAULT, Thresholds
 from irtwin.identification.progress import tell, tell_step
 from irtwin.identification.two_processes import begun, one_blas_thread

@@ -18,10 +18,10 @@ from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
-from irtwin.gap.isolation.beside_power import SearchBesidePower
+from irtwin.gap.isolation.beside_power import SearchBesidePower, Tried
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
-from irtwin.gap.isolation.finding import ChannelFinding, estimate_of, find
+from irtwin.gap.isolation.finding import ChannelFinding, attributed, estimate_of, find
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
 from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.isolation.steadied import Steadied
@@ -32,13 +32,11 @@ from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.run_to_run import share_of_offsets
 from irtwin.gap.regression.torque_from_power import ThroughPower
+from irtwin.identification.accumulate import part_read
 from irtwin.identification.progress import tell
 
 _LOOKS = 3  # at torque: in the last, dry friction turns and torque lags as the others found
 _NUISANCES = frozenset({FrictionTurn.id, TorqueLag.id})
-
-Tried = tuple[Sequence[Effect], Sequence[Effect]]
-"""Effects on torque, and on power, that a search tries."""
 
 
 def check_observed(system: System) -> None:
@@ -135,10 +133,10 @@ class Search:
         if case.shows("power"):
             about = self.below, self.twin.torque, self.before
             beside = SearchBesidePower(case, self.stack, some, *about, self.floor, self.shortlist)
-            possible = find_possible(case, beside.find, *known)
+            possible = find_possible(case, beside.proposed(self.unknown).find, *known)
         else:
-            system = torque_system(self.stack, case.with_torque, case.grouping, some[0], self.below, case.shaken)
-            possible = find_possible(case, lambda without: self._of_torque(system, without), *known)
+            system, shortlist = self._torque_equations(some[0])
+            possible = find_possible(case, lambda without: self._of_torque(system, without, shortlist), *known)
         finding, floor, refusals = possible
         return ExplainedTorque(self.stack, finding, self.below), floor, refusals
 
@@ -181,8 +179,18 @@ class Search:
         case, shortlist = case.with_friction_near_zero(found), finding.attribution.shortlist
         return replace(self, case=case, unknown=unknown, found=found, shortlist=shortlist)
 
-    def _of_torque(self, system: System, without: Set[Without]) -> tuple[ChannelFinding, Floor]:
-        first = find("torque", self.case, system, self.floor.torque, without, before=self.shortlist)
+    def _torque_equations(self, tried: Sequence[Effect]) -> tuple[System, Shortlist]:
+        """Return torque's equations with what is tried; of a long log a part proposes what is tried on all of it."""
+        case, about = self.case, (self.stack, self.case.with_torque, self.case.grouping)
+        every = part_read(case.with_torque)
+        if every == 1 or self.shortlist.tried:
+            return torque_system(*about, tried, self.below, case.shaken), self.shortlist
+        part = torque_system(*about, tried, self.below, case.shaken, every)
+        shortlist = attributed(case, part, Steadied.of(case, part), self.floor.torque, self.unknown).shortlist
+        return torque_system(*about, shortlist.among(tried), self.below).with_noise_of(part), shortlist
+
+    def _of_torque(self, system: System, without: Set[Without], before: Shortlist) -> tuple[ChannelFinding, Floor]:
+        first = find("torque", self.case, system, self.floor.torque, without, before=before)
         explained = ExplainedTorque(self.stack, first, self.below)
         left = floor_left(self.case, self.floor, explained) if first.causes else self.floor
         return replace(first, signal_floor=left.torque), left

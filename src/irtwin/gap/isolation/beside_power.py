@@ -22,7 +22,11 @@ from irtwin.gap.regression.candidate_columns import Below
 from irtwin.gap.regression.channel_equations import Pairs, Torque
 from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
+from irtwin.identification.accumulate import part_read
 from irtwin.identification.power_line import power_slope
+
+Tried = tuple[Sequence[Effect], Sequence[Effect]]
+"""Effects on torque, and on power, that a search tries."""
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
@@ -33,22 +37,36 @@ class SearchBesidePower:
 
     effects: candidates of torque and of power. Those of power compete, so that none of torque stands for one of them;
     they are found anew on the torque that is explained here. `below` is what candidates of torque are built on,
-    `predicted` the joint torque by the twin, `before` the power that it takes; `shortlist`: what a search before tried.
+    `predicted` the joint torque by the twin, `before` the power that it takes; `shortlist`: what a search before tried;
+    `part`: the equations of a part of the log, if that proposes.
     """
 
     case: Case
     stack: Stack
-    effects: tuple[Sequence[Effect], Sequence[Effect]]
+    effects: Tried
     below: Below
     predicted: Torque
     before: TwinPower
     floor: Floor
     shortlist: Shortlist = NO_SEARCH
+    part: JointEquations | None = None
+
+    def proposed(self, without: Set[Without] = frozenset()) -> SearchBesidePower:
+        """Return the search in the shapes for which a part of the log speaks; itself where the log is not so long."""
+        every = part_read(self.case.measured)
+        if every == 1 or self.shortlist.tried:
+            return self
+        part = self._about(self.effects, self.predicted, self.before, self.case.shaken, every)
+        steadied = Steadied.of(self.case, part.whole)
+        shortlist = attributed(self.case, part.whole, steadied, _level(part, self.floor), without).shortlist
+        return replace(self, effects=_among(shortlist, self.effects), shortlist=shortlist, part=part)
 
     @cached_property
     def equations(self) -> JointEquations:
         """Both equations, power linear about the twin's torque: worked out once, however often is searched."""
-        return self._about(self.effects, self.predicted, self.before, self.case.shaken)
+        if self.part is None:
+            return self._about(self.effects, self.predicted, self.before, self.case.shaken)
+        return self._about(self.effects, self.predicted, self.before).with_noise_of(self.part)
 
     def find(self, without: Set[Without] = frozenset()) -> tuple[ChannelFinding, Floor]:
         """Find the causes of torque, `without` some effects; return them with the floor that they leave.
@@ -68,16 +86,15 @@ class SearchBesidePower:
             > _STRAIGHT * power.system.noise_before[0]
         ):
             shortlist = first.attribution.shortlist
-            some = shortlist.among(self.effects[0]), shortlist.among(self.effects[1])
-            again = self._about(some, explained, power).with_noise_of(self.equations)
+            again = self._about(_among(shortlist, self.effects), explained, power).with_noise_of(self.equations)
             return _find(case, again, left, without, shortlist), left
         return replace(first, signal_floor=left.torque), left
 
     def _about(
-        self, effects: tuple[Sequence[Effect], Sequence[Effect]], torque: Torque, power: TwinPower, shaken: Pairs = ()
+        self, effects: Tried, torque: Torque, power: TwinPower, shaken: Pairs = (), every: int = 1
     ) -> JointEquations:
-        case = self.case
-        return joint_equations(self.stack, case.measured, case.grouping, effects, self.below, torque, power, shaken)
+        about = self.stack, self.case.measured, self.case.grouping
+        return joint_equations(*about, effects, self.below, torque, power, shaken, every)
 
 
 def _bend(case: Case, stack: Stack, before: tuple[Torque, TwinPower], after: tuple[Torque, TwinPower]) -> float:
@@ -96,16 +113,25 @@ def _find(
 ) -> ChannelFinding:
     """Return what both equations show of torque."""
     whole, torque = equations.whole, equations.torque
-    levels = [np.zeros(len(torque.pattern)) if floor.torque is None else floor.torque, [floor.power or 0.0]]
-    steadied = Steadied.of(case, whole)
-    both = attributed(case, whole, steadied, np.concatenate(levels), without, before)
+    level, steadied = _level(equations, floor), Steadied.of(case, whole)
+    both = attributed(case, whole, steadied, level, without, before)
     of_torque = _causes_of_torque(both)
     of_power = [k for cause in both.causes if cause not in of_torque for k in cause.columns]
     known = floor.torque is not None and floor.power is not None
-    within = steadied.within(np.concatenate(levels)) if known else None
+    within = steadied.within(level) if known else None
     beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), within)
     where = "torque", case.robot.joint_names, case.observed, torque, Steadied.of(case, torque)
     return finding_of(*where, _of_torque(both, equations), floor.torque, beside=beside)
+
+
+def _level(equations: JointEquations, floor: Floor) -> np.ndarray:
+    """Return the floor of both, (n + 1,) RMS, 0 where it is unknown."""
+    of_torque = np.zeros(len(equations.torque.pattern)) if floor.torque is None else floor.torque
+    return np.append(of_torque, floor.power or 0.0)
+
+
+def _among(shortlist: Shortlist, effects: Tried) -> Tried:
+    return shortlist.among(effects[0]), shortlist.among(effects[1])
 
 
 def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:

@@ -12,6 +12,9 @@ from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.posterior import Posterior
 from irtwin.gap.regression.hypotheses import Hypothesis
 
+_SILENT = 0.1  # of log odds: data that say less of a shape say nothing
+_BEHIND = 10.0  # of log odds: so far behind the likeliest shape of a look, one is nobody's rival
+
 Place = tuple[str, str, str | None]  # as `Hypothesis.place`
 
 
@@ -19,8 +22,8 @@ Place = tuple[str, str, str | None]  # as `Hypothesis.place`
 class Shortlist:
     """Of the shapes that searches `tried`, wherever, those `kept`; `counts`: how many each hypothesis had, by place.
 
-    Kept is what some look spoke for, beside whatever had been found then. Of each hypothesis one shape is kept at
-    least, so that none is missing, and what was tried is paid for.
+    Kept is what some look spoke for, and of nothing much more, beside whatever had been found then. Of each hypothesis
+    one shape is kept at least, so that none is missing, and what was tried is paid for.
     """
 
     tried: frozenset[Effect] = frozenset()
@@ -34,11 +37,14 @@ class Shortlist:
             hypothesis.place: {_anywhere(variant.effect): -np.inf for variant in hypothesis.variants}
             for hypothesis in hypotheses
         }
+        kept = set[Effect]()
         for look in looks:
+            least = max(_SILENT, float(look.spoken.max(initial=0.0)) - _BEHIND)
             for variant, owner, odds in zip(look.evidence.variants, look.owner, look.spoken.tolist(), strict=True):
                 own, shape = told[look.hypotheses[owner].place], _anywhere(variant.effect)
                 own[shape] = max(own[shape], odds)
-        kept = {shape for own in told.values() for shape, odds in own.items() if odds > 0}
+                if odds > least:
+                    kept.add(shape)
         best: dict[str, dict[Effect, float]] = {}
         for (effect, *_), own in told.items():
             for shape, odds in own.items():

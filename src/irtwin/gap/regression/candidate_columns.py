@@ -44,9 +44,14 @@ class Candidates:
     held at a time.
     """
 
-    def __init__(self, robot: Robot, effects: Sequence[Effect], pattern: np.ndarray, below: Below):
-        """Take which columns act in each equation, (g, M), and what the twin predicts `below` them over a whole run."""
-        self._robot, self._effects, self._below = robot, effects, below
+    def __init__(
+        self, robot: Robot, effects: Sequence[Effect], pattern: np.ndarray, below: Below, *, in_order: bool = True
+    ):
+        """Take which columns act in each equation, (g, M), and what the twin predicts `below` them over a whole run.
+
+        `in_order`: all of a run is asked for, part by part.
+        """
+        self._robot, self._effects, self._below, self._at_once = robot, effects, below, _PIECE if in_order else 0
         self._equations = len(pattern)
         ends = np.cumsum([0, *(_count(effect, robot) for effect in effects)])
         self._patterns = [pattern[:, start:stop] for start, stop in pairwise(ends)]
@@ -74,7 +79,9 @@ class Candidates:
             return self._columns(place, motion, self._predicted and self._predicted.part(start, stop))
         if place not in self._held or not self._held[place].covers(start, stop):
             assert reach is not None, "what has no reach is held over the whole run"
-            self._held[place] = self._piece(place, whole, start, max(stop, start + _PIECE), round(reach * whole.rate))
+            self._held[place] = self._piece(
+                place, whole, start, max(stop, start + self._at_once), round(reach * whole.rate)
+            )
         return self._held[place].cut(start, stop)
 
     def _piece(self, place: int, whole: Motion, start: int, stop: int, around: int) -> _Held:

@@ -31,10 +31,11 @@ def torque_system(
     effects: Sequence[Effect],
     below: Below | None,
     shaken: Pairs = (),
+    every: int = 1,
 ) -> System:
     """Reduce the equations of measured torque; `below` gives over a whole run what candidates are built on.
 
-    `shaken` says what noise of positions does to them.
+    `shaken` says what noise of positions does to them; `every`: of which stretches, as `accumulate` takes it.
     Raises InputError where too few samples are left.
     """
     robot = stack.robot
@@ -43,7 +44,7 @@ def torque_system(
     pattern = np.concatenate([stack.pattern, tried], axis=1)
 
     def equations() -> Equations:
-        candidates = Candidates(robot, effects, tried, below or _nothing)
+        candidates = Candidates(robot, effects, tried, below or _nothing, in_order=every == 1)
 
         def of_part(motion: Motion) -> Rows:
             assert motion.torque is not None
@@ -59,7 +60,7 @@ def torque_system(
 
         return of_part
 
-    blocks = accumulate(motions, equations(), pattern, by_products=bool(effects))
+    blocks = accumulate(motions, equations(), pattern, by_products=bool(effects), every=every)
     told = [pair for pair in shaken if pair[0].torque is not None]
     noise = shaken_products(told, equations(), equations(), pattern, len(stack.torque_terms))
     known = stack.prior_rows(stack.torque_terms)

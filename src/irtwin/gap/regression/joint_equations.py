@@ -40,16 +40,7 @@ class JointEquations:
 
     def with_noise_of(self, other: JointEquations) -> JointEquations:
         """Return them with what noise of positions does to others, which have these columns and more."""
-        own, theirs = self.whole, other.whole
-        at = {(id(column.effect), column.index): k for k, column in enumerate(theirs.columns, start=theirs.base)}
-        places = np.array([*range(own.base), *(at[id(column.effect), column.index] for column in own.columns)])
-        shaken = []
-        for equation, products in enumerate(theirs.shaken or ()):
-            row = equation % len(own.pattern)
-            held = np.flatnonzero(theirs.pattern[row])
-            kept = np.append(np.searchsorted(held, places[own.pattern[row]]), len(held))
-            shaken.append(products[np.ix_(kept, kept)])
-        whole = replace(own, shaken=tuple(shaken) or None, shaken_twin=theirs.shaken_twin)
+        whole = self.whole.with_noise_of(other.whole)
         return JointEquations(whole, replace(self.torque, shaken_twin=other.torque.shaken_twin))
 
     def in_whole(self, column: int) -> int:
@@ -68,13 +59,14 @@ def joint_equations(
     predicted: Torque,
     power: TwinPower,
     shaken: Pairs = (),
+    every: int = 1,
 ) -> JointEquations:
     """Reduce both.
 
     effects: candidates of torque, then of power; `below` is what those of torque are built on. Power is linear in the
     torque about what the twin predicts: the joint torque `predicted`, and the `power` that it takes; a real torque
     carries its column times the slope of power, which is the joint's speed and twice the losses of its current.
-    `shaken` says what noise of positions does to them.
+    `shaken` says what noise of positions does to them; `every`: of which stretches, as `accumulate` takes it.
     Raises InputError where too few samples are left.
     """
     robot, (of_torque, of_power) = stack.robot, effects
@@ -88,8 +80,8 @@ def joint_equations(
         return Predicted(torque, *power(whole, torque))
 
     def equations() -> Equations:
-        shown = Candidates(robot, of_torque, tried, below)
-        added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn)
+        shown = Candidates(robot, of_torque, tried, below, in_order=every == 1)
+        added = Candidates(robot, of_power, np.ones((1, len(supplied)), dtype=bool), drawn, in_order=every == 1)
 
         def of_part(motion: Motion) -> Rows:
             own, parts, torque = stack.columns_by_joint(motion), shown.part(motion), predicted(motion)
@@ -108,7 +100,7 @@ def joint_equations(
         return of_part
 
     pattern = _pattern(stack.pattern, tried, stack.real, real, len(free), len(supplied))
-    blocks = accumulate(motions, equations(), pattern, by_products=True)
+    blocks = accumulate(motions, equations(), pattern, by_products=True, every=every)
     alone = [block.of(slice(-1)) for block in blocks if block.rows[:-1].any()]
     terms, columns = (*stack.torque_terms, *free), (*mechanical, *supplied)
     noise = shaken_products(shaken, equations(), equations(), pattern, len(terms))

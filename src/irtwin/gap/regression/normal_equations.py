@@ -88,6 +88,18 @@ class System:
         places = [self.base + kept.index(k) for k in own]
         return system, [p + len(kept) * (k >= self.changed) for p, k in zip(places, chosen, strict=True)]
 
+    def with_noise_of(self, other: System) -> System:
+        """Return the system with what noise of positions does to another, which has these columns and more."""
+        at = {(id(column.effect), column.index): k for k, column in enumerate(other.columns, start=other.base)}
+        places = np.array([*range(self.base), *(at[id(column.effect), column.index] for column in self.columns)])
+        shaken = []
+        for equation, products in enumerate(other.shaken or ()):
+            row = equation % len(self.pattern)  # slow rows after fast ones
+            held = np.flatnonzero(other.pattern[row])
+            kept = np.append(np.searchsorted(held, places[self.pattern[row]]), len(held))
+            shaken.append(products[np.ix_(kept, kept)])
+        return replace(self, shaken=tuple(shaken) or None, shaken_twin=other.shaken_twin)
+
     def joined(self, other: System) -> System:
         """Return the system with the blocks of another, of the same columns, as groups of their own."""
         return replace(
