@@ -14,7 +14,7 @@ from sqlalchemy import select
 from irtwin.asking import ask, explain, export
 from irtwin.asserting import follow, keep
 from irtwin.errors import InputError
-from irtwin.knowledge import by_parts
+from irtwin.knowledge import by_parts, parts
 from irtwin.knowledge.owl_rl.beside import FactsClosure
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.named_graphs import in_graph
@@ -166,7 +166,9 @@ def test_a_limit_that_is_set_is_followed_by_classes_until_it_is_taken_back(works
     shipped = rows(workspace, value), rows(workspace, heavy)
     assert shipped[0][0][0] == 0.5 and len(shipped[1]) == 1
     update(workspace, "INSERT DATA { limit:idle_share irt:Limit_Value 0.85 }")
+    closed = parts._schema.cache_info().misses
     update(workspace, "INSERT DATA { limit:idle_share irt:Limit_Value 0.95 }", "bert")
+    assert parts._schema.cache_info().misses == closed + 1  # what was tried is what holds
     ((now, source),) = rows(workspace, value)
     assert now == 0.95 and source.startswith("bert, ") and source.endswith(", in place of 0.85")
     assert rows(workspace, heavy) == []

@@ -148,10 +148,15 @@ def _limits(graph: KnowledgeGraph, facts: Iterable[AssertedFact]) -> dict[tuple[
     for fact in facts:
         limit = NamedNode(fact.subject)
         if fact.graph == GRAPH_ONTOLOGY and (limit, ontology.LIMIT_VALUE) in limits:
-            said_by = Literal(f"{fact.author}, {fact.time:%Y-%m-%d}, in place of {fact.replaced}")
             limits[limit, ontology.LIMIT_VALUE] = quad_of(fact)
-            limits[limit, ontology.SOURCE] = Quad(limit, ontology.SOURCE, said_by, _ONTOLOGY)
+            limits[limit, ontology.SOURCE] = _source_of(fact)
     return limits
+
+
+def _source_of(fact: AssertedFact) -> Quad:
+    """Return what the source of a limit is by a fact about it."""
+    said_by = Literal(f"{fact.author}, {fact.time:%Y-%m-%d}, in place of {fact.replaced}")
+    return Quad(NamedNode(fact.subject), ontology.SOURCE, said_by, _ONTOLOGY)
 
 
 def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
@@ -223,8 +228,12 @@ def _set_limit(
     new: set[Quad],
     make_fact: Callable[..., AssertedFact],
 ) -> None:
-    """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said."""
-    statement, shipped = say(about, graph.base), ontology.limits(graph.resources)[about]
+    """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said.
+
+    Its source goes along, so that what is tried is the ontology that will hold.
+    """
+    limits = ontology.limits(graph.resources)
+    statement, shipped = say(about, graph.base), limits[about]
     value = _text(_NUMBER, new, statement)
     if value is not None and not math.isfinite(float(value)):
         raise InputError(f"{statement}: cannot be {value}; nothing changed")
@@ -234,16 +243,23 @@ def _set_limit(
         raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
     now = next((quad for quad in graph.store.said(*about) if quad.graph_name == _ONTOLOGY), shipped)
     before = _float(now)
-    assertion.removed.add(now)
+    sources = {quad for quad in graph.store.said(about[0], ontology.SOURCE) if quad.graph_name == _ONTOLOGY}
     if value is None or float(value) == _float(shipped):
         assertion.withdrawn += known
-        assertion.added.add(shipped)
+        _exchange(
+            assertion, {now, *sources}, {limits[key] for key in (about, (about[0], ontology.SOURCE)) if key in limits}
+        )
         return
     more = {"value": value, "kind": f"{XSD}double", "graph": GRAPH_ONTOLOGY, "replaced": written(before)}
     fact = make_fact(fact_id=secrets.token_hex(12), **more)
-    assertion.added.add(quad_of(fact))
     if float(value) != before:
         assertion.facts.append(fact)
+        _exchange(assertion, {now, *sources}, {quad_of(fact), _source_of(fact)})
+
+
+def _exchange(assertion: Assertion, old: set[Quad], new: set[Quad]) -> None:
+    assertion.removed |= old - new
+    assertion.added |= new - old
 
 
 def _float(quad: Quad) -> float:
