@@ -40,10 +40,6 @@ def test_shapes_that_data_spoke_for_are_tried_again_and_one_of_each_hypothesis()
     new = catalogue()["torque_drift"]
     assert shortlist.among([*SHAPES, new]) == [*(shape for shape in SHAPES if shape in shortlist.kept), new]
     assert shortlist.among([SHAPES[TRUE].on("joint_2")]) == [SHAPES[TRUE].on("joint_2")]
-    nothing = Shortlist.of(
-        [], hypotheses([CandidateColumn(SHAPES[1], 0, Term("A sin", "N m", "a"))], 0, MISSING), shortlist
-    )
-    assert nothing.kept == {SHAPES[1]}
 
 
 def test_a_repeated_search_finds_the_same_as_surely() -> None:

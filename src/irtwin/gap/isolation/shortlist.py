@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from irtwin.effects.effect import Effect
 from irtwin.gap.isolation.posterior import Posterior
-from irtwin.gap.regression.hypotheses import Hypothesis
+from irtwin.gap.regression.hypotheses import Hypothesis, Variant
 
 _SILENT = 0.1  # of log odds: data that say less of a shape say nothing
 _BEHIND = 10.0  # of log odds: so far behind the likeliest shape of a look, one is nobody's rival
@@ -31,30 +31,18 @@ class Shortlist:
     counts: Mapping[Place, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, looks: Iterable[Posterior], hypotheses: Sequence[Hypothesis], before: Self) -> Self:
-        """Take it from the looks of a search at some of its hypotheses, after those `before`."""
-        told: dict[Place, dict[Effect, float]] = {
-            hypothesis.place: {_anywhere(variant.effect): -np.inf for variant in hypothesis.variants}
-            for hypothesis in hypotheses
-        }
-        kept = set[Effect]()
-        for look in looks:
-            least = max(_SILENT, float(look.spoken.max(initial=0.0)) - _BEHIND)
-            for variant, owner, odds in zip(look.evidence.variants, look.owner, look.spoken.tolist(), strict=True):
-                own, shape = told[look.hypotheses[owner].place], _anywhere(variant.effect)
-                own[shape] = max(own[shape], odds)
-                if odds > least:
-                    kept.add(shape)
-        best: dict[str, dict[Effect, float]] = {}
-        for (effect, *_), own in told.items():
-            for shape, odds in own.items():
-                of_effect = best.setdefault(effect, {})
-                of_effect[shape] = max(of_effect.get(shape, -np.inf), odds)
-        for (effect, *_), own in told.items():
-            if kept.isdisjoint(own):
-                kept.add(max(own, key=lambda shape, all_joints=best[effect]: all_joints[shape]))  # type: ignore[misc]
-        counts = {place: max(len(own), before.counts.get(place, 0)) for place, own in told.items()}
-        return cls(before.tried.union(*told.values()), frozenset(kept), {**before.counts, **counts})
+    def of(cls, looks: Sequence[Posterior], hypotheses: Sequence[Hypothesis], before: Self) -> Self:
+        """Take it from the looks of a search at its hypotheses, the first at all of them, after those `before`."""
+        kept = {_anywhere(variant.effect) for look in looks for variant in _spoken_for(look)}
+        first = looks[0]
+        by_odds = [first.evidence.variants[k].effect for k in np.argsort(-first.spoken)]
+        likeliest = list(dict.fromkeys(map(_anywhere, by_odds)))
+        shapes = {h.place: {_anywhere(variant.effect) for variant in h.variants} for h in hypotheses}
+        for own in shapes.values():
+            if kept.isdisjoint(own):  # the same of all joints, if they have it: columns are worked out together
+                kept.add(next(shape for shape in likeliest if shape in own))
+        counts = {place: max(len(own), before.counts.get(place, 0)) for place, own in shapes.items()}
+        return cls(before.tried.union(*shapes.values()), frozenset(kept), {**before.counts, **counts})
 
     def among(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return the effects that are worth trying: those kept, and those that were not tried."""
@@ -63,6 +51,11 @@ class Shortlist:
 
 
 NO_SEARCH = Shortlist()
+
+
+def _spoken_for(look: Posterior) -> Iterator[Variant]:
+    least = max(_SILENT, float(look.spoken.max(initial=0.0)) - _BEHIND)
+    return (look.evidence.variants[k] for k in np.flatnonzero(look.spoken > least))
 
 
 def _anywhere(effect: Effect) -> Effect:

@@ -77,7 +77,7 @@ def attribute(
     named = [k for k, candidate in enumerate(candidates) if not candidate.nuisance]
     hypotheses = tuple(candidates[k] for k in named)
     causes = search.causes(structure, noise)
-    shortlist = Shortlist.of(search.tried.values(), candidates, before)
+    shortlist = Shortlist.of([first, *search.tried.values()], candidates, before)
     return Attribution(causes, noise, hypotheses, visible[named], beside[named], shortlist)
 
 
