@@ -21,6 +21,7 @@ from irtwin.gap.regression.cross_fitted import LeftOut, TwinPower
 from irtwin.gap.regression.hypotheses import MISSING, hypotheses
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.gap.regression.projection import Projection
+from irtwin.gap.search import Search
 from irtwin.gap.thresholds import DEFAULT
 from irtwin.signals.channels import Signals
 from irtwin.signals.log import Run
@@ -208,3 +209,20 @@ def test_what_noise_of_positions_does_is_picked_of_more_columns() -> None:
     for own, other in zip(picked.whole.shaken or (), worked_out.whole.shaken or (), strict=True):
         np.testing.assert_allclose(own, other, rtol=1e-6, atol=1e-9 * np.abs(other).max(initial=0.0))
     assert len(picked.whole.shaken or ()) == 2 * (len(ROBOT.joints) + 1)
+
+
+@pytest.mark.parametrize("power", [True, False])
+def test_a_part_of_a_long_log_proposes_what_all_of_it_decides(power: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = case(cable=6.0)
+    if not power:
+        alone = {run: replace(motion, power=None) for run, motion in one.motions.items()}
+        one = replace(one, motions=alone, given=(ROBOT, alone))
+    names_of = (*TRIED, "torque_ripple", "stribeck_friction")
+    tried = [shape for name in names_of for shape in catalogue()[name].candidates(ROBOT)], []
+    whole = Search(one).torque_causes(tried)[0].finding
+    monkeypatch.setattr("irtwin.identification.accumulate._ENOUGH", 1000)
+    by_part = Search(one).torque_causes(tried)[0].finding
+    assert names(by_part) == names(whole) == ["cable_drag missing joint_1"]
+    assert by_part.system.rows.sum() == whole.system.rows.sum()  # of all of the log
+    assert len(by_part.system.columns) < len(whole.system.columns) / 2
+    assert by_part.causes[0].log_odds == pytest.approx(whole.causes[0].log_odds, rel=0.15)
