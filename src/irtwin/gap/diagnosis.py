@@ -20,12 +20,12 @@ from irtwin.gap.data.case import case_of
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.energy_errors import EnergyErrors, energy_errors
 from irtwin.gap.forecast import forecast
-from irtwin.gap.isolation.beside_power import Tried
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.detectability import untestable
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque
 from irtwin.gap.isolation.finding import ChannelFinding
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals
+from irtwin.gap.isolation.shortlist import Tried
 from irtwin.gap.isolation.verdict import (
     IMPOSSIBLE_NUMBER,
     MUCH_IS_LEFT,

@@ -18,12 +18,12 @@ from irtwin.gap.closed_twin import added
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import OUT_OF_BAND, Floor, noise_floor
 from irtwin.gap.data.same_robot import check_same_robot
-from irtwin.gap.isolation.beside_power import SearchBesidePower, Tried
+from irtwin.gap.isolation.beside_power import SearchBesidePower
 from irtwin.gap.isolation.detectability import can_show
 from irtwin.gap.isolation.explained import Explained, ExplainedTorque, explained_power, floor_left
 from irtwin.gap.isolation.finding import ChannelFinding, attributed, estimate_of, find
 from irtwin.gap.isolation.refusal import NOTHING_REFUSED, Refusals, find_possible
-from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist, Tried
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Without
 from irtwin.gap.regression.candidate_columns import Below
@@ -129,7 +129,7 @@ class Search:
     def torque_causes(self, tried: Tried) -> tuple[ExplainedTorque, Floor, Refusals]:
         """Find the causes of torque, and the floor that they leave; where power was measured too, they explain both."""
         case, known = self.case, (self.unknown, self.refused)
-        some = self.shortlist.among(tried[0]), self.shortlist.among(tried[1])
+        some = self.shortlist.among_both(tried)
         if case.shows("power"):
             about = self.below, self.twin.torque, self.before
             beside = SearchBesidePower(case, self.stack, some, *about, self.floor, self.shortlist)

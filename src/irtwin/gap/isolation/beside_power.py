@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from irtwin.effects.effect import Effect
 from irtwin.effects.stack import Stack
 from irtwin.gap.data.case import Case
 from irtwin.gap.data.noise_floor import Floor
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.explained import ExplainedTorque, floor_left
 from irtwin.gap.isolation.finding import BesidePower, ChannelFinding, attributed, finding_of
-from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
+from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist, Tried
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without
 from irtwin.gap.regression.candidate_columns import Below
@@ -24,9 +23,6 @@ from irtwin.gap.regression.cross_fitted import TwinPower
 from irtwin.gap.regression.joint_equations import JointEquations, joint_equations
 from irtwin.identification.accumulate import part_read
 from irtwin.identification.power_line import power_slope
-
-Tried = tuple[Sequence[Effect], Sequence[Effect]]
-"""Effects on torque, and on power, that a search tries."""
 
 _STRAIGHT = 0.3  # of what is left of power: by less a slope may be off, a tenth of its square
 
@@ -59,7 +55,7 @@ class SearchBesidePower:
         part = self._about(self.effects, self.predicted, self.before, self.case.shaken, every)
         steadied = Steadied.of(self.case, part.whole)
         shortlist = attributed(self.case, part.whole, steadied, _level(part, self.floor), without).shortlist
-        return replace(self, effects=_among(shortlist, self.effects), shortlist=shortlist, part=part)
+        return replace(self, effects=shortlist.among_both(self.effects), shortlist=shortlist, part=part)
 
     @cached_property
     def equations(self) -> JointEquations:
@@ -86,7 +82,7 @@ class SearchBesidePower:
             > _STRAIGHT * power.system.noise_before[0]
         ):
             shortlist = first.attribution.shortlist
-            again = self._about(_among(shortlist, self.effects), explained, power).with_noise_of(self.equations)
+            again = self._about(shortlist.among_both(self.effects), explained, power).with_noise_of(self.equations)
             return _find(case, again, left, without, shortlist), left
         return replace(first, signal_floor=left.torque), left
 
@@ -128,10 +124,6 @@ def _level(equations: JointEquations, floor: Floor) -> np.ndarray:
     """Return the floor of both, (n + 1,) RMS, 0 where it is unknown."""
     of_torque = np.zeros(len(equations.torque.pattern)) if floor.torque is None else floor.torque
     return np.append(of_torque, floor.power or 0.0)
-
-
-def _among(shortlist: Shortlist, effects: Tried) -> Tried:
-    return shortlist.among(effects[0]), shortlist.among(effects[1])
 
 
 def _causes_of_torque(attribution: Attribution) -> list[FoundCause]:

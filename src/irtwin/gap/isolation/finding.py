@@ -190,7 +190,7 @@ def find(
     if telling is None:
         attribution = attributed(case, system, steadied, floor, without, before)
     else:
-        attribution = attributed(case, telling, Steadied.of(case, telling), floor, without)
+        attribution = attributed(case, telling, Steadied.of(case, telling), floor, without, before)
         attribution = replace(attribution, noise=_left(system, attribution))
     return finding_of(name, places, case.observed, system, steadied, attribution, floor, plain)
 

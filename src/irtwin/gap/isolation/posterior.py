@@ -22,10 +22,12 @@ from functools import cached_property
 import numpy as np
 
 from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
-from irtwin.gap.regression.hypotheses import Hypothesis, Variant
+from irtwin.gap.regression.hypotheses import Hypothesis, Place, Variant
 from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.projection import Projection
 from irtwin.gap.thresholds import Criterion
+
+SILENT = 0.1  # of log odds: data that say less of a hypothesis say nothing
 
 _TRIED = 3  # of those that explain most
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
@@ -42,12 +44,10 @@ class HypothesisPrior:
 
     effects: int
     joints: Mapping[tuple[str, str], int]
-    shapes: Mapping[tuple[str, str, str | None], int] = field(default_factory=dict)
+    shapes: Mapping[Place, int] = field(default_factory=dict)
 
     @classmethod
-    def of(
-        cls, candidates: Sequence[Hypothesis], shapes: Mapping[tuple[str, str, str | None], int] | None = None
-    ) -> HypothesisPrior:
+    def of(cls, candidates: Sequence[Hypothesis], shapes: Mapping[Place, int] | None = None) -> HypothesisPrior:
         """Take it from all candidates of a search."""
         effects = {(candidate.effect, candidate.scope) for candidate in candidates}
         joints = Counter((candidate.effect, candidate.scope) for candidate in candidates if candidate.joint)

@@ -9,13 +9,13 @@ from typing import Self
 import numpy as np
 
 from irtwin.effects.effect import Effect
-from irtwin.gap.isolation.posterior import Posterior
-from irtwin.gap.regression.hypotheses import Hypothesis, Variant
+from irtwin.gap.isolation.posterior import SILENT, Posterior
+from irtwin.gap.regression.hypotheses import Hypothesis, Place, Variant
 
-_SILENT = 0.1  # of log odds: data that say less of a shape say nothing
 _BEHIND = 10.0  # of log odds: so far behind the likeliest shape of a look, one is nobody's rival
 
-Place = tuple[str, str, str | None]  # as `Hypothesis.place`
+Tried = tuple[Sequence[Effect], Sequence[Effect]]
+"""Effects on torque, and on power, that a search tries."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,16 @@ class Shortlist:
         dropped = self.tried - self.kept
         return [effect for effect in effects if _anywhere(effect) not in dropped]
 
+    def among_both(self, tried: Tried) -> Tried:
+        """Do as `among` does, of torque and of power."""
+        return self.among(tried[0]), self.among(tried[1])
+
 
 NO_SEARCH = Shortlist()
 
 
 def _spoken_for(look: Posterior) -> Iterator[Variant]:
-    least = max(_SILENT, float(look.spoken.max(initial=0.0)) - _BEHIND)
+    least = max(SILENT, float(look.spoken.max(initial=0.0)) - _BEHIND)
     return (look.evidence.variants[k] for k in np.flatnonzero(look.spoken > least))
 
 

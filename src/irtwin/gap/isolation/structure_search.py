@@ -9,7 +9,7 @@ from itertools import chain, combinations, repeat
 import numpy as np
 
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior, overlap
+from irtwin.gap.isolation.posterior import SILENT, HypothesisPrior, Posterior, overlap
 from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.regression.hypotheses import Hypothesis, Variant, in_scope
 from irtwin.gap.regression.normal_equations import System
@@ -19,7 +19,6 @@ from irtwin.identification.progress import track
 
 _MOST = 16  # hypotheses of a structure
 _HOPELESS = -4.0  # log odds: what has less is not tried further
-_SILENT = 0.1  # of log odds: data that say less of a hypothesis say nothing
 _KEPT = 2  # projections, each by another noise: a look by what is left, and one back
 _SWEEPS = 3  # over a structure, each of its hypotheses looked for anew
 
@@ -214,7 +213,7 @@ class _Search:
             member = posterior.hypotheses[first], posterior.variant(first)
             judged = self.beside(structure, self.left([*structure, member], noise))
             place = judged.likeliest_at(member[0])
-            if judged.log_odds[place] > max(enough, judged.log_prior[place] + _SILENT):
+            if judged.log_odds[place] > max(enough, judged.log_prior[place] + SILENT):
                 return judged.hypotheses[place], judged.variant(place)
         return None
 

@@ -13,6 +13,9 @@ from irtwin.robot.description import Robot
 
 MISSING, CHANGED = "missing", "changed"
 
+Place = tuple[str, str, str | None]
+"""An effect, its scope, and the joint; None: of the whole robot."""
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -41,7 +44,7 @@ class Hypothesis:
     variants: tuple[Variant, ...]
 
     @property
-    def place(self) -> tuple[str, str, str | None]:
+    def place(self) -> Place:
         """Its effect, scope and joint, which no other has."""
         return self.effect, self.scope, self.joint
 

@@ -300,6 +300,10 @@ class System:
         for group in range(self.groups):
             own = rows[self.group == group].sum(axis=0)
             held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))
+        for side in (self.observed, ~self.observed):
+            if len(np.unique(self.group[side])) > 1:  # over all groups, too
+                own = rows[side].sum(axis=0)
+                held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))
         taken = 8 * held
         if taken > _MOST_BYTES:
             raise InputError(
