@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -204,7 +204,7 @@ def diagnose(
     torque: ExplainedTorque | None = None
     if case.shows("torque") and plain is not None:
         tell("Trying every effect on torque")
-        search, torque, floor, refusals = search.causes_of_torque(_tried)
+        search, torque, floor, refusals = search.causes_of_torque(_tried(search))
         case, twin_torque = search.case, search.twin.torque
         explained.append(torque)
         scale = torque_scale(data_set, case.seen, torque)
@@ -284,8 +284,8 @@ def diagnose(
     )
 
 
-def _tried(search: Search) -> Tried:
-    """Return the effects on torque and on power that are tried, those that a screening proposes among them."""
+def _tried(search: Search) -> Callable[[Search], Tried]:
+    """Return what says which effects a search tries; what some of them are is screened once, by the search given."""
     case = search.case
     assert search.plain is not None
     screened = screen(case, search.stack, search.plain)
@@ -294,4 +294,4 @@ def _tried(search: Search) -> Tried:
             search.below(motion)
         if case.shows("power"):
             _ = search.before
-    return screened.shapes(variants(case, "torque")), variants(case, "power")
+    return lambda of: (screened.shapes(variants(of.case, "torque")), variants(of.case, "power"))

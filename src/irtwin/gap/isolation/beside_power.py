@@ -116,7 +116,7 @@ def _find(
     known = floor.torque is not None and floor.power is not None
     within = steadied.within(level) if known else None
     beside = BesidePower(replace(equations, whole=steadied.system), tuple(of_power), within)
-    where = "torque", case.robot.joint_names, case.observed, torque, Steadied.of(case, torque)
+    where = "torque", case.robot.joint_names, case.observed, torque, steadied.of_torque(torque)
     return finding_of(*where, _of_torque(both, equations), floor.torque, beside=beside)
 
 

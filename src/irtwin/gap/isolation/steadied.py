@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,13 @@ class Steadied:
         steadied = differing.steadied(system)
         positions = steadied.with_columns(())[0].by_speed.position_noise.reshape(-1, len(made))
         return cls(steadied, differing.shares, made, sensors, positions)
+
+    def of_torque(self, torque: System) -> Steadied:
+        """Return the same of the `torque` equations, the first of all that are here."""
+        count = len(torque.pattern)
+        blocks = tuple(block.of(slice(count)) for block in self.system.blocks if block.rows[:count].any())
+        of_joints = self.made[:count], self.sensors[:count], self.positions[:, :count]
+        return Steadied(replace(torque, blocks=blocks), self.shares, *of_joints)
 
     def floor(self, signal: np.ndarray | None) -> np.ndarray | None:
         """Return the noise floor, (g,) RMS, of that of the measured `signal`: with what noise of positions makes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -55,6 +56,7 @@ def screen(case: Case, stack: Stack, system: System) -> Screened:
     ripples = (*known_ripples(case.robot, left), *fast_ripples(case.robot, left))
     local = local_effects(case.robot, known, left)
 
+    @cache
     def loads() -> tuple[Effect, ...]:
         touch = in_contact(lambda: tell_step("  waiting for what shows contacts"))
         return each_beside_the_other(case, stack, system, noise, touch)
