@@ -41,14 +41,12 @@ def sharp_sign(dq: np.ndarray) -> np.ndarray:
     return np.where(np.abs(dq) < STANDSTILL, 0.0, np.sign(dq))
 
 
-def turn(dq: np.ndarray, width: float, exponent: float, power: np.ndarray | None = None) -> np.ndarray:
+def turn(dq: np.ndarray, width: float | np.ndarray, exponent: float) -> np.ndarray:
     """Return u/(1 + |u|^p)^(1/p), u = dq/width: the sign of dry friction that turns over a speed, not at once.
 
     Exponent 2 is the usual regularised sign; near 1 the tails are as long as an arctangent's, above 3 nearly a ramp.
-    `power` is |dq|^p where that is known: many widths have it in common, and it takes half of the time.
     """
-    power = np.abs(dq) ** exponent if power is None else power
-    return np.asarray(dq / (width**exponent + power) ** (1 / exponent))
+    return np.asarray(dq / (width**exponent + np.abs(dq) ** exponent) ** (1 / exponent))
 
 
 def direction(robot: Robot, dq: np.ndarray) -> np.ndarray:

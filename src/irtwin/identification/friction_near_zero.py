@@ -7,7 +7,7 @@ of a long log a part proposes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -148,7 +148,7 @@ def _reduced(
             [sample for shape in some for sample in shape.samples(robot, motion, None)] for some in (open_shapes, laws)
         )
         columns = [  # single columns take ten times as long to filter
-            [*some, side_by_side([*of_joint(shapes, k), *_friction(motion.dq[:, k], tried[k]), *of_joint(bent, k)])]
+            [*some, side_by_side([*of_joint(shapes, k), _friction(motion.dq[:, k], tried[k]), *of_joint(bent, k)])]
             for k, some in enumerate(own)
         ]
         undecided = stack.undecided(motion) | sticking.undecided(motion)
@@ -182,11 +182,14 @@ def _alike(effect: Effect, first: Robot, second: Robot) -> bool:
     return np.array_equal(effect.columns(first, slow), effect.columns(second, slow))
 
 
-def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> Iterator[np.ndarray]:
-    yield sharp_sign(dq)[:, None]
-    powers = {exponent: np.abs(dq) ** exponent for exponent in {exponent for _, exponent in shapes}}
-    for width, exponent in shapes:
-        yield turn(dq, width, exponent, powers[exponent])[:, None]
+def _friction(dq: np.ndarray, shapes: Sequence[Turn]) -> np.ndarray:
+    """Return (N, 1 + S) dry friction that turns at once, and by each shape; those of one exponent together."""
+    columns = np.empty((len(dq), 1 + len(shapes)))
+    columns[:, 0] = sharp_sign(dq)
+    for exponent in {exponent for _, exponent in shapes}:
+        own = [k for k, (_, other) in enumerate(shapes) if other == exponent]
+        columns[:, 1 + np.array(own)] = turn(dq[:, None], np.array([shapes[k][0] for k in own]), exponent)
+    return columns
 
 
 def _best(

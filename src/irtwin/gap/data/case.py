@@ -160,13 +160,15 @@ class Case:
         turns, all runs say how.
         """
         robot, effects = self.robot, [*self.effects, *beside]
-        for motions in (self.seen, self.others):
-            if motions:
-                turned, _ = with_friction_near_zero(self.robot, motions, effects)
-                both = zip(robot.joints, turned.joints, strict=True)
-                robot = replace(robot, joints=tuple(_turned(own, joint) for own, joint in both))
+        sides = [motions for motions in (self.seen, self.others) if motions]
+        known = self.turning if len(sides) == 1 else frozenset()  # one side has all runs: once is enough
+        for motions in sides:
+            turned, _ = with_friction_near_zero(self.robot, motions, effects, known)
+            both = zip(robot.joints, turned.joints, strict=True)
+            robot = replace(robot, joints=tuple(_turned(own, joint) for own, joint in both))
         if self.turning:
-            turned, _ = with_friction_near_zero(self.robot, self.with_torque, effects, self.turning)
+            if not known:
+                turned, _ = with_friction_near_zero(self.robot, self.with_torque, effects, self.turning)
             both = zip(robot.joints, turned.joints, strict=True)
             robot = replace(robot, joints=tuple(joint if joint.name in self.turning else own for own, joint in both))
         return replace(self, robot=robot)
