@@ -98,6 +98,7 @@ def test_an_answer_is_taken_as_if_it_had_been_typed(tmp_path: Path) -> None:
     assert_same(read_data_set(tmp_path / "set"))
 
 
+@pytest.mark.slow
 def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None:
     columns = {"time": good()["time"]} | per_joint("q", "c{}", factor=1000.0) | per_joint("tau", "trq{}")
     maps = [f"c{k}=q_joint_a{k}{':mrad' if k == 1 else ''}" for k in range(1, 7)]
@@ -109,6 +110,7 @@ def test_a_word_on_one_column_counts_for_those_beside_it(tmp_path: Path) -> None
     assert_same(read_data_set(tmp_path / "set"), "q torque")
 
 
+@pytest.mark.slow
 def test_a_motion_without_torque_asks_which_columns_are_it(tmp_path: Path) -> None:
     columns = {"time": good()["time"]} | per_joint("q", "pos{}") | per_joint("tau", "xy{}")
     log = write_text(tmp_path / "run.csv", columns)

@@ -41,6 +41,7 @@ def test_the_number_of_a_fault(
     assert not finding.stops
 
 
+@pytest.mark.slow
 def test_a_zero_that_is_off():
     robot = arm(6)
     motion = measure(robot, swing(robot, 0), noise=0.05)

@@ -113,6 +113,7 @@ def test_only_observed_runs_are_shaken() -> None:
     assert not shaken([run], {run.name: condition_for_fit(run, ROBOT, CUTOFF)}, ROBOT, DEFAULT.data)
 
 
+@pytest.mark.slow
 def test_noise_of_positions_is_no_elastic_joint() -> None:
     runs = [logged(seed) for seed in range(1, 6)]
     assert blamed(equations(runs, told=False)) == ["joint_elasticity"]

@@ -368,6 +368,7 @@ def test_effects_that_share_nothing_are_no_rivals():
     assert cause.rivals["effect_1"] < 1e-3
 
 
+@pytest.mark.slow
 @given(st.floats(0.1, 10))
 def test_the_unit_of_noise_does_not_matter(unit):
     system, candidates = system_of(np.eye(2), [0.3, 0.1])

@@ -44,6 +44,7 @@ def test_noise_of_a_coarse_encoder_is_no_louder_than_that_of_torque() -> None:
     assert f"{highest:.3g} Hz, halved as noise of positions is louder than that of torque" in found.why
 
 
+@pytest.mark.slow
 def test_what_a_simulator_lacks_of_noise_says_nothing_of_the_robots_sensors() -> None:
     coarse, exact = runs(5e-3), [replace(run, name=f"{run.name} again", role="simulated") for run in runs(1e-9)]
     assert cutoff_for(ROBOT, [*coarse, *exact], None) == cutoff_for(ROBOT, coarse, None)

@@ -78,6 +78,7 @@ def test_drawn_facts(axioms: list[str], said: list[str]) -> None:
         assert found is None or any(one.predicate.value.endswith("#sameAs") for one in found)
 
 
+@pytest.mark.slow
 def test_facts_that_come_later(two_robots: list[Quad]) -> None:
     ontology, facts = ontology_graph().triples(), sorted((quad.triple for quad in two_robots), key=str)
     schema = Schema(ontology)

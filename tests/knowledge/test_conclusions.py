@@ -74,6 +74,7 @@ def test_an_individual_that_is_sound_keeps_all_that_is_said_of_it() -> None:
     assert aside.statements == {said("a", "mass", Literal(1)), said("a", "mass", Literal(2))}
 
 
+@pytest.mark.slow
 def test_many_clashes_of_a_kind_are_found_at_once() -> None:
     premises = {said(f"run{n}", "mass", Literal(value)) for n in range(50) for value in (n, n + 0.5)}
     infer = mock.Mock(side_effect=lambda out: Closure(ONTOLOGY | (premises - out)))

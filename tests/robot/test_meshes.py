@@ -132,6 +132,7 @@ def test_a_file_too_large_is_refused(tmp_path: Path) -> None:
         read_mesh_file(tmp_path / "large.stl")
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.sampled_from(["stl", "stl_ascii", "obj", "dae"]), st.data())
 def test_a_damaged_mesh_is_read_or_refused(kind: str, data: st.DataObject) -> None:

@@ -20,6 +20,7 @@ def test_they_are_those_of_pinocchio(urdf):
     assert recursive_equations(parse_urdf(urdf)).deviation < 1e-8
 
 
+@pytest.mark.slow
 def test_six_joints_take_few_short_formulas():
     found = recursive_equations(arm(6))
     assert found.deviation < 1e-9
@@ -39,6 +40,7 @@ def test_each_step_is_made_before_it_is_used_and_each_is_needed():
     assert {str(name) for name, _ in found.steps} <= used
 
 
+@pytest.mark.slow
 def test_the_last_joint_alone_takes_fewer_steps():
     found = recursive_equations(arm(6))
     last = found.alone(5)

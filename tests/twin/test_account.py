@@ -73,6 +73,7 @@ def test_what_hardly_makes_up_for_another_is_an_entry_of_its_own():
     assert _joined(energies, variances) == [[0, 1], [2]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("more", "set_to"), [("copper_loss", {}), ("no_regeneration", {"burnt": 1, "Fc": 0, "Fv": 0})])
 def test_a_share_is_as_unsure_as_its_parameters(more, set_to):
     """Parameters drawn from their covariance spread each share as its interval says; those that are set are sure."""

@@ -262,6 +262,7 @@ def test_nothing_to_fit():
         identify(robot, [measure(robot, swing(robot, 1))], ["stiction"])
 
 
+@pytest.mark.slow
 def test_a_long_log_says_the_same_read_in_part_first(monkeypatch):
     robot = with_constants(arm(3))
     motions = [replace(measure(robot, swing(robot, seed), noise=0.3, seed=seed), cutoff=20.0) for seed in range(3)]

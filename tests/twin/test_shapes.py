@@ -71,6 +71,7 @@ def test_the_shape_of_one_effect_is_chosen_beside_those_of_the_others():
         assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in of_stribeck(found))
 
 
+@pytest.mark.slow
 def test_sides_whose_power_was_measured_share_a_shape_of_power():
     sides = [[measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed)] for seed in (1, 2)]
     found = shaped(ROBOT, sides, [*BASELINE, "meter_lag"])

@@ -36,6 +36,7 @@ def fed(of: EnergySoFar, samples: dict[str, np.ndarray], size: int) -> list:
     return stretches
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [pytest.param(1, marks=pytest.mark.nightly), 7, 100, 10**6])
 def test_in_pieces_it_takes_what_it_takes_as_a_whole(size: int) -> None:
     so_far = EnergySoFar(ROBOT.joint_names, TWIN)

@@ -133,6 +133,7 @@ def test_an_effect_of_a_shape_is_written_with_it(tmp_path):
     assert load(path).effects[-1] == shaped
 
 
+@pytest.mark.slow
 def test_brakes_of_a_former_release_open_as_a_joint_moves(tmp_path):
     braked = ("standby_power", "mechanical_power", "rigid_body", HoldingBrakes(delay=0.3))
     path = saved(tmp_path, identify(ROBOT, [MOTION], braked), lambda said: said["effects"][-1]["shape"].pop("lead"))
