@@ -16,6 +16,7 @@ from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Predicted
 from irtwin.effects.friction import turning
 from irtwin.effects.stack import Stack
+from irtwin.errors import InputError
 from irtwin.gap.diagnosis import diagnose
 from irtwin.gap.isolation.apart import Apart, closed_squares
 from irtwin.gap.regression.channel_equations import torque_system
@@ -128,6 +129,12 @@ def test_rows_that_stand_apart_say_together_what_they_said() -> None:
     np.testing.assert_array_equal(apart.rows[:, :2] + apart.rows[:, 2:], system.rows)
     assert np.all(apart.rows > 0)
     assert len(apart.moments(np.tile(noise, 2))) == 2 * system.groups
+
+
+def test_too_many_columns_are_refused_by_the_joints_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("irtwin.gap.regression.normal_equations._MOST_BYTES", 1000)
+    with pytest.raises(InputError, match="trying every effect on 2 joints takes"):
+        reduced(noise=0.0).by_speed.residual_rms((), np.ones(4))
 
 
 def test_a_group_is_left_out_with_all_its_rows() -> None:

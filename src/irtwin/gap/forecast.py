@@ -9,14 +9,14 @@ from irtwin.signals.log import DataSet
 LONG = 30.0  # s: of less nothing is said
 _GROUPS = 8  # at least: few runs are cut in time
 
-# Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 of 6, 12, 20, 30 and 40 joints, and 12x5000
-# of 6; memory to 6, 12 and 30 joints alone. How often is searched depends on what is found.
-_PER_SAMPLE = 2.6e-5  # s, of each sample and joint
-_OF_TORQUE = (4.2e-2, 1.5)  # s, of each group and either role: times joints to a power
+# Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 of 6, 12, 20 and 30 joints, 12x5000 of 6, and
+# 1x200000. How often is searched depends on what is found.
+_PER_SAMPLE = 3.5e-5  # s, of each sample and joint
+_OF_TORQUE = (1.45e-2, 1.85)  # s, of each group and either role: times joints to a power
 _OF_POWER = 1.1  # as much together, where power was measured too
 _BEFORE = 0.2e9  # bytes that the program has without data
-_HELD = (1.6e6, 1.15)  # bytes, of each group and either role: times joints to a power
-_PER_VALUE = 400.0  # bytes, of each sample and joint
+_HELD = (1.57e6, 1.4)  # bytes, of each group and either role: times joints to a power
+_PER_VALUE = 800.0  # bytes, of each sample and joint
 
 
 @dataclass(frozen=True)

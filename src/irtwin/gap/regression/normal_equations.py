@@ -306,8 +306,9 @@ class System:
                 held += sum(numbers(int(count), int(width)) for count, width in zip(own, columns, strict=True))
         taken = 8 * held
         if taken > _MOST_BYTES:
+            joints = len(self.pattern[self.halves[0]]) - self.beside_power
             raise InputError(
-                f"trying every effect on {len(self.pattern) - self.beside_power} joints takes {taken / 1e9:.1f} GB of "
+                f"trying every effect on {joints} joints takes {taken / 1e9:.1f} GB of "
                 f"memory, and {_MOST_BYTES / 1e9:.1f} are the most: take fewer joints at once, or fewer runs"
             )
 
