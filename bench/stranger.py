@@ -347,6 +347,32 @@ def drawn(models: Path, rng: np.random.Generator) -> tuple[Case, str]:
     return Case(arm, changes, roles, repeats, traces, factors, warmth), kind
 
 
+def law_numbers(arm: Arm) -> dict[str, dict[str, list[float]]]:
+    """Return what the law of friction has of shapes of the catalogue's effects, by effect and name, joint by joint."""
+    alike, fading, bristle = np.ones(len(arm.joints)), arm.fading.tolist(), arm.bristle.tolist()
+    known = {
+        "stribeck_friction": {"vs": fading, "d": (2.0 * alike).tolist()},
+        "presliding_hysteresis": {"d": bristle},
+        "nonlinear_viscous_friction": {"d": (0.6 * alike).tolist()},
+    }
+    return {effect: known[effect] for effect in NAME_OF_LAW.get(arm.law, [])}
+
+
+def shapes_held(label: dict[str, Any], causes: list[dict[str, Any]]) -> list[bool]:
+    """Return of each number of a law that nobody named whether its interval holds it; of one of all joints their mean.
+
+    That mean is geometric.
+    """
+    held = []
+    for cause in (one for one in causes if one["effect"] in label["also"]):
+        numbers = label["law_numbers"][cause["effect"]]
+        for stated in (one for one in cause["parameters"] if one["name"] in numbers and one["interval95"]):
+            own = dict(zip(label["joints"], numbers[stated["name"]], strict=True))
+            true = own[stated["joint"]] if stated["joint"] else np.exp(np.mean(np.log(list(own.values()))))
+            held.append(bool(stated["interval95"][0] <= true <= stated["interval95"][1]))
+    return held
+
+
 def make(models: Path, folder: Path, seed: int, number: int) -> dict[str, Any]:
     """Write one case, return its label."""
     rng = np.random.default_rng([seed, number])
@@ -367,9 +393,10 @@ def make(models: Path, folder: Path, seed: int, number: int) -> dict[str, Any]:
     named = rng.random() < 0.6
     write(folder / f"case_{number:03d}", case, named, rng)
     return {
-        "robot": case.arm.name, "law": case.arm.law, "named": named, "differs": case.arm.differs, "kind": kind,
+        "robot": case.arm.name, "joints": case.arm.joints, "law": case.arm.law, "named": named,
+        "differs": case.arm.differs, "kind": kind,
         "scope": case.changes[0].scope if case.changes else "-",
-        "also": [] if named else NAME_OF_LAW.get(case.arm.law, []),
+        "also": [] if named else NAME_OF_LAW.get(case.arm.law, []), "law_numbers": law_numbers(case.arm),
         "effects": [
             {"effect": change.effect, "joints": [] if change.effect in WHOLE else [case.arm.joints[change.joint]],
              "gap_over_floor": max(gap), "size": change.size, "shape": change.shape}
@@ -423,6 +450,7 @@ def write(folder: Path, case: Case, named: bool, rng: np.random.Generator) -> No
 def score(out: Path, labels: dict[str, Any]) -> list[str]:
     """Return a line for each case, then counts."""
     lines, first, placed, strong, blamed, gap, healthy, false, sure = [], 0, 0, 0, 0, 0, 0, 0, []
+    shapes: list[bool] = []
     for name, label in labels.items():
         if not (out / f"{name}.json").exists():
             continue
@@ -433,6 +461,7 @@ def score(out: Path, labels: dict[str, Any]) -> list[str]:
         wrong = [one for one, right in told if one["confidence"] >= 0.5 and not right]
         false += len(wrong)
         sure += [right for one, right in told if one["confidence"] >= 0.9]
+        shapes += shapes_held(label, causes)
         if label["kind"] in ("single", "pair") and max(each["gap_over_floor"] for each in true.values()) >= 1:
             strong += 1
             own = [one for one, _ in told if one["effect"] not in label["also"] or one["effect"] in true]
@@ -456,6 +485,7 @@ def score(out: Path, labels: dict[str, Any]) -> list[str]:
         *lines, f"right first {first}, with joints {placed}, of {strong} of one noise and more",
         f"healthy: blamed {blamed}, not no_gap {gap} (law named or the catalogue's), of {healthy}",
         f"false causes of 0.5 and more {false}; of 0.9 and more right {sum(sure)} of {len(sure)}",
+        f"numbers of the shapes of laws that nobody named: within their intervals {sum(shapes)} of {len(shapes)}",
     ]  # fmt: skip
 
 

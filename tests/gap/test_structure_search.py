@@ -176,6 +176,15 @@ def test_of_two_shapes_that_one_is_taken_which_leaves_less():
     one = Hypothesis("effect", None, MISSING, (*near.variants, *true.variants))
     (cause,) = causes(system, [one])
     assert cause.variants == true.variants
+    assert [len(shapes) for shapes in cause.shapes] == [1]
+
+
+def test_shapes_that_leave_as_much_may_be_the_one_as_well():
+    mix = [[0.98, 0.2], [1.0, 0.0], [1.0, 1e-3]]
+    system, (far, true, near) = system_of(mix, [2.0, 0.0])
+    one = Hypothesis("effect", None, MISSING, (*far.variants, *true.variants, *near.variants))
+    (cause,) = causes(system, [one])
+    assert [len(shapes) for shapes in cause.shapes] == [2]
 
 
 def test_a_crumb_within_the_misfit_that_no_effect_names_is_no_cause():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from irtwin.effects.effect import Effect
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.robot.description import Robot
 
@@ -13,7 +14,8 @@ class FoundCause:
     """An effect in one or more joints (the variants chosen), with what it explains beside the other causes.
 
     gain: of weighted squares, a row of each equation; log_odds: that it is there beside the other causes, against that
-    nothing is in its place; probability: against all that could be; `rivals`: each other effect's, all scopes.
+    nothing is in its place; probability: against all that could be; `rivals`: each other effect's, all scopes;
+    `shapes`: of each variant those that it may have, 95 % of their posterior.
     """
 
     effect: str
@@ -24,6 +26,7 @@ class FoundCause:
     log_odds: float
     probability: float
     rivals: dict[str, float] = field(default_factory=dict)
+    shapes: tuple[tuple[Effect, ...], ...] = ()
 
     def not_told_from(self, least: float) -> tuple[str, ...]:
         """Return the effects that the data do not tell from it: as likely as `least`, the likeliest first."""

@@ -17,6 +17,7 @@ from irtwin.gap.isolation.both_channels import BothChannels, acting, observed_gr
 from irtwin.gap.isolation.cause import FoundCause
 from irtwin.gap.isolation.closing import Closing, closing, share_above
 from irtwin.gap.isolation.detectability import can_show
+from irtwin.gap.isolation.shape_interval import with_shape
 from irtwin.gap.isolation.shortlist import NO_SEARCH, Shortlist
 from irtwin.gap.isolation.steadied import Steadied
 from irtwin.gap.isolation.structure_search import Attribution, Without, attribute
@@ -300,8 +301,9 @@ def of_variant(robot: Robot, finding: ChannelFinding, cause: FoundCause, number:
     if len(effect.terms(robot)) != len(places):
         return [_coefficient(term, estimate, place) for term, place in zip(variant.terms, places, strict=True)]
     given = Coefficients(estimate.values[places], estimate.covariance[np.ix_(places, places)], known)
-    stated = effect.parameters(robot, given)
-    return [parameter for parameter in stated if np.isfinite(parameter.value)]
+    stated = [parameter for parameter in effect.parameters(robot, given) if np.isfinite(parameter.value)]
+    likely = cause.shapes[number] if cause.shapes else ()
+    return with_shape(stated, robot, effect, likely, shared=not cause.joints)
 
 
 def _coefficient(term: Term, estimate: Estimate, place: int) -> Quantity:

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from irtwin.effects.effect import Effect
 from irtwin.gap.regression.evidence import HypothesisEvidence, evidence
 from irtwin.gap.regression.hypotheses import Hypothesis, Place, Variant
 from irtwin.gap.regression.normal_equations import System
@@ -32,6 +33,7 @@ SILENT = 0.1  # of log odds: data that say less of a hypothesis say nothing
 _TRIED = 3  # of those that explain most
 _HIDDEN = 6.0  # of log odds, by noise that holds the effect
 _SIZES = tuple(4.0**-k for k in range(-1, 5))  # in units of what is expected, alike for a base and a wrist
+_SURE = 0.95  # of the posterior of shapes
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
 
 
@@ -179,6 +181,15 @@ class Posterior:
         kept = np.flatnonzero((self.log_odds > least - _HIDDEN) & (shown > 0))
         if len(kept):
             yield from dict.fromkeys([*kept[np.argsort(-shown[kept])[:_TRIED]], kept[np.argmax(self.log_odds[kept])]])
+
+    def shapes_of(self, place: int) -> tuple[Effect, ...]:
+        """Return the likeliest shapes of a hypothesis, as many as hold 95 % of what all of them have."""
+        own = np.flatnonzero(self.owner == place)
+        weights, _ = self._beside_best(own, np.zeros(1, dtype=int))
+        order = np.argsort(-weights)
+        held = np.cumsum(np.exp(weights[order] - np.logaddexp.reduce(weights)))
+        few = order[: np.searchsorted(held, _SURE) + 1]
+        return tuple(self.evidence.variants[k].effect for k in own[few])
 
     def explained(self, place: int) -> float:
         """Return the squares that a hypothesis explains in its best shape."""

@@ -359,6 +359,7 @@ def _cause(member: Member, posterior: Posterior) -> FoundCause:
         log_odds=float(posterior.log_odds[own]),
         probability=probability,
         rivals=rivals,
+        shapes=(posterior.shapes_of(own),),
     )
 
 
@@ -369,6 +370,7 @@ def _joined(parts: Sequence[FoundCause]) -> FoundCause:
         first,
         joints=tuple(joint for part in parts for joint in part.joints),
         variants=tuple(variant for part in parts for variant in part.variants),
+        shapes=tuple(shapes for part in parts for shapes in part.shapes),
         gain=sum(part.gain for part in parts),
     )
 
