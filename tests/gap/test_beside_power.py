@@ -184,8 +184,9 @@ def test_what_power_alone_tells_of_a_sensor_is_no_surer_than_power_is_explained(
     projection = Projection(system, noise, [shape for each in named for shape in each.variants])
     by_equation = np.tile([misfit["torque"], misfit["torque"], misfit["power"]], 2)
     prior = HypothesisPrior.of(named)
-    beside = Posterior.beside(projection, ((), ()), named, prior, DEFAULT.criterion, by_equation)
-    told = {(each.effect, each.joint): size**2 for each, size in zip(named, beside.misfit, strict=True)}
+    beside = Posterior.beside(projection, ((), ()), named, prior, DEFAULT.criterion, (by_equation, by_equation))
+    many = replace(beside, evidence=replace(beside.evidence, rows=1e6 * beside.evidence.rows))  # all is misfit
+    told = {(each.effect, each.joint): variance for each, variance in zip(named, many.variance, strict=True)}
     assert told["cable_drag", "joint_1"] < 2 * misfit["torque"]  # both tell that
     assert told["torque_constant_error", "joint_2"] > 5 * misfit["torque"]
 

@@ -248,8 +248,26 @@ def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it(
     alike = np.ones(5, dtype=int)
     seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, np.zeros(5), every, alike)
     named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
-    posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one[:, 0], DEFAULT.criterion)
+    posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one, DEFAULT.criterion)
     assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
+
+
+def where_friction_turns(effect):
+    """The log odds of an effect that shows in slow rows alone, as large as three noises."""
+    generator, blocks = np.random.default_rng(5), []
+    for run in range(RUNS):
+        constant, column, fast, slow = np.ones(ROWS), *generator.standard_normal((3, ROWS))
+        halves = [constant, 0.0 * column, fast], [constant, column, 3.0 * column + slow]
+        factors = tuple(triangle(np.column_stack(half)) for half in halves)
+        blocks.append(Block(f"run_{run}", 0.0, 1.0, np.full(2, ROWS), factors))
+    column = CandidateColumn(catalogue()[effect], 0, Term("k", "1"))
+    system = replace(equation(blocks, [CONSTANT], [column]), pattern=np.ones((2, 2), dtype=bool), apart=True)
+    (cause,) = causes(system, [alone(effect, 1, column)])
+    return cause.log_odds
+
+
+def test_what_is_left_where_friction_turns_tells_of_reversals_alone():
+    assert where_friction_turns("backlash") > where_friction_turns("load_dependent_friction") + 10
 
 
 def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
@@ -264,7 +282,7 @@ def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
         Hypothesis("loss", None, MISSING, variants[:1]),
         Hypothesis("friction", "j1", MISSING, variants[1:]),
     )
-    posterior = Posterior((loss, friction), np.arange(2), np.zeros(2), seen, 0.05 * one[:, 0], DEFAULT.criterion)
+    posterior = Posterior((loss, friction), np.arange(2), np.zeros(2), seen, 0.05 * one, DEFAULT.criterion)
     assert (posterior.near(loss), posterior.near(friction)) == ([0], [1])
     assert posterior.likeliest_at(friction) == 1
 

@@ -266,6 +266,7 @@ class Backlash(_Compliance):
 
     id: ClassVar[str] = "backlash"
     family: ClassVar[str] = "transmission"
+    about_reversals: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"b": (3e-4, 3e-3)}
 
     b: float = 1e-3  # rad
@@ -322,6 +323,7 @@ class JointElasticity(_Compliance):
 
     id: ClassVar[str] = "joint_elasticity"
     family: ClassVar[str] = "transmission"
+    about_reversals: ClassVar[bool] = True
     across: ClassVar[bool] = True
 
     contribution = Effect.contribution

@@ -144,6 +144,7 @@ class Effect(ABC):
     as likely there as not, explains what it can, and is no cause. Columns of one that is `smooth` depend on their
     sample's states alone, and vary no faster than these. `differs_by_run`: what its coefficients are called, which are
     others in each run. `prior_tells`: that its coefficients lie far from what is known of them is evidence by itself.
+    `about_reversals`: it shows most where a joint reverses, beside what nobody knows of how dry friction turns there.
 
     `family` is what engineers would file it under. `requires` names signals that it depends on beside the motion,
     `alters` an effect whose number it changes: where the twin lacks both, there is nothing to change.
@@ -191,6 +192,7 @@ class Effect(ABC):
     never_changed: ClassVar[bool] = False
     nuisance: ClassVar[bool] = False
     prior_tells: ClassVar[bool] = False
+    about_reversals: ClassVar[bool] = False
     entries: ClassVar[tuple[str, ...]] = ()
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     lately: ClassVar[frozenset[str]] = frozenset()

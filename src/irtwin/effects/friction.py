@@ -86,6 +86,7 @@ class FrictionTurn(JointEffect):
 
     id: ClassVar[str] = "friction_turn"
     family: ClassVar[str] = "friction"
+    about_reversals: ClassVar[bool] = True
     nuisance: ClassVar[bool] = True
     never_changed: ClassVar[bool] = True
 
@@ -156,6 +157,7 @@ class StribeckFriction(JointEffect):
 
     id: ClassVar[str] = "stribeck_friction"
     family: ClassVar[str] = "friction"
+    about_reversals: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"vs": (0.005, 0.2), "d": (0.5, 2.0)}
 
     vs: float = 0.05  # rad/s
@@ -350,6 +352,7 @@ class PreslidingHysteresis(JointEffect):
 
     id: ClassVar[str] = "presliding_hysteresis"
     family: ClassVar[str] = "friction"
+    about_reversals: ClassVar[bool] = True
     memory: ClassVar[bool] = True
     ranges: ClassVar[dict[str, tuple[float, float]]] = {"d": (1e-4, 0.2)}
 

@@ -151,6 +151,7 @@ class TimeDelay(JointEffect):
 
     id: ClassVar[str] = "time_delay"
     family: ClassVar[str] = "sensing"
+    about_reversals: ClassVar[bool] = True
     manual_test: ClassVar[str | None] = "sines of rising frequency, up to 5 Hz"
     channel: ClassVar[str] = "measurement"
     needs: ClassVar[str | None] = "torque"
@@ -184,6 +185,7 @@ class TorqueLag(Effect):
 
     id: ClassVar[str] = "torque_lag"
     family: ClassVar[str] = "sensing"
+    about_reversals: ClassVar[bool] = True
     channel: ClassVar[str] = "measurement"
     needs: ClassVar[str | None] = "torque"
     stage: ClassVar[int] = 3

@@ -78,7 +78,7 @@ class HypothesisPrior:
 class Posterior:
     """H hypotheses beside a structure; V variants of the `evidence`, each of its `owner`, with `prior` and `misfit`.
 
-    `prior` (V,): log odds of each; `misfit` (V,): RMS.
+    `prior` (V,): log odds of each; `misfit` (V, `System.kinds`): RMS, where each acts.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -96,9 +96,12 @@ class Posterior:
         candidates: Sequence[Hypothesis],
         prior: HypothesisPrior,
         limits: Criterion,
-        misfit: np.ndarray,
+        misfit: tuple[np.ndarray, np.ndarray],
     ) -> Posterior:
-        """Try candidates beside what was `found`, by its columns, everything refitted; `misfit` (g,): of `_Search`."""
+        """Try candidates beside what was `found`, by its columns, everything refitted.
+
+        `misfit` (g,): of effects that act about reversals, and of others, as `_Search` has it.
+        """
         variants = [variant for candidate in candidates for variant in candidate.variants]
         owner = np.repeat(np.arange(len(candidates)), [len(candidate.variants) for candidate in candidates])
         known, chosen = found
@@ -111,14 +114,22 @@ class Posterior:
         log_prior = np.array(odds)[owner] - np.where(screened, np.log(_SCREENED), 0.0)
         stand_for = np.round(np.array(shapes) / [len(candidate.variants) for candidate in candidates]).astype(int)
         seen = evidence(projection, chosen, variants, stand_for[owner])
-        own = np.sqrt(_where_it_explains(projection.system, misfit, seen))
-        return cls(tuple(candidates), owner, log_prior, seen, own, limits)
+        about = np.array([variant.effect.about_reversals for variant in variants], dtype=bool)[:, None]
+        of_kinds = np.where(about, *(_of_kinds(projection.system, variants, each) for each in misfit))
+        return cls(tuple(candidates), owner, log_prior, seen, np.sqrt(of_kinds), limits)
 
     @cached_property
     def variance(self) -> np.ndarray:
-        """(V,) of what is left along a variant's columns, a row, in units of the noise."""
+        """(V,) of what is left along a variant's columns, a row, in units of the noise.
+
+        What a variant explains in one kind of equations counts by the misfit there. Power may tell of torque what
+        torque does not: that a sensor is off is said by power alone, and no surer than power is explained.
+        """
         seen = self.evidence
-        return np.asarray(self.misfit**2 + (seen.disagreement + seen.unnamed) / seen.rows_that_speak)
+        of_kinds = self.misfit**2 + ((seen.disagreement + seen.unnamed) / seen.rows_that_speak)[:, None]
+        explained = seen.by_kind.clip(min=0.0)
+        explained[explained.sum(axis=1) <= 0] = 1.0
+        return np.asarray(explained.sum(axis=1) / (explained / of_kinds).sum(axis=1))
 
     @cached_property
     def log_odds(self) -> np.ndarray:
@@ -300,19 +311,13 @@ def _largest(values: np.ndarray, firsts: np.ndarray) -> np.ndarray:
     return np.array([first + np.argmax(values[first:end]) for first, end in zip(firsts, ends, strict=False)], dtype=int)
 
 
-def _where_it_explains(system: System, misfit: np.ndarray, seen: HypothesisEvidence) -> np.ndarray:
-    """Return (V,) the misfit, squared, of the rows in which a variant explains something; `misfit` (g,) of equations.
-
-    What it explains in one kind of equations counts by the misfit there. Power may tell of torque what torque does not:
-    that a sensor is off is said by power alone, and no surer than power is explained.
-    """
-    acts = system.equations([variant.columns for variant in seen.variants])
-    explained, own = seen.by_kind.clip(min=0.0), np.zeros_like(seen.by_kind)
-    for k, kind in enumerate(system.kinds):
-        mine = np.where(acts[:, kind].any(axis=1, keepdims=True), acts[:, kind], True)
-        own[:, k] = (mine * misfit[kind]).sum(axis=1) / mine.sum(axis=1)
-    explained[explained.sum(axis=1) <= 0] = 1.0
-    return np.asarray(explained.sum(axis=1) / (explained / own).sum(axis=1))
+def _of_kinds(system: System, variants: Sequence[Variant], misfit: np.ndarray) -> np.ndarray:
+    """Return (V, `System.kinds`) the mean `misfit` (g,) of the equations of a kind in which each variant acts."""
+    acts, means = system.equations([variant.columns for variant in variants]), []
+    for kind in system.kinds:
+        own = np.where(acts[:, kind].any(axis=1, keepdims=True), acts[:, kind], True)
+        means.append((own * misfit[kind]).sum(axis=1) / own.sum(axis=1))
+    return np.array(means).T.reshape(len(variants), len(system.kinds))
 
 
 def overlap(first: Hypothesis, second: Hypothesis) -> bool:

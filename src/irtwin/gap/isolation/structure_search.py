@@ -148,7 +148,8 @@ class _Search:
             and not any(_same_place(candidate, member) for member, _ in structure)
         ]
         found = [hypothesis for hypothesis, _ in structure], _columns(structure) if columns is None else columns
-        return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, self.misfit(noise))
+        misfit = self.misfit(noise, noise), self.misfit(noise, self.left(structure, noise))
+        return Posterior.beside(self.projection(noise), found, left, self.prior, self.limits, misfit)
 
     def fitted(self, structure: Sequence[Member], noise: np.ndarray) -> list[int]:
         """Return the columns of a structure, in order, without those of nuisances that would be below their bounds."""
@@ -173,17 +174,19 @@ class _Search:
         self.projections[asked] = projection
         return projection
 
-    def misfit(self, noise: np.ndarray) -> np.ndarray:
+    def misfit(self, noise: np.ndarray, turning: np.ndarray) -> np.ndarray:
         """Return (g,) the misfit along any effect, squared, as a part of the mean square that is left, `noise`.
 
-        It is larger by what no floor explains, and where dry friction turns by all that is left beyond other rows.
+        It is larger by what no floor explains, and where dry friction turns by all that is left beyond other rows by
+        the noise `turning`: of an effect about reversals that is what it leaves itself, of others what is left without
+        them, as what the unknown law of friction leaves is not theirs to explain.
         """
         limits, floor = self.limits, np.zeros_like(noise) if self.floor is None else self.floor
         unexplained = 1 - np.minimum((1 + limits.excess) * (floor / noise) ** 2, 1.0)
         misfit = limits.misfit**2 + limits.misfit_unexplained**2 * unexplained
-        fast = noise[self.system.halves[0]]
+        fast = turning[self.system.halves[0]]
         for half in self.system.halves[1:]:
-            misfit[half] += 1 - np.minimum(fast / noise[half], 1.0) ** 2
+            misfit[half] += 1 - np.minimum(fast / turning[half], 1.0) ** 2
         return np.asarray(misfit)
 
     def forward(self, posterior: Posterior, noise: np.ndarray) -> tuple[list[Member], np.ndarray]:
