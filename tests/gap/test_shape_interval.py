@@ -36,6 +36,12 @@ def test_what_the_data_do_not_tell_apart_is_within():
     assert (exponent.lower, exponent.upper) == pytest.approx((np.sqrt(2), 2.0))
 
 
+def test_what_is_said_lies_within_whatever_is_likelier():
+    angle, likelier = PreslidingHysteresis(d=0.01, joints=("joint_1",)), PreslidingHysteresis(d=1e-3)
+    (said,) = stated(angle, [likelier])
+    assert said.lower < 1e-3 and said.upper > 0.01
+
+
 def test_a_shape_that_joints_share_is_said_once():
     angle = PreslidingHysteresis(d=3e-3)
     assert len(stated(angle, [angle])) == 3

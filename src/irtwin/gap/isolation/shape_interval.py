@@ -34,9 +34,9 @@ def _interval(name: str, robot: Robot, effect: Effect, likely: Sequence[Effect])
     None, None where values are found by a screening, and not chosen out of the effect's `candidates`.
     """
     least, most = effect.ranges[name]
-    alike = [shape for shape in likely if isinstance(shape, type(effect))]
-    if effect.screened or not alike or least <= 0:
+    if effect.screened or not likely or least <= 0:
         return None, None
+    alike = effect, *(shape for shape in likely if isinstance(shape, type(effect)))
     tried = np.unique([getattr(shape, name) for shape in (*effect.candidates(robot), *alike)])
     edges = [min(least, tried[0]), *np.sqrt(tried[:-1] * tried[1:]), max(most, tried[-1])]
     own = np.searchsorted(tried, [getattr(shape, name) for shape in alike])
