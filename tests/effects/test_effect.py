@@ -62,13 +62,29 @@ def test_parameters_have_the_units_of_the_ontology():
             assert own[said] == unit if said in own else said in effect.ranges, name
 
 
-def units(effect, robot):
-    """The names and units of an effect's parameters, "N m" as "Nm"; parts of a vector ("f_x") under the whole's."""
+def test_the_ontology_knows_the_numbers_of_shapes():
+    graph = rdflib.Graph().parse(folder("ontology") / "effects.ttl")
+    irt, effect_iri = rdflib.Namespace("https://w3id.org/irtwin#"), "https://w3id.org/irtwin/effect/"
+    robot = with_constants(arm(3))
+    for name, effect in catalogue().items():
+        every = graph.objects(rdflib.URIRef(effect_iri + name), irt.has_Effect_Parameter)
+        shapes = {parameter for parameter in every if (parameter, rdflib.RDF.type, irt.Shape_Parameter) in graph}
+        said = {str(graph.value(parameter, irt.Parameter_Name)) for parameter in shapes}
+        as_it_is = {each.name for each in parameters(effect, robot) if each.lower is None}
+        assert said == as_it_is & effect.shape.keys(), name
+
+
+def parameters(effect, robot):
+    """What an effect says of coefficients of one that are known to one."""
     terms = [term for term in effect.terms(robot) if not term.fixed]
     names = {"coulomb_friction": "Fc", "viscous_friction": "Fv", "rotor_inertia": "Ia", "copper_loss": "R"}
     known = {(effect, joint, name): 1.0 for effect, name in names.items() for joint in robot.joint_names}
-    found = effect.parameters(robot, Coefficients(np.ones(len(terms)), np.eye(len(terms)), known)) if terms else ()
-    return {each.name.partition("_")[0]: each.unit.replace("N m", "Nm") for each in found}
+    return effect.parameters(robot, Coefficients(np.ones(len(terms)), np.eye(len(terms)), known)) if terms else ()
+
+
+def units(effect, robot):
+    """The names and units of an effect's parameters, "N m" as "Nm"; parts of a vector ("f_x") under the whole's."""
+    return {each.name.partition("_")[0]: each.unit.replace("N m", "Nm") for each in parameters(effect, robot)}
 
 
 def test_ids_and_keys_agree():

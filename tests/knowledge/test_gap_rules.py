@@ -135,3 +135,22 @@ def test_a_cause_that_closes_little_calls_for_nothing(actions):
 def test_a_guess_calls_for_nothing(actions):
     assert actions["likely"] == {AGAIN, "measure the payload"}
     assert "guess" not in actions
+
+
+def test_a_number_of_a_shape_is_no_change() -> None:
+    """A dry friction that changed by five deviations, and the speed over which it fades, as sure of itself."""
+    lines = [
+        "@prefix irt: <https://w3id.org/irtwin#> . @prefix : <https://w3id.org/irtwin/id/> .",
+        f"<{SOURCE}> {{",
+        ":cause a irt:Gap_Cause ; irt:cause_of :d ; irt:has_Scope <https://w3id.org/irtwin/scope/changed> ;",
+        "irt:caused_by_Effect <https://w3id.org/irtwin/effect/stribeck_friction> . :d a irt:Gap_Diagnosis .",
+    ]
+    for name, value, half in (("Fs", 5.0, 2.0), ("vs", 0.05, 0.02)):
+        lines.append(
+            f':{name} irt:parameter_of_Cause :cause ; irt:Cause_Parameter_Name "{name}" ; '
+            f"irt:Cause_Parameter_Value {value}e0 ; irt:Cause_Parameter_Lower {value - half}e0 ; "
+            f"irt:Cause_Parameter_Upper {value + half}e0 ."
+        )
+    graph = reasoned_over(parse("\n".join([*lines, "}"]), format=RdfFormat.TRIG))
+    rows = graph.query("SELECT ?name WHERE { ?changed a irt:Changed_Parameter ; irt:Cause_Parameter_Name ?name }")
+    assert [row["name"] for row in rows] == ["Fs"]

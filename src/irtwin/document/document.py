@@ -112,7 +112,7 @@ class GapLocation:
 
 @part("Gap_Cause_Parameter", of="parameter_of_Cause", ranked=True)
 class CauseParameter:
-    """A parameter of a cause, in its `unit`; joint None: of the whole robot.
+    """A parameter of a cause, in its `unit`; joint None: of the whole robot, or of all joints of the cause alike.
 
     Where a simulator has the number, `simulator` is its, `robot` the robot's, and `value` how far these are apart.
     """

@@ -20,7 +20,11 @@ def with_shape(
     """
     stated = []
     for quantity in quantities:
-        if quantity.lower is None and quantity.name in effect.ranges:
+        if (
+            quantity.lower is None
+            and quantity.value == effect.shape.get(quantity.name)
+            and quantity.name in effect.ranges
+        ):
             lower, upper = _interval(quantity.name, robot, effect, likely)
             joint = None if shared else quantity.joint
             quantity = replace(quantity, joint=joint, lower=lower, upper=upper)
