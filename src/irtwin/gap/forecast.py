@@ -11,8 +11,8 @@ _GROUPS = 8  # at least: few runs are cut in time
 
 # Set by hand to what `bench/diagnosis_speed.py` took, with power: 12x1000 of 6, 12, 20 and 30 joints, 12x5000 of 6, and
 # 1x200000. How often is searched depends on what is found.
-_PER_SAMPLE = 3.5e-5  # s, of each sample and joint
-_OF_TORQUE = (1.45e-2, 1.85)  # s, of each group and either role: times joints to a power
+_PER_SAMPLE = 4.5e-5  # s, of each sample and joint
+_OF_TORQUE = (8.47e-3, 2.022)  # s, of each group and either role: times joints to a power
 _OF_POWER = 1.1  # as much together, where power was measured too
 _BEFORE = 0.2e9  # bytes that the program has without data
 _HELD = (1.57e6, 1.4)  # bytes, of each group and either role: times joints to a power
