@@ -1,7 +1,7 @@
 """Arms of others under a plant written from the log format alone: how right is a diagnosis where laws are not its own?
 
-In bench/: `python stranger.py make MODELS FOLDER --seed SEED --count 40`, `python -m blind.run FOLDER OUT`, `python
-stranger.py score OUT FOLDER_labels.json`. MODELS is the folder of `pip download --no-deps robosuite gymnasium-robotics
+In bench/: `python stranger.py MODELS FOLDER --seed SEED --count 40`, `python -m blind.run FOLDER OUT`, `python
+stranger_score.py OUT FOLDER_labels.json`. MODELS is the folder of `pip download --no-deps robosuite gymnasium-robotics
 -d MODELS`. Motions are prescribed; torque is that of bodies off their drawings, rotors, and one of nine laws of
 friction that differs by up to 5 % from run to run; encoders are coarse, torque is a quantised current that may lag.
 """
@@ -358,21 +358,6 @@ def law_numbers(arm: Arm) -> dict[str, dict[str, list[float]]]:
     return {effect: known[effect] for effect in NAME_OF_LAW.get(arm.law, [])}
 
 
-def shapes_held(label: dict[str, Any], causes: list[dict[str, Any]]) -> list[bool]:
-    """Return of each number of a law that nobody named whether its interval holds it; of one of all joints their mean.
-
-    That mean is geometric.
-    """
-    held = []
-    for cause in (one for one in causes if one["effect"] in label["also"]):
-        numbers = label["law_numbers"][cause["effect"]]
-        for stated in (one for one in cause["parameters"] if one["name"] in numbers and one["interval95"]):
-            own = dict(zip(label["joints"], numbers[stated["name"]], strict=True))
-            true = own[stated["joint"]] if stated["joint"] else np.exp(np.mean(np.log(list(own.values()))))
-            held.append(bool(stated["interval95"][0] <= true <= stated["interval95"][1]))
-    return held
-
-
 def make(models: Path, folder: Path, seed: int, number: int) -> dict[str, Any]:
     """Write one case, return its label."""
     rng = np.random.default_rng([seed, number])
@@ -447,63 +432,13 @@ def write(folder: Path, case: Case, named: bool, rng: np.random.Generator) -> No
     (folder / "dataset.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def score(out: Path, labels: dict[str, Any]) -> list[str]:
-    """Return a line for each case, then counts."""
-    lines, first, placed, strong, blamed, gap, healthy, false, sure = [], 0, 0, 0, 0, 0, 0, 0, []
-    shapes: list[bool] = []
-    for name, label in labels.items():
-        if not (out / f"{name}.json").exists():
-            continue
-        answer = json.loads((out / f"{name}.json").read_text(encoding="utf-8"))
-        causes = answer.get("causes", [])
-        true = {each["effect"]: each for each in label["effects"]}
-        told = [(one, one["effect"] in true or one["effect"] in label["also"]) for one in causes]
-        wrong = [one for one, right in told if one["confidence"] >= 0.5 and not right]
-        false += len(wrong)
-        sure += [right for one, right in told if one["confidence"] >= 0.9]
-        shapes += shapes_held(label, causes)
-        if label["kind"] in ("single", "pair") and max(each["gap_over_floor"] for each in true.values()) >= 1:
-            strong += 1
-            own = [one for one, _ in told if one["effect"] not in label["also"] or one["effect"] in true]
-            right = bool(own) and own[0]["effect"] in true
-            first += right
-            placed += right and set(own[0]["joints"]) == set(true[own[0]["effect"]]["joints"])
-        if label["kind"] == "clean_null":
-            healthy, blamed = healthy + 1, blamed + bool(wrong)
-            gap += answer.get("verdict") != "no_gap" and not label["also"]
-        truth = ", ".join(f"{e['effect']} {e['joints']} {e['gap_over_floor']:.1f}" for e in label["effects"]) or "-"
-        says = "; ".join(
-            f"{o['effect']} ({o['scope'][0]}) {','.join(o['joints'])} {o['confidence']:.2f}" for o in causes[:5]
-        )
-        mark = "FALSE " if wrong else ""
-        lines.append(
-            f"{name} {label['robot']} {label['law']}{'+' if label['named'] else ''} {label['differs']:g} "
-            f"{label['scope']}: "
-            f"{truth} | {answer.get('verdict', answer.get('error'))} | {mark}{says or '-'} | {answer['seconds']:.0f} s"
-        )
-    return [
-        *lines, f"right first {first}, with joints {placed}, of {strong} of one noise and more",
-        f"healthy: blamed {blamed}, not no_gap {gap} (law named or the catalogue's), of {healthy}",
-        f"false causes of 0.5 and more {false}; of 0.9 and more right {sum(sure)} of {len(sure)}",
-        f"numbers of the shapes of laws that nobody named: within their intervals {sum(shapes)} of {len(shapes)}",
-    ]  # fmt: skip
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python stranger.py", description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True)
-    making = commands.add_parser("make")
-    making.add_argument("models", type=Path)
-    making.add_argument("folder", type=Path)
-    making.add_argument("--seed", type=int, required=True)
-    making.add_argument("--count", type=int, default=40)
-    scoring = commands.add_parser("score")
-    scoring.add_argument("out", type=Path)
-    scoring.add_argument("labels", type=Path)
+    parser.add_argument("models", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--count", type=int, default=40)
     given = parser.parse_args()
-    if given.command == "score":
-        print(*score(given.out, json.loads(given.labels.read_text(encoding="utf-8"))), sep="\n")
-        return
     labels = {f"case_{k:03d}": make(given.models, given.folder, given.seed, k) for k in range(given.count)}
     given.folder.with_name(given.folder.name + "_labels.json").write_text(
         json.dumps(labels, indent=1), encoding="utf-8"
