@@ -10,6 +10,7 @@ from tests.synthetic import arm, swing
 
 from irtwin.effects.compliance import Backlash, JointElasticity, load_inertia, load_torque, transmitted
 from irtwin.effects.effect import Coefficients, Predicted, Quantity, Stated
+from irtwin.robot.body_regressor import body_regressor
 from irtwin.signals.motion import Motion
 
 RATE = 250.0
@@ -105,6 +106,20 @@ def test_one_joint_alone_is_as_among_others(effect):
     (one,) = effect.on(robot.joint_names[1]).samples(robot, motion, predicted)
     np.testing.assert_allclose(one[:, 1], every[:, 1], rtol=1e-12, atol=1e-12)
     assert every[:, 1].any() and not one[:, [0, 2]].any()
+
+
+def test_bodies_that_no_motion_tells_apart_give_an_elastic_joint_the_same_columns():
+    robot, motion = arm(3), swing(arm(3), 1, seconds=3)
+    drawn = np.concatenate([body.toDynamicParameters() for body in list(robot.model.inertias)[1:]])
+    regressor = body_regressor(robot.model, motion.q, motion.dq, motion.ddq).reshape(-1, len(drawn))
+    unseen = np.linalg.svd(regressor)[2][np.linalg.matrix_rank(regressor) :]
+    heavy = unseen.T @ unseen[:, 20]  # of what no motion shows, the most of the last body's mass
+    bodies = drawn - 3 * heavy / heavy[20] * drawn[20]  # less than none
+    elastic = JointElasticity(antiresonance=8.0)
+    as_drawn, as_found = (
+        elastic.columns(robot, motion, Predicted(np.zeros_like(motion.q), bodies=own)) for own in (drawn, bodies)
+    )
+    np.testing.assert_allclose(as_found, as_drawn, atol=1e-6 * np.abs(as_drawn).max())
 
 
 def test_a_gap_that_is_known_about_passes_the_mean_of_it_and_of_those_about_it():

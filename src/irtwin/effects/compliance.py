@@ -23,7 +23,7 @@ from irtwin.effects.effect import (
     quantity,
     ratio,
 )
-from irtwin.effects.rigid_body import model_of
+from irtwin.effects.rigid_body import model_of, torque_slope
 from irtwin.robot.description import Joint, Robot
 from irtwin.robot.model import inverse_dynamics
 from irtwin.signals.conditioning import differentiate
@@ -79,9 +79,9 @@ def _dragged(robot: Robot, motion: Motion, acting: Sequence[int], predicted: Pre
     """
     rows, known = _mass_matrices(robot, motion)
     own = np.maximum(np.diagonal(known, axis1=1, axis2=2), _LIGHTEST)[:, None, acting]
-    model = model_of(robot, None if predicted is None else predicted.bodies)
-    data = model.createData()
-    weighs = np.array([pin.computeGeneralizedGravityDerivatives(model, data, q) for q in motion.q[rows]])
+    still = np.zeros((len(rows), len(robot.joints)))
+    held = motion.moved(motion.time[rows], motion.q[rows], still, still)
+    weighs = torque_slope(robot, None if predicted is None else predicted.bodies, held)
     each = np.stack([known[:, :, acting] / own, weighs[:, :, acting]]).reshape(2, len(rows), -1)
     every = np.arange(len(motion.time))
     drawn = [[np.interp(every, rows, ratio) for ratio in ratios.T] for ratios in each]
