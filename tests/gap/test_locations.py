@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 from tests.synthetic import arm, rigid_torque, swing
 
+from irtwin.effects.effect import Term
+from irtwin.effects.friction import ViscousFriction
 from irtwin.effects.transmission import JointCoupling
 from irtwin.gap.isolation.cause import FoundCause
-from irtwin.gap.localisation.channel_residuals import ChannelResidual
+from irtwin.gap.localisation.channel_residuals import ChannelResidual, fitted_values
 from irtwin.gap.localisation.excess_map import JOINT_REGIMES, heat_map, joint_maps, level_of, robot_maps
 from irtwin.gap.localisation.locations import locate
 from irtwin.gap.localisation.operating_variable import followed
 from irtwin.gap.regression.groups import Grouping
 from irtwin.gap.regression.hypotheses import MISSING, Variant
+from irtwin.gap.regression.normal_equations import System
 from irtwin.gap.regression.residuals import Trace
 from irtwin.gap.thresholds import DEFAULT
+from irtwin.identification.accumulate import Block
 
 pytestmark = pytest.mark.slow
 
@@ -61,6 +65,18 @@ def located(observed, others=(), acting=None, leaving=None):
     follows = [followed(observed, k, joint)[0] for k, joint in enumerate(JOINTS)]
     level = level_of(FLOOR, seen, known)
     return locate("torque", JOINTS, follows, seen, level, reference=known, acting=acting, leaving=leaving)
+
+
+@pytest.mark.parametrize("moved, expected", [(1e-5, 2.0), (1.0, 3.0)], ids=["rests in other runs", "moves there"])
+def test_other_runs_foretell_what_they_show(moved, expected):
+    speed = np.linspace(-moved, moved, 400), np.linspace(-1, 1, 400)
+    measured = [viscous * own + 0.1 * np.cos(9e3 * own) for viscous, own in zip((3.0, 2.0), speed, strict=True)]
+    factors = [(np.column_stack(columns),) for columns in zip(speed, measured, strict=True)]
+    blocks = (Block(f"run_{k}", 0.0, 1.0, np.array([400]), factor) for k, factor in enumerate(factors))
+    terms = ((ViscousFriction(), Term("Fv", "N m s/rad", "joint_1", spread=30.0)),)
+    system = System(terms, (), np.ones((1, 1), dtype=bool), tuple(blocks), np.arange(2), np.array([False, True]))
+    values = fitted_values(SimpleNamespace(system=system, rmse=np.full(1, 0.1)), reference=True)
+    assert values("run_1") == pytest.approx([expected], rel=0.05)
 
 
 def test_noise_has_no_place():

@@ -24,6 +24,7 @@ from irtwin.gap.regression.residuals import Trace, Values, as_filtered, power_tr
 from irtwin.identification.progress import track
 from irtwin.signals.motion import Motion
 
+_HARDLY = 0.1  # of a row: a joint that rests in all other runs would be foretold by numbers that nothing there holds
 _UNNAMED = 3  # places that no cause explains, drawn
 
 
@@ -194,7 +195,8 @@ def _standing_out(left: ChannelResidual, place: int) -> tuple[str, ...]:
 def fitted_values(finding: ChannelFinding, *, reference: bool) -> Values:
     """Return the coefficients of the twin alone, without causes, for each run.
 
-    They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group.
+    They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group, and
+    to these only as far as the others say nothing of a number.
     """
     system = finding.system
     moments = system.moments(finding.rmse)
@@ -202,7 +204,9 @@ def fitted_values(finding: ChannelFinding, *, reference: bool) -> Values:
         whole = twin_values(system, system.solution((), Summed(moments)))
         return lambda run: whole
     groups = np.flatnonzero(~system.group_observed)
-    total = Summed([moments[group] for group in groups])
+    total = Summed(
+        [own.times(_HARDLY) if seen else own for own, seen in zip(moments, system.group_observed, strict=True)]
+    )
     whole = twin_values(system, system.solution((), total))
     own: dict[str, np.ndarray] = {}
     for group in groups if len(groups) > 1 else ():

@@ -137,6 +137,10 @@ class Moments:
         self.size = weighed[0][0].places.size
         self.weighed = sorted(weighed, key=lambda pair: not pair[0].places.wide)
 
+    def times(self, weight: float) -> Moments:
+        """Return these, each row counted so much."""
+        return Moments([(products, weight * own) for products, own in self.weighed])
+
     def among(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the products (r, c) of some columns with others: of mostly more columns, each one's side by side."""
         sums = np.zeros((len(columns), len(rows)))
