@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.synthetic import arm, measure, swing, truth
 
-from irtwin.effects.friction import direction, turn
+from irtwin.effects.friction import StribeckFriction, direction, turn
 from irtwin.effects.stack import Stack
 from irtwin.identification.fits import fit_torque
 from irtwin.identification.friction_near_zero import with_friction_near_zero
@@ -81,6 +81,12 @@ def test_joints_have_laws_of_their_own() -> None:
     assert (first.friction_width or 0.0) < 0.003
     assert second.friction_width == pytest.approx(0.01, rel=0.3)
     assert second.friction_exponent == pytest.approx(2.0, rel=0.3)
+
+
+def test_a_turn_is_over_where_friction_that_is_known_fades() -> None:
+    motions, fading = [measured(LAWS["tanh"], 0.03, seed) for seed in (1, 2)], StribeckFriction(vs=0.05)
+    robot, _ = with_friction_near_zero(ROBOT, motions, (*EFFECTS, fading), set(ROBOT.joint_names))
+    assert fading.on(*ROBOT.joint_names) in fading.candidates(robot)  # else it could not be found again
 
 
 def test_without_torque_friction_turns_at_once() -> None:

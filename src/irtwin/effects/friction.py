@@ -29,7 +29,7 @@ SLOW = 0.02  # rad/s, across which friction surely changes its sign, whatever it
 _SHARP = 3e-3  # rad/s: what turns sooner hardly differs from what turns at once
 _TURNS = ((4e-3, 4.0), (0.01, 4.0), (0.025, 4.0), (0.025, 1.25))  # of a mixture: three ramps and a tail, as of `turn`
 _TURNED = 2.0  # widths, where most of a turn is over
-_OVER = 3.0  # widths, where a turn is over
+OVER = 3.0  # widths, where a turn is over
 _FROM_REST, _REST = 0.06, 0.2  # rad, over which friction builds up again, and s, after which a joint rested
 _MOST_FIRST = 0.5  # of a run's motion: a joint of which more is over this way is modelled there, too
 _LAW = 0.02  # of a joint's dry friction: as well as its law over speed is known, one standard deviation
@@ -169,7 +169,7 @@ class StribeckFriction(JointEffect):
         if robot is None:
             return tuple(grid)
         widths = {joint.name: joint.friction_width or 0.0 for joint in self.acting(robot)}
-        turned = [[name for name, width in widths.items() if form.vs >= _OVER * width] for form in grid]
+        turned = [[name for name, width in widths.items() if form.vs >= OVER * width] for form in grid]
         return tuple(form.on(*joints) for form, joints in zip(grid, turned, strict=True) if joints)
 
     def joint_terms(self, joint: Joint) -> tuple[Term, ...]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from irtwin.effects.effect import Effect, JointEffect
-from irtwin.effects.friction import SLOW, CoulombFriction, shapes_over_speed, sharp_sign, turn
+from irtwin.effects.friction import OVER, SLOW, CoulombFriction, StribeckFriction, shapes_over_speed, sharp_sign, turn
 from irtwin.effects.stack import Stack, side_by_side
 from irtwin.identification.accumulate import Block, Rows, accumulate, part_read, triangle
 from irtwin.identification.progress import track
@@ -62,12 +62,14 @@ def with_friction_near_zero(
         if isinstance(shape, JointEffect) and shape != effect
     ]
     laws = [shape for shape in shapes_over_speed(_WIDEST) if shape.id not in stack.ids]
-    tried: Sequence[Sequence[Turn]] = [_COARSE] * len(robot.joints)
+    known_shapes = [effect for effect in beside if effect.id not in named]
+    widest = [_widest(known_shapes, joint) for joint in robot.joints]
+    tried: Sequence[Sequence[Turn]] = [[turn for turn in _COARSE if turn[0] <= most] for most in widest]
     every = part_read(measured)
     known = [joint.name in turning for joint in robot.joints]
     dry, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
     if any(turn for both in dry for turn, _ in both):
-        tried = [_around([turn for turn, _ in both if turn]) for both in dry]
+        tried = [_around([turn for turn, _ in both if turn], most) for both, most in zip(dry, widest, strict=True)]
         dry, blocks = _found(stack, open_shapes, laws, measured, tried, known, every)
     if every > 1:  # a part of the log chose, all of it says whether that is so
         tried = [[turn] if turn else [] for (turn, _), *_ in dry]
@@ -109,9 +111,15 @@ def _found(
     return best, blocks
 
 
-def _around(turns: Sequence[Turn]) -> list[Turn]:
+def _widest(beside: Sequence[Effect], joint: Joint) -> float:
+    """Return the widest turn of a joint's friction: it is over where a known friction fades as the joint speeds up."""
+    fading = (effect for effect in beside if isinstance(effect, StribeckFriction))
+    return min([_WIDEST, *(effect.vs / OVER for effect in fading if joint.name in (effect.joints or (joint.name,)))])
+
+
+def _around(turns: Sequence[Turn], widest: float) -> list[Turn]:
     near = [
-        (min(width * a, _WIDEST), max(exponent * b, _LEAST_EXPONENT)) for width, exponent in turns for a, b in _FINER
+        (min(width * a, widest), max(exponent * b, _LEAST_EXPONENT)) for width, exponent in turns for a, b in _FINER
     ]
     return list(dict.fromkeys(near))
 
