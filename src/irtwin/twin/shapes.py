@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +18,13 @@ from irtwin.identification.reduced_torque import ReducedTorque
 from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
-_NO_BRACKET = -1  # of `find_minimum`: the least is not inside
-_LOOKS, _LOOKS_BY_JOINT = 8, 5  # at shapes between two that were tried; what is joint by joint is looked at twice
-_PASSES = 2  # over the numbers of a shape, of all joints at once: each stands on the others'
+_LOOKS = 8  # at shapes between two that were tried
+_PASSES = 2  # over the numbers of a shape, of all joints at once: each stands on the others', and is looked at closer
 _SWEEPS = 4  # over effects that share a joint, at most: the shape of one stands on the other's
+
+
+Left = Callable[[Sequence[Stack]], list[np.ndarray]]
+"""What each of some stacks leaves of each equation, (g,) RMS."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,8 @@ class _Side:
     def powered(self) -> list[Motion]:
         return [motion for motion in self.motions if motion.power is not None]
 
-    def torque(self, trial: Stack) -> Estimate:
-        return fit_torque(Stack(self.robot, trial.effects), self.motions, self.reduced)[1]
+    def torque(self, trials: Sequence[Stack]) -> list[Estimate]:
+        return _of_torque([Stack(self.robot, trial.effects) for trial in trials], self.motions, self.reduced)
 
     def power(self, trial: Stack, torque_values: np.ndarray) -> Estimate:
         return _of_power(Stack(self.robot, trial.effects), self.powered, torque_values)
@@ -63,15 +66,20 @@ def shaped(
         return tuple(effects)
     parts = [_Side(*with_friction_near_zero(robot, own, effects), own) for own in with_torque]
     stack = Stack(parts[0].robot, effects)
-    stack = _shaped(stack, tried, "torque", lambda trial: _together(parts, [part.torque(trial) for part in parts]))
+
+    def left_of_torque(trials: Sequence[Stack]) -> list[np.ndarray]:
+        return [_together(parts, fits) for fits in zip(*(part.torque(trials) for part in parts), strict=True)]
+
+    stack = _shaped(stack, tried, "torque", left_of_torque)
     if tried & of_power:
         metered = [part for part in parts if part.powered]
-        values = [part.torque(stack).values for part in metered]
+        values = [part.torque([stack])[0].values for part in metered]
 
-        def left(trial: Stack) -> np.ndarray:
-            return _together(metered, [part.power(trial, own) for part, own in zip(metered, values, strict=True)])
+        def left_of_power(trials: Sequence[Stack]) -> list[np.ndarray]:
+            pairs = list(zip(metered, values, strict=True))
+            return [_together(metered, [part.power(trial, own) for part, own in pairs]) for trial in trials]
 
-        stack = _shaped(stack, tried, "power", left)
+        stack = _shaped(stack, tried, "power", left_of_power)
     return (
         *(effect for effect in effects if effect not in tried),
         *(effect for effect in stack.effects if effect.id in tried),
@@ -88,14 +96,29 @@ def shaped_for_torque(
     stack: Stack, open_shapes: Set[str], motions: Sequence[Motion], reduced: ReducedTorque | None
 ) -> Stack:
     """Return a stack with the effects of torque, whose shape is open, in that which leaves least of measured torque."""
-    return _shaped(stack, open_shapes, "torque", lambda trial: fit_torque(trial, motions, reduced)[1].noise)
+
+    def left(trials: Sequence[Stack]) -> list[np.ndarray]:
+        return [fit.noise for fit in _of_torque(trials, motions, reduced)]
+
+    return _shaped(stack, open_shapes, "torque", left)
 
 
 def shaped_for_power(
     stack: Stack, open_shapes: Set[str], motions: Sequence[Motion], torque_values: np.ndarray
 ) -> Stack:
     """Return the same of power, on top of torque by coefficients that were found; a part of a long log is read."""
-    return _shaped(stack, open_shapes, "power", lambda trial: _of_power(trial, motions, torque_values).noise)
+
+    def left(trials: Sequence[Stack]) -> list[np.ndarray]:
+        return [_of_power(trial, motions, torque_values).noise for trial in trials]
+
+    return _shaped(stack, open_shapes, "power", left)
+
+
+def _of_torque(trials: Sequence[Stack], motions: Sequence[Motion], reduced: ReducedTorque | None) -> list[Estimate]:
+    known = reduced is not None and all(map(reduced.has, trials))
+    if len(trials) > 1 and not known and not any(trial.coupled for trial in trials):  # samples are read once for all
+        reduced = ReducedTorque.of_all(trials, motions)
+    return [fit_torque(trial, motions, reduced)[1] for trial in trials]
 
 
 def _of_power(trial: Stack, motions: Sequence[Motion], torque_values: np.ndarray) -> Estimate:
@@ -106,7 +129,7 @@ def _has_open_shape(effect: Effect, signal: str, robot: Robot) -> bool:
     return effect.signal == signal and len(effect.candidates(robot)) > 1
 
 
-def _shaped(stack: Stack, open_shapes: Set[str], signal: str, left: Callable[[Stack], np.ndarray]) -> Stack:
+def _shaped(stack: Stack, open_shapes: Set[str], signal: str, left: Left) -> Stack:
     """Give each effect of the signal, whose shape is open, the one that leaves least beside the others' shapes."""
     opened = [
         effect for effect in stack.effects if effect.id in open_shapes and _has_open_shape(effect, signal, stack.robot)
@@ -122,11 +145,11 @@ def _shaped(stack: Stack, open_shapes: Set[str], signal: str, left: Callable[[St
     return stack
 
 
-def _with_best_shape(stack: Stack, effect: Effect, left: Callable[[Stack], np.ndarray]) -> Stack:
+def _with_best_shape(stack: Stack, effect: Effect, left: Left) -> Stack:
     """Give an effect the best of the shapes that are tried: joint by joint where it acts so."""
     before, _, after = _around(stack, effect.id)
     shapes = effect.candidates(stack.robot)
-    noise = np.array([left(stack.with_effects([*before, shape, *after])) for shape in shapes])
+    noise = np.array(left([stack.with_effects([*before, shape, *after]) for shape in shapes]))
     if not (isinstance(effect, JointEffect) and effect.signal == "torque"):
         return stack.with_effects([*before, shapes[int(np.argmin(np.log(noise).sum(axis=1)))], *after])
     places = {joint.name: stack.robot.index(joint.name) for joint in effect.acting(stack.robot)}
@@ -134,20 +157,20 @@ def _with_best_shape(stack: Stack, effect: Effect, left: Callable[[Stack], np.nd
     return stack.with_effects([*before, *_by_shape(best, stack.robot), *after])
 
 
-def _with_shape_between(stack: Stack, effect: Effect, left: Callable[[Stack], np.ndarray]) -> Stack:
+def _with_shape_between(stack: Stack, effect: Effect, left: Left) -> Stack:
     """Give an effect the shape between those that were tried that leaves least."""
     before, own, after = _around(stack, effect.id)
     shapes = effect.candidates(stack.robot)
 
-    def left_by(some: Sequence[Effect]) -> np.ndarray:
-        return left(stack.with_effects([*before, *some, *after]))
+    def left_by(trials: Sequence[Sequence[Effect]]) -> list[np.ndarray]:
+        return left([stack.with_effects([*before, *some, *after]) for some in trials])
 
     if not isinstance(effect, JointEffect):
-        best = _between(own[0], shapes, lambda shape: float(np.log(left_by([shape])).sum()))
+        best = _between(own[0], shapes, lambda shape: float(np.log(left_by([[shape]])[0]).sum()))
         return stack.with_effects([*before, best, *after])
     if effect.signal == "torque":
         of_joint = {joint.name: replace(shape, joints=None) for shape in own for joint in shape.acting(stack.robot)}
-        of_joint = _between_by_joint(of_joint, shapes, stack.robot, lambda some: left_by(_by_shape(some, stack.robot)))
+        of_joint = _between_by_joint(of_joint, shapes, stack.robot, left_by)
         return stack.with_effects([*before, *_by_shape(of_joint, stack.robot), *after])
     return stack
 
@@ -181,43 +204,53 @@ def _between_by_joint(
     best: Mapping[str, Effect],
     shapes: Sequence[Effect],
     robot: Robot,
-    left: Callable[[Mapping[str, Effect]], np.ndarray],
+    left: Callable[[Sequence[Sequence[Effect]]], list[np.ndarray]],
 ) -> dict[str, Effect]:
-    """Return the same joint by joint; `left` of joints' shapes is what each equation leaves."""
-    by_joint = dict(best)
-    for name, ends in [*shapes[0].ranges.items()] * _PASSES:
-        tried = sorted({*(float(shape.shape[name]) for shape in shapes), *ends})
-        by_joint |= _number_by_joint(by_joint, name, tried, robot, left)
+    """Return the same joint by joint: all joints are looked at together, first half-way to the neighbours tried."""
+    by_joint, places = dict(best), [robot.index(joint) for joint in best]
+    tried = {
+        name: sorted({*(float(shape.shape[name]) for shape in shapes), *ends})
+        for name, ends in shapes[0].ranges.items()
+    }
+    near = {
+        name: [_neighbours(float(shape.shape[name]), some) for shape in best.values()] for name, some in tried.items()
+    }
+    for name in [*near] * _PASSES:
+        own = [float(shape.shape[name]) for shape in by_joint.values()]
+        points = np.array([_halved(value, *ends) for value, ends in zip(own, near[name], strict=True)])  # (J, 5)
+        trials = [_by_shape(_numbered(by_joint, name, values), robot) for values in points.T]
+        noise = np.array(left(trials))[:, places].T
+        least = [_least(*pair) for pair in zip(points, noise, strict=True)]
+        near[name] = [_neighbours(value, sorted(some)) for value, some in zip(least, points, strict=True)]
+        by_joint = _numbered(by_joint, name, least)
     return by_joint
 
 
-def _number_by_joint(
-    by_joint: Mapping[str, Effect],
-    name: str,
-    tried: Sequence[float],
-    robot: Robot,
-    left: Callable[[Mapping[str, Effect]], np.ndarray],
-) -> dict[str, Effect]:
-    """Return the shapes whose number leaves less than those that were tried, by joint: one fit looks at all joints."""
-    from scipy.optimize import elementwise  # takes a while to import
+def _numbered(by_joint: Mapping[str, Effect], name: str, values: Iterable[float]) -> dict[str, Effect]:
+    """Return the shapes with other values of one of their numbers."""
+    pairs = zip(by_joint.items(), values, strict=True)
+    return {joint: shape.variants(**{name: (float(value),)})[0] for (joint, shape), value in pairs}
 
-    joints, points = list(by_joint), np.array(tried)
-    own = np.array([float(by_joint[joint].shape[name]) for joint in joints])
-    below = points[np.maximum(np.searchsorted(points, own) - 1, 0)]
-    above = points[np.minimum(np.searchsorted(points, own, side="right"), len(points) - 1)]
-    inner = np.where((below < own) & (own < above), own, (below + above) / 2)
 
-    def shapes_of(values: np.ndarray, which: np.ndarray) -> dict[str, Effect]:
-        numbers = zip((joints[k] for k in which), values, strict=True)
-        return {joint: by_joint[joint].variants(**{name: (float(value),)})[0] for joint, value in numbers}
+def _neighbours(value: float, tried: Sequence[float]) -> tuple[float, float]:
+    """Return what was tried next below and above a value, or the value where there is none."""
+    below, above = ([other for other in tried if sign * (other - value) > 0] for sign in (-1, 1))
+    return max(below, default=value), min(above, default=value)
 
-    def left_of(values: np.ndarray, which: np.ndarray) -> np.ndarray:
-        return left({**by_joint, **shapes_of(values, which)})[[robot.index(joints[k]) for k in which]]
 
-    every = np.arange(len(joints))
-    least = elementwise.find_minimum(left_of, (below, inner, above), args=(every,), maxiter=_LOOKS_BY_JOINT)
-    inside = least.status != _NO_BRACKET
-    return shapes_of(least.x[inside], every[inside])
+def _halved(value: float, below: float, above: float) -> list[float]:
+    """Return five numbers from `below` to `above`, about the value, half-way by ratio."""
+    return [below, float(np.sqrt(below * value)), value, float(np.sqrt(value * above)), above]
+
+
+def _least(points: np.ndarray, noise: np.ndarray) -> float:
+    """Return where the parabola through the least `noise` and its neighbours is least, over the logarithm of points."""
+    at = int(np.argmin(noise))
+    some = slice(at - 1, at + 2)
+    if at in (0, len(points) - 1) or len(set(points[some])) < 3:
+        return float(points[at])
+    bend, slope, _ = np.polyfit(np.log(points[some] / points[at]), noise[some], 2)
+    return float(points[at] * np.exp(-slope / (2 * bend) if bend > 0 else 0.0))
 
 
 def _by_shape(of_joint: Mapping[str, Effect], robot: Robot) -> list[Effect]:
