@@ -195,8 +195,8 @@ def _standing_out(left: ChannelResidual, place: int) -> tuple[str, ...]:
 def fitted_values(finding: ChannelFinding, *, reference: bool) -> Values:
     """Return the coefficients of the twin alone, without causes, for each run.
 
-    They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group, and
-    to these only as far as the others say nothing of a number.
+    They are fitted to all runs; with `reference` to the runs beside the observed ones, without the run's own group.
+    Rows of observed runs count little then: they tell what the others hardly say anything of.
     """
     system = finding.system
     moments = system.moments(finding.rmse)
