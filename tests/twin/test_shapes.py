@@ -11,6 +11,7 @@ from tests.synthetic import arm, measure, swing
 from irtwin.effects.catalogue import BASELINE
 from irtwin.effects.effect import Effect
 from irtwin.effects.friction import StribeckFriction
+from irtwin.effects.local import LocalWear
 from irtwin.twin.shapes import shaped
 
 ROBOT = arm(3)
@@ -47,6 +48,17 @@ def test_sides_of_other_friction_share_the_shape_that_one_of_them_shows():
     never_sticks = replace(measure(ROBOT, swing(ROBOT, 3), noise=0.1, seed=3), power=None)
     found = of_stribeck(shaped(ROBOT, [[never_sticks], [sticking(1)]], [*BASELINE, "stribeck_friction"]))
     assert all(one.vs == pytest.approx(0.1, rel=0.02) and one.d == 2.0 for one in found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", [-0.3, 0.04], ids=["between two below zero", "between one below and one above"])
+def test_a_number_of_a_shape_may_be_below_zero(place):
+    worn = LocalWear(q0=place, w=LocalWear().candidates(ROBOT)[0].w)
+    plain = [replace(measure(ROBOT, swing(ROBOT, seed), noise=0.1, seed=seed), power=None) for seed in (1, 2)]
+    side = [replace(one, torque=one.torque + 8 * sum(worn.samples(ROBOT, one, None))) for one in plain]
+    found = [one for one in shaped(ROBOT, [side], [*BASELINE, "local_wear"]) if isinstance(one, LocalWear)]
+    assert {name for one in found for name in one.joints or ROBOT.joint_names} == set(ROBOT.joint_names)
+    assert all(one.q0 == pytest.approx(place, abs=0.01) for one in found)
 
 
 def test_what_is_given_in_a_shape_keeps_it():

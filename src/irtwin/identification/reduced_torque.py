@@ -18,13 +18,15 @@ Column = tuple[Effect, str | None, str | None, str]
 
 @dataclass(frozen=True)
 class ReducedTorque:
-    """The equations of torque of each joint, without samples in which dry friction is undecided, reduced to `blocks`.
+    """The equations of torque of each joint, without samples in which some effects are undecided, reduced to `blocks`.
 
-    `places` say for each joint which column of its factors is which; one may stand under several names.
+    `places` say for each joint which column of its factors is which; one may stand under several names. `required`:
+    effects without which a stack would have more samples.
     """
 
     blocks: Sequence[Block]
     places: Sequence[Mapping[Column, int]]
+    required: frozenset[str] = frozenset({CoulombFriction.id})
 
     @classmethod
     def of_all(cls, stacks: Sequence[Stack], motions: Sequence[Motion]) -> ReducedTorque:
@@ -52,7 +54,7 @@ class ReducedTorque:
         pattern = np.concatenate([part.pattern for part in parts], axis=1)
         terms = [column(*pair) for part in parts for pair in part.torque_terms]
         places = [{terms[k]: place for place, k in enumerate(np.flatnonzero(used))} for used in pattern]
-        return cls(accumulate(motions, equations, pattern), places)
+        return cls(accumulate(motions, equations, pattern), places, frozenset())
 
     def of(self, stack: Stack) -> list[Block] | None:
         """Return the blocks of a stack's equations; None where some of its columns are not among these."""
@@ -69,7 +71,7 @@ class ReducedTorque:
         return self._places_of(stack) is not None
 
     def _places_of(self, stack: Stack) -> list[list[int]] | None:
-        if CoulombFriction.id not in stack.ids:
+        if not self.required.issubset(stack.ids):
             return None
         columns = [column(effect, term) for effect, term in stack.torque_terms]
         chosen = []

@@ -19,7 +19,7 @@ from irtwin.robot.description import Robot
 from irtwin.signals.motion import Motion
 
 _LOOKS = 8  # at shapes between two that were tried
-_PASSES = 2  # over the numbers of a shape, of all joints at once: each stands on the others', and is looked at closer
+_PASSES = 3  # over the numbers of a shape, of all joints at once: each stands on the others', and is looked at closer
 _SWEEPS = 4  # over effects that share a joint, at most: the shape of one stands on the other's
 
 
@@ -215,14 +215,16 @@ def _between_by_joint(
     near = {
         name: [_neighbours(float(shape.shape[name]), some) for shape in best.values()] for name, some in tried.items()
     }
-    for name in [*near] * _PASSES:
-        own = [float(shape.shape[name]) for shape in by_joint.values()]
-        points = np.array([_halved(value, *ends) for value, ends in zip(own, near[name], strict=True)])  # (J, 5)
-        trials = [_by_shape(_numbered(by_joint, name, values), robot) for values in points.T]
-        noise = np.array(left(trials))[:, places].T
-        least = [_least(*pair) for pair in zip(points, noise, strict=True)]
-        near[name] = [_neighbours(value, sorted(some)) for value, some in zip(least, points, strict=True)]
-        by_joint = _numbered(by_joint, name, least)
+    for last in (False,) * (_PASSES - 1) + (True,):
+        for name, ends in near.items():
+            own = [float(shape.shape[name]) for shape in by_joint.values()]
+            points = np.array([_halved(value, *pair) for value, pair in zip(own, ends, strict=True)])  # (J, 5)
+            trials = [_by_shape(_numbered(by_joint, name, values), robot) for values in points.T]
+            noise = np.array(left(trials))[:, places].T
+            at = np.argmin(noise, axis=1)
+            near[name] = [_closer(*pair, tried[name]) for pair in zip(points, at, strict=True)]
+            least = [_vertex(*some) if last else some[0][some[2]] for some in zip(points, noise, at, strict=True)]
+            by_joint = _numbered(by_joint, name, least)
     return by_joint
 
 
@@ -239,18 +241,24 @@ def _neighbours(value: float, tried: Sequence[float]) -> tuple[float, float]:
 
 
 def _halved(value: float, below: float, above: float) -> list[float]:
-    """Return five numbers from `below` to `above`, about the value, half-way by ratio."""
-    return [below, float(np.sqrt(below * value)), value, float(np.sqrt(value * above)), above]
+    """Return five numbers from `below` to `above`, about the value."""
+    return [below, (below + value) / 2, value, (value + above) / 2, above]
 
 
-def _least(points: np.ndarray, noise: np.ndarray) -> float:
-    """Return where the parabola through the least `noise` and its neighbours is least, over the logarithm of points."""
-    at = int(np.argmin(noise))
+def _closer(points: np.ndarray, at: int, tried: Sequence[float]) -> tuple[float, float]:
+    """Return what is next below and above the best of five; beyond an end as far as on this side of it."""
+    gaps, value = np.diff(points), points[at]
+    below, above = value - gaps[max(at - 1, 0)], value + gaps[min(at, len(gaps) - 1)]
+    return float(max(below, tried[0])), float(min(above, tried[-1]))
+
+
+def _vertex(points: np.ndarray, noise: np.ndarray, at: int) -> float:
+    """Return where the parabola through the least `noise` and its neighbours is least, or that point."""
     some = slice(at - 1, at + 2)
     if at in (0, len(points) - 1) or len(set(points[some])) < 3:
         return float(points[at])
-    bend, slope, _ = np.polyfit(np.log(points[some] / points[at]), noise[some], 2)
-    return float(points[at] * np.exp(-slope / (2 * bend) if bend > 0 else 0.0))
+    bend, slope, _ = np.polyfit(points[some] - points[at], noise[some], 2)
+    return float(points[at] - (slope / (2 * bend) if bend > 0 else 0.0))
 
 
 def _by_shape(of_joint: Mapping[str, Effect], robot: Robot) -> list[Effect]:
