@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,7 +40,8 @@ def system_of(mix, coefficients, noise=1.0, size=30.0):
 
 
 def apart(system, attribution):
-    return Apart.of(system, system, [cause.columns for cause in attribution.causes])
+    causes = attribution.causes
+    return Apart.of(system, system, [cause.columns for cause in causes], [cause.likely for cause in causes])
 
 
 def shared(system, attribution):
@@ -80,6 +82,14 @@ def test_one_cause_has_it_all_and_none_has_nothing():
     system, attribution = system_of([[1.0]], [1.0])
     assert shared(system, attribution) == (1.0,)
     assert shared(system, SimpleNamespace(causes=(), noise=attribution.noise)) == ()
+
+
+def test_a_guess_closes_what_likely_causes_leave_and_takes_nothing_off_them():
+    system, attribution = system_of([[1.0, 0.0], [0.8, 0.6]], [1.0, 0.0])
+    sure, guess = attribution.causes
+    told = SimpleNamespace(causes=(replace(sure, probability=0.9), guess), noise=attribution.noise)
+    assert shared(system, told) == pytest.approx([1.0, 0.0], abs=0.01)
+    assert shared(system, attribution)[1] > 0.2
 
 
 def test_where_nothing_is_closed_nothing_is_shared():

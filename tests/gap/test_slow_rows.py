@@ -154,7 +154,7 @@ def test_rows_are_never_less_noisy_where_friction_turns() -> None:
 def test_what_is_left_where_friction_turns_is_no_gap() -> None:
     system, floor = reduced(noise=3.0), np.array([0.02, 0.02])
     first, second = [system.base], [system.base + 1]
-    apart = Apart.of(system, system, [first, second])
+    apart = Apart.of(system, system, [first, second], [True, True])
     before, after = apart.left
     assert np.all(before > 2 * after)
     assert np.all(1.5 * after < system.residual_rms(apart.chosen, system.noise_before))
@@ -165,13 +165,13 @@ def test_what_is_left_where_friction_turns_is_no_gap() -> None:
 def test_friction_that_turns_otherwise_than_in_the_reference_runs_shows(noise: float, otherwise: bool) -> None:
     system = reduced(noise=3.0, last=noise)
     one = replace(system, observed=np.array([block.run == system.blocks[-1].run for block in system.blocks]))
-    assert (Apart.of(one, one, []).turned(np.array([0.02, 0.02])).max() > 0) == otherwise
-    assert Apart.of(system, system, []).turned(np.array([0.02, 0.02])).max() == -np.inf
+    assert (Apart.of(one, one, [], []).turned(np.array([0.02, 0.02])).max() > 0) == otherwise
+    assert Apart.of(system, system, [], []).turned(np.array([0.02, 0.02])).max() == -np.inf
 
 
 def test_what_is_closed_where_friction_turns_counts_by_the_noise_there() -> None:
     system = reduced(noise=3.0)
-    apart = Apart.of(system, system, [[system.base, system.base + 1]])
+    apart = Apart.of(system, system, [[system.base, system.base + 1]], [True])
     held_out = apart.held_out()
     plain = left_out(system, system.noise_before, (), np.arange(system.groups))
     assert np.all(held_out.before.sum(axis=0) < plain.sum(axis=0))

@@ -27,19 +27,23 @@ _ORDERS = 40  # drawn, and each reversed, where there are more
 
 @dataclass(frozen=True)
 class Apart:
-    """`plain`: the equations of the twin as it is; `system`: with the causes, each one's columns in it `players`."""
+    """`plain`: the equations of the twin as it is; `system`: with the causes, each one's columns in it `players`.
+
+    `likely`: whether each is there more likely than not.
+    """
 
     plain: System
     system: System
     players: tuple[list[int], ...]
+    likely: tuple[bool, ...]
 
     @classmethod
-    def of(cls, plain: System, system: System, causes: Sequence[Sequence[int]]) -> Apart:
+    def of(cls, plain: System, system: System, causes: Sequence[Sequence[int]], likely: Sequence[bool]) -> Apart:
         """Take of a channel's equations the terms of the twin, and the causes' columns, alone."""
         kept, places = system.with_columns([k for columns in causes for k in columns])
         ends = np.cumsum([len(columns) for columns in causes])
         players = tuple(places[end - len(columns) : end] for end, columns in zip(ends, causes, strict=True))
-        return cls(plain.with_columns(())[0].by_speed, kept.by_speed, players)
+        return cls(plain.with_columns(())[0].by_speed, kept.by_speed, players, tuple(likely))
 
     @property
     def chosen(self) -> list[int]:
@@ -134,7 +138,8 @@ def closed_squares(apart: Apart) -> np.ndarray:
     """Return what each cause closes of the squares of each observed group left out and equation, (C, G, g), as counted.
 
     Its Shapley value: everything is refitted with every set of causes, up to eight causes exactly, beyond from random
-    orders, each beside its reverse. They add up to what all causes close.
+    orders, each beside its reverse. They add up to what all causes close. A guess closes what the likely causes leave:
+    one that only spoils the fit is not held against them.
     """
     system, players = apart.system, apart.players
     judged = np.flatnonzero(system.group_observed)
@@ -148,10 +153,8 @@ def closed_squares(apart: Apart) -> np.ndarray:
         total, moments = totals[bool(members)], weighed[bool(members)]
         return np.array([system.squares_without(chosen, total, moments[group], int(group)) for group in judged])
 
-    count = len(players)
-    values = np.zeros((count, len(judged), len(system.pattern)))
-    sets = _exact(count) if count <= _EXACT else _drawn(count)
-    for player, before, weight in track(sets, "what causes leave, each set of them"):
+    values = np.zeros((len(players), len(judged), len(system.pattern)))
+    for player, before, weight in track(_orders(apart.likely), "what causes leave, each set of them"):
         values[player] += weight * (left(before) - left(before | {player}))
     return apart.counted(values)
 
@@ -167,20 +170,29 @@ def shares(closed: np.ndarray, rows: np.ndarray, level: np.ndarray) -> tuple[flo
     return tuple(float(value) / together for value in values) if together > 0 else ()
 
 
-def _exact(count: int) -> Iterator[tuple[int, frozenset[int], float]]:
-    """Yield every player, every set of others that may stand before it, and the share of orders in which it does."""
-    for player in range(count):
-        others = [k for k in range(count) if k != player]
+def _orders(likely: Sequence[bool]) -> Iterator[tuple[int, frozenset[int], float]]:
+    """Yield every player, each set of others that may stand before it, and the share of orders in which it does."""
+    earlier: frozenset[int] = frozenset()
+    for some in (np.flatnonzero(likely).tolist(), np.flatnonzero(np.logical_not(likely)).tolist()):
+        for player, before, weight in _exact(some) if len(some) <= _EXACT else _drawn(some):
+            yield player, earlier | before, weight
+        earlier |= set(some)
+
+
+def _exact(players: Sequence[int]) -> Iterator[tuple[int, frozenset[int], float]]:
+    count = len(players)
+    for player in players:
+        others = [k for k in players if k != player]
         for size in range(count):
             weight = factorial(size) * factorial(count - 1 - size) / factorial(count)
             for before in combinations(others, size):
                 yield player, frozenset(before), weight
 
 
-def _drawn(count: int) -> Iterator[tuple[int, frozenset[int], float]]:
+def _drawn(players: Sequence[int]) -> Iterator[tuple[int, frozenset[int], float]]:
     generator = np.random.default_rng(0)
     for _ in range(_ORDERS):
-        order: Sequence[int] = generator.permutation(count).tolist()
+        order: Sequence[int] = generator.permutation(players).tolist()
         for way in (order, order[::-1]):
             for place, player in enumerate(way):
                 yield player, frozenset(way[:place]), 0.5 / _ORDERS

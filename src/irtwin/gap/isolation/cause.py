@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from irtwin.document.document import LIKELY
 from irtwin.effects.effect import Effect
 from irtwin.gap.regression.hypotheses import Variant
 from irtwin.robot.description import Robot
@@ -32,6 +33,11 @@ class FoundCause:
         """Return the effects that the data do not tell from it: as likely as `least`, the likeliest first."""
         named = [rival for rival, chance in self.rivals.items() if chance >= least]
         return tuple(sorted(named, key=lambda rival: -self.rivals[rival]))
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is more likely than not, and no guess."""
+        return self.probability >= LIKELY
 
     @property
     def nuisance(self) -> bool:

@@ -208,13 +208,15 @@ def finding_of(
     beside: BesidePower | None = None,
 ) -> ChannelFinding:
     """Return the finding of an attribution: judged on groups left out, its coefficients estimated, `beside` power."""
-    chosen = [k for cause in attribution.causes for k in cause.columns]
+    causes = attribution.causes
+    chosen = [k for cause in causes for k in cause.columns]
     fitted = estimate_of(steadied.system, chosen) if beside is None else beside.estimate(chosen)
     system = with_offsets_held(system, chosen)
     steadied = replace(steadied, system=with_offsets_held(steadied.system, chosen))
     alone, inside = system.with_columns(chosen)
     judged = held_out(alone, (plain or alone).noise_before, attribution.noise, inside, plain)
-    apart = Apart.of(plain or steadied.system, steadied.system, [cause.columns for cause in attribution.causes])
+    likely = [cause.likely for cause in causes]
+    apart = Apart.of(plain or steadied.system, steadied.system, [cause.columns for cause in causes], likely)
     return ChannelFinding(
         name,
         places,
@@ -228,7 +230,7 @@ def finding_of(
         floor,
         fitted,
         plain=plain,
-        both=None if beside is None else beside.closing(attribution.causes),
+        both=None if beside is None else beside.closing(causes),
     )
 
 
@@ -383,7 +385,8 @@ class BesidePower:
         """Return what causes of torque, in columns as torque's equations count them, close of both channels."""
         of_torque = [list(map(self.equations.in_whole, cause.columns)) for cause in causes]
         whole = with_offsets_held(self.equations.whole, [k for columns in of_torque for k in columns])
-        return BothChannels(Apart.of(whole, whole, [*of_torque, self.columns]), self.floor)
+        likely = [*(cause.likely for cause in causes), True]
+        return BothChannels(Apart.of(whole, whole, [*of_torque, self.columns], likely), self.floor)
 
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         return [*map(self.equations.in_whole, chosen), *self.columns]
