@@ -191,6 +191,14 @@ def test_without_repeats_nothing_is_said():
     assert disturbances(replace(case, runs=tuple(replace(run, repeat_of=None) for run in case.runs))) == []
 
 
+def test_a_line_of_what_follows_the_motion_is_none_of_what_differs():
+    rng, time = np.random.default_rng(0), np.arange(0, 15, 0.01)
+    slow = np.sin(0.4 * time)
+    rounding = slow + 0.3 * np.sin(2 * np.pi * 7.9 * time)
+    series = EvenSeries(time, slow + 0.2 * rng.standard_normal(len(time)), rounding[:, None])
+    assert lines([series], 6)[0] == []
+
+
 @pytest.mark.parametrize("memory", [1, 5, 20, 100])
 def test_noise_that_remembers_has_no_lines(memory):
     rng, false = np.random.default_rng(memory), 0

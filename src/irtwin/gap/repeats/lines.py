@@ -84,7 +84,8 @@ def _grid(series: Sequence[EvenSeries]) -> np.ndarray:
 def _power(series: EvenSeries, grid: np.ndarray) -> np.ndarray:
     """Return the power that what is left of a series has at even frequencies, (F,): of white noise its mean square.
 
-    Nothing, where the columns beside it leave less than `_FREE` of a wave.
+    Nothing, where the columns beside it leave less than `_FREE` of a wave. No more than before they are taken off: the
+    rounding of positions has lines of its own.
     """
     window = np.hanning(len(series.values) + 2)[1:-1]
     turn = 2j * np.pi / series.rate
@@ -95,8 +96,8 @@ def _power(series: EvenSeries, grid: np.ndarray) -> np.ndarray:
         return np.asarray(np.abs(sums) ** 2)
 
     taken = transform(series.basis()).sum(axis=1) / len(window)
-    power = transform(window[:, None] * series.left()[:, None])[:, 0] / float(window @ window)
-    return np.where(taken < 1 - _FREE, power, 0.0)
+    told = transform(window[:, None] * np.column_stack([series.left(), series.values]))
+    return np.where(taken < 1 - _FREE, told.min(axis=1) / float(window @ window), 0.0)
 
 
 def _noise(power: np.ndarray, grid: np.ndarray) -> np.ndarray:
