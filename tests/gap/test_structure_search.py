@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from irtwin.effects.catalogue import catalogue
 from irtwin.effects.effect import Term
 from irtwin.effects.friction import FrictionTurn
+from irtwin.effects.transmission import TorqueRipple
 from irtwin.gap.isolation.posterior import HypothesisPrior, Posterior
 from irtwin.gap.isolation.structure_search import _Search, attribute, judged
 from irtwin.gap.regression.evidence import Coefficients, HypothesisEvidence, evidence
@@ -248,7 +249,7 @@ def test_what_groups_disagree_on_brings_no_number_nearer_to_what_is_known_of_it(
     alike = np.ones(5, dtype=int)
     seen = HypothesisEvidence(variants, *squares, (coefficients(one),), np.full(4, 1e3), one, np.zeros(5), every, alike)
     named = tuple(Hypothesis(f"effect_{k}", None, MISSING, (variant,)) for k, variant in enumerate(variants))
-    posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one, DEFAULT.criterion)
+    posterior = Posterior(named, np.arange(5), np.zeros(5), seen, 0.05 * one, np.ones(5), DEFAULT.criterion)
     assert posterior.log_odds[0] > 5 > posterior.log_odds[4] + 4
 
 
@@ -282,7 +283,7 @@ def test_what_power_shows_beside_torque_is_no_rival_of_what_torque_shows():
         Hypothesis("loss", None, MISSING, variants[:1]),
         Hypothesis("friction", "j1", MISSING, variants[1:]),
     )
-    posterior = Posterior((loss, friction), np.arange(2), np.zeros(2), seen, 0.05 * one, DEFAULT.criterion)
+    posterior = Posterior((loss, friction), np.arange(2), np.zeros(2), seen, 0.05 * one, np.ones(2), DEFAULT.criterion)
     assert (posterior.near(loss), posterior.near(friction)) == ([0], [1])
     assert posterior.likeliest_at(friction) == 1
 
@@ -329,10 +330,21 @@ def test_what_explains_most_does_not_hide_what_is_likely():
     judged = SimpleNamespace(hypotheses=("most", "likely"), variant=str, log_odds=[-9.0, 2.0], log_prior=[-5.0, -5.0])
     search = SimpleNamespace(beside=lambda found, noise: judged, left=lambda found, noise: noise)
     judged.likeliest_at = judged.hypotheses.index
-    posterior = SimpleNamespace(**{**vars(judged), "promising": lambda least: [0, 1]})
+    posterior = SimpleNamespace(promising=lambda least: [("most", "0"), ("likely", "1")])
     assert _Search.likely(search, posterior, [], None) == ("likely", "1")
-    posterior.promising = lambda least: [0]
+    posterior.promising = lambda least: [("most", "0")]
     assert _Search.likely(search, posterior, [], None) is None
+
+
+def test_what_is_nearly_all_that_is_left_is_found_however_rare_its_shape():
+    """By noise that holds it nothing is likely: much is left, and a rare shape pays for all that were tried."""
+    system, candidates = system_of(np.eye(60), [*np.zeros(59), 1.0])
+    orders, term = [*range(1, 25), 42], system.columns[0].term
+    shapes = tuple(Variant(TorqueRipple(N=order), (36 + k,), (term,)) for k, order in enumerate(orders))
+    ripple = Hypothesis("torque_ripple", None, MISSING, shapes)
+    (cause,) = attribute(system, [*candidates[:35], ripple], DEFAULT.criterion, np.array([1.0])).causes
+    assert cause.variants[0].effect.N == 42
+    assert cause.probability > 0.9
 
 
 def test_what_is_likelier_in_the_end_takes_the_place_of_what_came_first():

@@ -31,7 +31,8 @@ from irtwin.gap.thresholds import Criterion
 SILENT = 0.1  # of log odds: data that say less of a hypothesis say nothing
 
 _TRIED = 3  # of those that explain most
-_HIDDEN = 6.0  # of log odds, by noise that holds the effect
+_HIDDEN = 6.0  # of log odds, where what is left counts as unexplained
+_OTHERS = 1e-3  # of the noise at least is not what a hypothesis explains
 _SIZES = tuple(4.0**-k for k in range(-1, 5))  # in units of what is expected, alike for a base and a wrist
 _SURE = 0.95  # of the posterior of shapes
 _SCREENED = 128  # places, or choices of runs, out of which a screening takes one: as many as tell anything apart
@@ -78,7 +79,8 @@ class HypothesisPrior:
 class Posterior:
     """H hypotheses beside a structure; V variants of the `evidence`, each of its `owner`, with `prior` and `misfit`.
 
-    `prior` (V,): log odds of each; `misfit` (V, `System.kinds`): RMS, where each acts.
+    `prior` (V,): log odds of each; `misfit` (V, `System.kinds`): RMS, where each acts; `acting` (V,): in how many
+    equations.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -86,6 +88,7 @@ class Posterior:
     prior: np.ndarray
     evidence: HypothesisEvidence
     misfit: np.ndarray
+    acting: np.ndarray
     limits: Criterion
 
     @classmethod
@@ -115,8 +118,10 @@ class Posterior:
         stand_for = np.round(np.array(shapes) / [len(candidate.variants) for candidate in candidates]).astype(int)
         seen = evidence(projection, chosen, variants, stand_for[owner])
         about = np.array([variant.effect.about_reversals for variant in variants], dtype=bool)[:, None]
-        of_kinds = np.where(about, *(_of_kinds(projection.system, variants, each) for each in misfit))
-        return cls(tuple(candidates), owner, log_prior, seen, np.sqrt(of_kinds), limits)
+        system = projection.system
+        of_kinds = np.where(about, *(_of_kinds(system, variants, each) for each in misfit))
+        acts = system.equations([variant.columns for variant in variants])[:, system.halves[0]].sum(axis=1)
+        return cls(tuple(candidates), owner, log_prior, seen, np.sqrt(of_kinds), np.maximum(acts, 1), limits)
 
     @cached_property
     def variance(self) -> np.ndarray:
@@ -183,15 +188,28 @@ class Posterior:
         """Return the shape of a hypothesis that explains most."""
         return self.evidence.variants[int(self.shape[place])]
 
-    def promising(self, least: float) -> Iterator[int]:
-        """Yield the places of the hypotheses that explain most, then that of the likeliest, where there are any.
+    def promising(self, least: float) -> Iterator[tuple[Hypothesis, Variant]]:
+        """Yield the hypotheses that explain most, then the likeliest, each in its shape.
 
-        What has less than the `least` log odds, and less still by noise that holds its own effect, is left out.
+        These are as if the noise did not hold what a shape explains; what is below the `least` log odds then is left
+        out.
         """
-        shown = self.evidence.explained[self.shape]
-        kept = np.flatnonzero((self.log_odds > least - _HIDDEN) & (shown > 0))
+        rows = self.acting * self.evidence.rows_that_speak
+        others = np.maximum(1 - self.evidence.explained / rows, _OTHERS)
+        more = self._explaining(self._told / others, self._counts) - self._explaining(self._told, self._counts)
+        odds = self._by_shape + more + _HIDDEN
+        shapes = _largest(self._beside_best(np.arange(len(self.owner)), self._firsts, others)[0], self._firsts)
+        shown = self.evidence.explained[shapes]
+        kept = np.flatnonzero((odds[shapes] > least) & (shown > 0))
         if len(kept):
-            yield from dict.fromkeys([*kept[np.argsort(-shown[kept])[:_TRIED]], kept[np.argmax(self.log_odds[kept])]])
+            most = kept[np.argsort(-shown[kept])[:_TRIED]]
+            for place in dict.fromkeys([*most, kept[np.argmax(self.log_odds[kept])]]):
+                yield self.hypotheses[place], self.evidence.variants[shapes[place]]
+
+    def explains_most(self) -> int | None:
+        """Return the place of the hypothesis that explains most in its likeliest shape; None where none does."""
+        shown = self.evidence.explained[self.shape]
+        return int(np.argmax(shown)) if shown.max(initial=0.0) > 0 else None
 
     def shapes_of(self, place: int) -> tuple[Effect, ...]:
         """Return the likeliest shapes of a hypothesis, as many as hold 95 % of what all of them have."""
@@ -245,18 +263,22 @@ class Posterior:
         weights, none = self._beside_best(self.shape[list(near)], np.zeros(1, dtype=int))
         return weights, float(none[0])
 
-    def _beside_best(self, places: np.ndarray, firsts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _beside_best(
+        self, places: np.ndarray, firsts: np.ndarray, others: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the log weights of variants, (P,), and that none of them is there, of each lot of those that compete.
 
         firsts (L,): where lots begin; one of each is there. Each is weighed by what it leaves of what the best of its
-        lot explains: the best tells how well that can be explained.
+        lot explains: the best tells how well that can be explained. others (V,): the part of the noise that is none of
+        what each explains; None: all.
         """
         best = places[_largest(self.evidence.explained[places], firsts)]
         lot = np.repeat(np.arange(len(firsts)), np.diff([*firsts, len(places)]))
-        told = self._in_units_of(best[lot], places)
+        part = np.ones(len(lot)) if others is None else others[best[lot]]
+        told = self._in_units_of(best[lot], places) / part
         most, counts = np.maximum.reduceat(told, firsts), self._counts[best]
         left = -np.asarray(self._explaining(most[lot] - told, counts[lot]))
-        size = self._sizes(places, self._scale[best[lot]])
+        size = self._sizes(places, self._scale[best[lot]] * part)
         return self.prior[places] - size + left, -np.asarray(self._explaining(most, counts))
 
     def _explaining(self, told: np.ndarray | float, count: np.ndarray | int) -> np.ndarray | float:

@@ -212,8 +212,7 @@ class _Search:
         what explains less may be likely. What the data speak against is not tried, nor what they say nothing of: it
         would hide others.
         """
-        for first, enough in zip(posterior.promising(least), chain([least], repeat(0.0)), strict=False):
-            member = posterior.hypotheses[first], posterior.variant(first)
+        for member, enough in zip(posterior.promising(least), chain([least], repeat(0.0)), strict=False):
             judged = self.beside(structure, self.left([*structure, member], noise))
             place = judged.likeliest_at(member[0])
             if judged.log_odds[place] > max(enough, judged.log_prior[place] + SILENT):
@@ -299,7 +298,7 @@ class _Search:
         self.projection(noise).prepare(_columns(firsts))
         for place, first in enumerate(firsts):
             beside = self._beside([*rest, first], noise, there)
-            second = next(beside.promising(-np.inf), None)
+            second = beside.explains_most()
             if second is not None:
                 pairs.append([first, (beside.hypotheses[second], beside.variant(second))])
                 explained.append(alone.explained(place) + beside.explained(second))
