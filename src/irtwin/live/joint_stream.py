@@ -212,11 +212,15 @@ def _number(message: Mapping[str, Any], name: str) -> float:
     return float(value)
 
 
+def _numbers(message: Mapping[str, Any], name: str, count: int, most: float, meaning: str) -> list[int | float]:
+    values = message[name]
+    if not isinstance(values, list) or len(values) != count or not all(_is_number(number, most) for number in values):
+        raise InputError(f"`{name}` must have {count} numbers within {most:g}{meaning}")
+    return values
+
+
 def _centre(message: Mapping[str, Any]) -> tuple[float, float, float]:
-    centre = message["payload_com"]
-    if not isinstance(centre, list) or len(centre) != 3 or not all(_is_number(number, 100.0) for number in centre):
-        raise InputError("`payload_com` must have 3 numbers within 100: m in the frame of the flange")
-    x, y, z = map(float, centre)
+    x, y, z = map(float, _numbers(message, "payload_com", 3, 100.0, ": m in the frame of the flange"))
     return x, y, z
 
 
@@ -230,12 +234,5 @@ def _values(message: Mapping[str, Any], channel: Channel, order: Sequence[int]) 
         return (math.nan,) * (len(order) if channel.per_joint else 1)
     if not channel.per_joint:
         return (_number(message, name),)
-    values = message[name]
-    most = _GREATEST[name]
-    if (
-        not isinstance(values, list)
-        or len(values) != len(order)
-        or not all(_is_number(number, most) for number in values)
-    ):
-        raise InputError(f"`{name}` must have {len(order)} numbers within {most:g}, one for each joint")
+    values = _numbers(message, name, len(order), _GREATEST[name], ", one for each joint")
     return tuple([float(values[place]) for place in order])

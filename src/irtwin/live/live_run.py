@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -21,18 +20,9 @@ from irtwin.storage.rows import Tables, Values
 from irtwin.storage.schema import LIVE, moment_of
 
 _COM = tuple(f"payload_com_{axis}_m" for axis in "xyz")
-
-
-@dataclass(frozen=True)
-class Newest:
-    """What is told of a joint's state, each (n,): position rad, speed rad/s, acceleration rad/s2, torque N m, degC."""
-
-    time: float
-    position: Sequence[float]
-    speed: Sequence[float]
-    acceleration: Sequence[float]
-    torque: Sequence[float]
-    temperature: Sequence[float]
+_JOINT_STATE = (
+    "joint_position_rad", "joint_speed_rad_s", "joint_acc_rad_s2", "joint_torque_nm", "joint_temperature_degc",
+)  # fmt: skip
 
 
 def columns(joints: Sequence[str]) -> tuple[str, ...]:
@@ -65,9 +55,19 @@ def moving(speed: Sequence[float], fastest: Sequence[float]) -> bool:
 
 
 def rows(
-    header: Header, joints: Sequence[str], began: float, count: int, at: Newest, current_state: str, live: Values
+    header: Header,
+    joints: Sequence[str],
+    began: float,
+    now: float,
+    count: int,
+    newest: Sequence[Sequence[float]],
+    current_state: str,
+    live: Values,
 ) -> Tables:
-    """Return the rows of a run: `began` and `at.time` in s since 1970, `live` what else its live_state says."""
+    """Return the rows of a run that `began`, and is at `now`, in s since 1970; `live`: what else its live_state says.
+
+    newest: position, speed, acceleration, torque and temperature, each (n,), NaN where it was not said.
+    """
     activity_id = activities(header.run_id)[0]
     run = {
         "run_id": header.run_id,
@@ -79,7 +79,7 @@ def rows(
         "start_time": moment_of(began),
         "start_time_from": "log",
         "started": moment_of(began),
-        "run_time_s": at.time - began,
+        "run_time_s": now - began,
         "sample_count": count,
         **({} if header.performs is None else {"performs": header.performs}),
     }
@@ -88,8 +88,11 @@ def rows(
         "run": [run],
         "activity": [activity(header, activity_id, LIVE, began)],
         "run_state": [{**made, "current_state": current_state}],
-        "joint_state": [{**made, **joint} for joint in _joint_states(header.robot_id, joints, at)],
-        "live_state": [{**made, "state_time": moment_of(at.time), **live}],
+        "joint_state": [
+            {**made, "robot_id": header.robot_id, "joint": joint, **_joint_state(values)}
+            for joint, *values in zip(joints, *newest, strict=True)
+        ],
+        "live_state": [{**made, "state_time": moment_of(now), **live}],
     }
 
 
@@ -98,21 +101,22 @@ def closed_rows(header: Header, samples: np.ndarray, live: Values) -> tuple[Tabl
     joints = joints_of(header.columns)
     columns = dict(zip(header.columns, samples.T, strict=True))
     signals = from_columns(columns, joints)
-    time, began = signals.time, float(signals.time[0])
+    time = signals.time
+    began, ended = float(time[0]), float(time[-1])
     speed = _speeds(signals)
     size = np.nan_to_num(np.abs(speed))
     still = size < np.maximum(STILL_SPEED, STILL_SHARE * size.max(axis=0))
     acceleration = np.diff(speed, axis=0, prepend=np.nan)[-1] / np.diff(time, prepend=np.nan)[-1]
     last = (signals.q[-1], speed[-1], acceleration, _last(signals, "torque"), _last(signals, "temperature"))
-    at = Newest(float(time[-1]), *(values.tolist() for values in last))
+    newest = [values.tolist() for values in last]
     idle = still.all(axis=1)
-    tables = rows(header, joints, began, len(time), at, "standstill" if idle[-1] else "moving", live)
-    length = at.time - began
+    tables = rows(header, joints, began, ended, len(time), newest, "standstill" if idle[-1] else "moving", live)
+    length = ended - began
     tables["run"][0] |= {
-        "ended": moment_of(at.time),
+        "ended": moment_of(ended),
         "sample_rate_hz": (len(time) - 1) / length if length else None,
     }
-    tables["activity"][0] |= {"ended": moment_of(at.time)}
+    tables["activity"][0] |= {"ended": moment_of(ended)}
     tables["run_state"][0] |= {"idle_share": float(idle.mean())}
     table = columns | {"time": time - began}
     return tables, pa.table({name: values for name, values in table.items() if not np.isnan(values).all()})
@@ -156,21 +160,5 @@ def _last(signals: Signals, field: str) -> np.ndarray:
     return np.full(signals.q.shape[1], np.nan) if values is None else values[-1]
 
 
-def _joint_states(robot_id: str, joints: Sequence[str], at: Newest) -> list[Values]:
-    values = zip(joints, at.position, at.speed, at.acceleration, at.torque, at.temperature, strict=True)
-    return [
-        {
-            "robot_id": robot_id,
-            "joint": joint,
-            "joint_position_rad": position,
-            "joint_speed_rad_s": _known(speed),
-            "joint_acc_rad_s2": _known(acceleration),
-            "joint_torque_nm": _known(torque),
-            "joint_temperature_degc": _known(temperature),
-        }
-        for joint, position, speed, acceleration, torque, temperature in values
-    ]
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
+def _joint_state(values: Sequence[float]) -> Values:
+    return {name: None if math.isnan(value) else value for name, value in zip(_JOINT_STATE, values, strict=True)}

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from irtwin.announce import Announce
-from irtwin.errors import InputError
+from irtwin.errors import InputError, first_line
 from irtwin.live.joint_stream import STREAMED, State, state_of
 from irtwin.robot.description import Robot
 from irtwin.signals.unit import Unit, unit_of
@@ -118,7 +118,7 @@ class OpcUa:
             self._connect()
         except (*_LOST, ValueError) as error:
             raise InputError(
-                f"{address}: cannot be read by OPC UA ({_reason(error)}); check address, user and certificates"
+                f"{address}: cannot be read by OPC UA ({first_line(error)}); check address, user and certificates"
             ) from error
 
     def states(self, done: threading.Event, announce: Announce) -> Iterator[State | InputError]:
@@ -132,7 +132,7 @@ class OpcUa:
             except (*_LOST, InputError) as error:
                 if done.is_set():
                     return
-                announce(f"{self.address}: the connection is lost ({_reason(error)}); trying again")
+                announce(f"{self.address}: the connection is lost ({first_line(error)}); trying again")
                 if self._connected_again(done):
                     announce(f"{self.address}: connected again")
 
@@ -273,17 +273,12 @@ class OpcUa:
             (await node.read_data_value()).StatusCode.check()
             text = self._said.get("units", {}).get(key) or await _unit_text(node)
         except ua.UaStatusCodeError as error:
-            raise InputError(f"{self.address}: {key} {node}: {_reason(error)}") from None
+            raise InputError(f"{self.address}: {key} {node}: {first_line(error)}") from None
         unit = unit_of(text, (channel.unit_of(kind),))
         if unit is None:
             why = f'"{text}" is no unit of it' if text else "the server says no unit"
             raise InputError(f"{self.address}: {key} {node}: {why}; write units.{key} in --nodes FILE")
         return _Place(key, node, unit)
-
-
-def _reason(error: BaseException) -> str:
-    """Say in words why a connection broke."""
-    return str(error) or type(error).__name__
 
 
 async def _next(readings: AsyncIterator[State | InputError]) -> State | InputError | None:

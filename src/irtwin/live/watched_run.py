@@ -106,11 +106,9 @@ class WatchedRun:
         """Return the rows of the run as it is now."""
         now = self.newest
         assert now is not None
-        at = live_run.Newest(
-            now.time, now.of("q"), self.speed, self.acceleration, now.of("torque"), now.of("temperature")
-        )
-        current = "moving" if live_run.moving(self.speed, self.fastest) else "standstill"
-        tables = live_run.rows(self.header, self.joints, self.began, self.count, at, current, self.counts(waited))
+        newest = now.of("q"), self.speed, self.acceleration, now.of("torque"), now.of("temperature")
+        current, counts = "moving" if live_run.moving(self.speed, self.fastest) else "standstill", self.counts(waited)
+        tables = live_run.rows(self.header, self.joints, self.began, now.time, self.count, newest, current, counts)
         return live_run.together(tables, self.energy_tables)
 
     def mapped(self, tables: Tables, shown: ShownRuns) -> set[Quad]:
