@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -107,19 +106,12 @@ def as_columns(path: Path, table: pa.Table, places: tuple[str, int]) -> tuple[di
     names = [name.strip() for name in table.column_names]
     check_names(path, names)
     check_values(path, table.num_rows, len(names))
-    _check_once(path, names)
     columns: dict[str, np.ndarray] = {}
     for name, column in zip(names, table.columns, strict=True):
         values = _values(path, name, column, places)
         if values is not None:
             columns[name] = values
     return columns, tuple(name for name in names if name not in columns)
-
-
-def _check_once(path: Path, names: Sequence[str]) -> None:
-    repeated = [name for name, count in Counter(names).items() if count > 1]
-    if repeated:
-        raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one, or give each a name of its own")
 
 
 def _values(path: Path, name: str, column: pa.ChunkedArray, places: tuple[str, int]) -> np.ndarray | None:
@@ -203,7 +195,6 @@ def _instant(text: str) -> np.datetime64 | None:
 def _parquet(path: Path) -> Recording:
     with open_parquet(path) as file:
         schema = file.schema_arrow
-        _check_once(path, schema.names)
         # what is no one value a row is no signal: it is not read, for one row may hold millions
         names = [
             column.name for column in schema if not pa.types.is_nested(column.type) and not _is_binary(column.type)

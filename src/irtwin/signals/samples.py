@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -56,9 +55,6 @@ def _known(columns: Sequence[str], channels: Mapping[str, Channel], robot: Robot
     """Return those columns that the log format knows; raise on missing, repeated, foreign ones."""
     names = [name.strip() for name in columns]
     check_names(path, names)
-    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
-    if repeated:
-        raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one")
     strict = {channel.prefix for channel in CHANNELS.values() if channel.strict}
     for name in names:
         prefix, _, joint = name.partition("_")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -60,7 +61,7 @@ class Source(ABC):
 
 
 def check_names(path: Path, names: Sequence[str]) -> None:
-    """Raise InputError where columns are too many, or one has no name but a text."""
+    """Raise InputError where columns are too many, two have one name, or one has no name but a text."""
     if len(names) > MOST_COLUMNS:
         raise InputError(f"{path}: {len(names)} columns; a run has at most {MOST_COLUMNS}: leave out what nobody needs")
     long = next((number for number, name in enumerate(names, start=1) if len(name) > LONGEST_NAME), None)
@@ -69,6 +70,9 @@ def check_names(path: Path, names: Sequence[str]) -> None:
             f"{path}: the name of column {long}, {names[long - 1][:40]!r}..., has {len(names[long - 1])} characters; "
             f"give it one of at most {LONGEST_NAME}"
         )
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        raise InputError(f"{path}: column {repeated[0]} occurs twice; keep one, or give each a name of its own")
 
 
 def check_values(path: Path, rows: int, columns: int) -> None:
