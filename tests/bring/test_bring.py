@@ -127,8 +127,8 @@ def test_one_joint_that_is_given_tells_those_that_are_counted_on(
 ) -> None:
     speeds = np.gradient(good()["q_joint_a1"], good()["time"])
     log = plain(tmp_path, **{f"speed{k}": speeds for k in range(1, 7)})
-    brought = bring([log], tmp_path / "set", NAME, Options(maps=(f"speed{number}=dq_joint_a1:rad/s",)))
-    assert [one.channel for one in brought.forms[0].taken.columns if one.column.startswith("speed")] == channels
+    (form,) = bring([log], tmp_path / "set", NAME, Options(maps=(f"speed{number}=dq_joint_a1:rad/s",)))
+    assert [one.channel for one in form.taken.columns if one.column.startswith("speed")] == channels
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, content: str, 
 def test_several_logs_are_several_runs_and_a_taken_folder_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     logs = [plain(tmp_path), plain(tmp_path / "other")]
-    assert len(bring(logs, tmp_path / "set", NAME, Options(name="Mine")).forms) == 1
+    assert len(bring(logs, tmp_path / "set", NAME, Options(name="Mine"))) == 1
     data_set = read_data_set(tmp_path / "set")
     assert ([run.name for run in data_set.runs], data_set.robot.name) == (["run", "run_2"], "Mine")
     before = (tmp_path / "set" / "dataset.toml").read_bytes()
@@ -252,8 +252,8 @@ def test_a_log_without_names_is_given_some(tmp_path: Path) -> None:
     log = plain(tmp_path)
     names, body = log.read_text().split("\n", 1)
     log.write_text(body)
-    brought = bring([log], tmp_path / "set", NAME, Options(names=tuple(names.split(","))))
-    assert [line for line in brought.said if "has no line of names; they are those of --names" in line]
+    (form,) = bring([log], tmp_path / "set", NAME, Options(names=tuple(names.split(","))))
+    assert [line for line in form.said if "has no line of names; they are those of --names" in line]
     np.testing.assert_allclose(read_data_set(tmp_path / "set").runs[0].signals.q, signals(good()).q, atol=1e-6)
     with pytest.raises(InputError, match=r"columns; --names gives 2 different names"):
         bring([log], tmp_path / "other", NAME, Options(names=("a", "b")))
@@ -264,8 +264,8 @@ def test_a_log_without_names_is_given_some(tmp_path: Path) -> None:
 def test_a_last_line_that_is_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
     log = plain(tmp_path)
     log.write_bytes(log.read_bytes().rstrip()[:-40])
-    brought = bring([log], tmp_path / "set", NAME, Options())
-    assert [line for line in brought.said if "the last, is cut off; it is left out" in line]
+    (form,) = bring([log], tmp_path / "set", NAME, Options())
+    assert [line for line in form.said if "the last, is cut off; it is left out" in line]
     assert len(read_data_set(tmp_path / "set").runs[0].signals.time) == len(good()["time"]) - 1
 
 

@@ -162,9 +162,9 @@ class Numbers(Source):
 def test_a_format_that_a_package_brings_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalogue, "_registered", lambda: (Numbers,))
     np.savez(tmp_path / "run.npz", **good())
-    found = bring([tmp_path / "run.npz"], tmp_path / "set", NAME, MAINS)
-    assert found.forms[0].logs[0].form == ".npz, by tests"
-    assert "read by a package" in found.said
+    (form,) = bring([tmp_path / "run.npz"], tmp_path / "set", NAME, MAINS)
+    assert form.logs[0].form == ".npz, by tests"
+    assert "read by a package" in form.said
     assert_same(read_data_set(tmp_path / "set"))
 
 
@@ -220,8 +220,8 @@ def test_a_measured_recording_comes_back_to_the_last_bit(tmp_path: Path) -> None
 def test_a_recording_that_ur_rtde_made(tmp_path: Path) -> None:
     """Made by RTDEReceiveInterface.startFileRecording of ur_rtde 1.6.5, of a controller that samples each 8 ms."""
     log = Path(__file__).parent / "data" / "ur_rtde.csv"
-    said = bring([log], tmp_path / "set", NAME, Options(maps=("actual_qd_*=dq:rad/s",))).said  # they are no derivatives
-    assert said == (f"{log}: 3 rows left out, the first line 7: they repeat the row before, time and all",)
+    (form,) = bring([log], tmp_path / "set", NAME, Options(maps=("actual_qd_*=dq:rad/s",)))  # they are no derivatives
+    assert form.said == [f"{log}: 3 rows left out, the first line 7: they repeat the row before, time and all"]
     data_set = read_data_set(tmp_path / "set")
     (run,) = data_set.runs
     rows, joints = np.round((run.signals.time - 1000.0) / 0.008), np.arange(6)

@@ -14,13 +14,12 @@ import pyarrow.parquet
 from irtwin.bring import rtde_names
 from irtwin.bring.aligned import aligned
 from irtwin.bring.choice import meanings
-from irtwin.bring.column_name import Meaning
 from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
-from irtwin.bring.taken import TakenLogs, TakenRun, take
+from irtwin.bring.taken import TakenLogs, TakenRun
 from irtwin.bring.told import UserSaid, roles, told
 from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
@@ -64,16 +63,10 @@ class Options:
         return replace(self, maps=maps, gear_ratios=ratios, power_at=places[-1] if places else self.power_at)
 
 
-@dataclass(frozen=True)
-class Brought:
-    """What was brought: forms of logs, and a line for each thing that was done in reading."""
-
-    forms: Sequence[LogsAlike]
-    said: tuple[str, ...]
-
-
-def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options, ask: Ask | None = None) -> Brought:
-    """Write logs as a new data set, a run a file.
+def bring(
+    files: Sequence[Path], out: Path, robot: str | None, options: Options, ask: Ask | None = None
+) -> list[LogsAlike]:
+    """Write logs as a new data set, a run a file; return what was brought, those of the same columns together.
 
     `robot`: a URDF file, a data set, or a name; None: a meter's logs, of whose joints nothing is known. `ask` answers
     what cannot be told; DoubtError where it is None. Raises InputError where a log cannot be used; nothing is written
@@ -102,7 +95,7 @@ def bring(files: Sequence[Path], out: Path, robot: str | None, options: Options,
         gear_ratios=dict(user_said.gear_ratios),
     )  # fmt: skip
     _write(out, described, written, {text.file: pa.table(dict(run.columns)) for text, run in listed})
-    return Brought(forms, tuple(line for form in forms for line in form.said))
+    return forms
 
 
 def import_logs(
@@ -132,14 +125,17 @@ def _metered(files: Sequence[Path]) -> Robot:
 
 
 class LogsAlike:
-    """Logs of the same columns, taken together: what one of them tells of a unit holds for all."""
+    """Logs of the same columns, taken together: what one of them tells of a unit holds for all.
+
+    `said`: a line for each thing that was done in reading.
+    """
 
     def __init__(self, logs: Sequence[Recording], robot: Robot, user_said: UserSaid, repair: bool) -> None:
         self.logs = logs
-        means: list[Meaning] = meanings(logs[0], robot, user_said)
+        means = meanings(logs[0], robot, user_said)
         usable = [aligned(log, means, repair=repair) for log in logs]
         self.said = [line for log in usable for line in (*log.recording.said, *log.said)]
-        self.taken: TakenLogs = take(usable, means, robot, user_said)
+        self.taken = TakenLogs(usable, means, robot, user_said)
 
 
 _Settled = tuple[UserSaid, list[LogsAlike], tuple[str | None, str]]

@@ -53,30 +53,25 @@ class TakenRun:
     started: datetime | None
 
 
-@dataclass(frozen=True)
 class TakenLogs:
-    """Logs of one form: their columns, runs, and where power was measured, None where it was not."""
+    """Logs of one form: their `columns`, `runs`, and where power was measured, `power_at`, None where it was not."""
 
-    columns: tuple[Taken, ...]
-    runs: tuple[TakenRun, ...]
-    power_at: str | None
-    power_at_why: str
-
-
-def take(logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: UserSaid) -> TakenLogs:
-    """Return logs of the same columns as runs. Raises DoubtError where a unit, or a place, cannot be told."""
-    return _Taking(logs, meanings, robot, told).result()
-
-
-class _Taking:
     def __init__(self, logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: UserSaid) -> None:
+        """Take logs of the same columns as runs. Raises DoubtError where a unit, or a place, cannot be told."""
         self.logs, self.meanings, self.robot, self.told = logs, meanings, robot, told
         self.where = ", ".join(str(log.recording.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
         self.units: Units = {}
         self.motions: list[MeasuredRun] = []
         self.unsigned = False  # torque, of no use beside commands
+        seconds, started = self._find_units()
+        self.power_at, self.power_at_why = self._power_at()
+        self.columns = tuple(self._row(meaning) for meaning in meanings)
+        self.runs = tuple(
+            TakenRun(self._columns(log, time), start) for log, time, start in zip(logs, seconds, started, strict=True)
+        )
 
-    def result(self) -> TakenLogs:
+    def _find_units(self) -> tuple[list[np.ndarray], list[datetime | None]]:
+        """Find the unit of each column; return the times of each log, s, and when it started."""
         self._resolve("q", self._position)
         self._resolve("command", self._position)
         positions = self._si("q")
@@ -97,13 +92,7 @@ class _Taking:
         self._resolve("meter_voltage", lambda raw, _, si: evidence.by_size(si, raw, _VOLTAGE))
         self._resolve("meter_current", self._supply_current)
         self._resolve("power", lambda raw, *_: evidence.power(self.robot, self.motions, raw))
-        power_at, why = self._power_at()
-        rows = tuple(self._row(meaning) for meaning in self.meanings)
-        runs = tuple(
-            TakenRun(self._columns(log, time), start)
-            for log, time, start in zip(self.logs, seconds, started, strict=True)
-        )
-        return TakenLogs(rows, runs, power_at, why)
+        return seconds, started
 
     def _of(self, field: str) -> list[Meaning]:
         """Return the columns of a channel, base to flange."""

@@ -14,7 +14,7 @@ from irtwin.errors import InputError
 from irtwin.location import Location
 
 if TYPE_CHECKING:
-    from irtwin.bring.bring import Brought
+    from irtwin.bring.bring import LogsAlike
     from irtwin.bring.doubt import DoubtError, WayOut
     from irtwin.bring.taken import Taken
 
@@ -105,10 +105,10 @@ def import_(
 
     options = Options(names=tuple(name.strip() for name in names.split(",")) if names else (), **told)
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
-    brought = bring(files, out, robot, options, ask)
-    _show(brought)
+    forms = bring(files, out, robot, options, ask)
+    _show(forms)
     findings, command = found_in(out)
-    for line in (*brought.said, *findings):
+    for line in (*(line for form in forms for line in form.said), *findings):
         say(f"irtwin: {line}")
     if command is None:
         say(f"Written: {out}, but it cannot be used yet. Cure what is said above, or import again into a new folder.")
@@ -165,14 +165,14 @@ def _ask(doubt: DoubtError) -> WayOut:
     return replace(chosen, options=tuple(options))
 
 
-def _show(brought: Brought) -> None:
+def _show(forms: list[LogsAlike]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     console = Console()
     wide = Console(width=None if console.is_terminal else _WIDE)
-    for form in brought.forms:
+    for form in forms:
         files = ", ".join(log.path.name for log in form.logs[:4]) + (" ..." if len(form.logs) > 4 else "")
         title = Text(printable(f"{files}: {form.logs[0].form}"))
         table = Table("column", "channel", "unit", "conversion", "why", title=title)
