@@ -75,6 +75,13 @@ class TomlTable:
             raise self.fault(key, f"should be text, not {shown(value)}")
         return value
 
+    def choice(self, key: str, known: Sequence[str], default: str | None = None) -> Any:
+        """Return the text of a key. Raises InputError as `text`, and where it is none of those that are known."""
+        text = self.text(key, default)
+        if text is not None and text not in known:
+            raise self.fault(key, f'= "{text}"; use {(" or " if len(known) == 2 else ", ").join(known)}')
+        return text
+
     def needed(self, key: str) -> str:
         """Return the text of a key that has to be there. Raises InputError as `text`, and where it is absent."""
         text = self.text(key)

@@ -53,22 +53,11 @@ def _row(robot: TomlTable, number: int, values: Any) -> Row:
         raise InputError(f"{robot.file}: [[robot.dh.row]] {number} should be a table, not {shown(values)}")
     table = TomlTable(robot.file, f"[[robot.dh.row]] {number}", values)
     table.check_keys(ROW_KEYS)
-    kind = table.text("type", "revolute") or ""
-    if kind not in _TYPES:
-        raise table.fault("type", f'= "{kind}"; use {", ".join(_TYPES)}')
+    kind = table.choice("type", _TYPES, "revolute")
     lower, upper = _limits(table, kind)
-    row = Row(
-        a=_within(table, "a"),
-        alpha=_within(table, "alpha"),
-        d=_within(table, "d"),
-        theta=_within(table, "theta"),
-        kind=kind,
-        lower=lower,
-        upper=upper,
-        velocity=table.number("velocity", least=0.0) or 0.0,
-        effort=table.number("effort", least=0.0) or 0.0,
-        name=table.text("name"),
-    )
+    sizes: dict[str, Any] = {key: _within(table, key) for key in ("a", "alpha", "d", "theta")}
+    sizes |= {key: table.number(key, least=0.0) or 0.0 for key in ("velocity", "effort")}
+    row = Row(kind=kind, lower=lower, upper=upper, name=table.text("name"), **sizes)
     mass, com = table.number("mass", least=0.0), table.numbers("com", 3, "3 numbers (m: x, y, z in the row's frame)")
     about = "kg m^2: xx, yy, zz, xy, xz, yz about the centre of mass"
     inertia = table.numbers("inertia", 6, f"6 numbers ({about})")
@@ -83,10 +72,8 @@ def _row(robot: TomlTable, number: int, values: Any) -> Row:
 
 def _limits(table: TomlTable, kind: str) -> tuple[float, float]:
     lower, upper = table.number("lower"), table.number("upper")
-    if kind == "continuous":
-        if lower is not None or upper is not None:
-            raise InputError(f"{table.file}: {table.name}: a continuous joint has no lower or upper limit; remove it")
-        return -math.inf, math.inf
+    if kind == "continuous" and (lower, upper) != (None, None):
+        raise InputError(f"{table.file}: {table.name}: a continuous joint has no lower or upper limit; remove it")
     if (lower is None) != (upper is None):
         raise table.fault("lower" if lower is None else "upper", "is missing")
     if lower is None or upper is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from irtwin.signals.channels import Samples
 from irtwin.signals.motion import stretches
@@ -56,7 +57,7 @@ def load_profile(time: Samples, power: Samples) -> LoadProfile:
     take alike, else what repeats within the longest stretch.
     """
     levels = _levels(time, power)
-    spent = np.concatenate([[0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2)])
+    spent = scipy.integrate.cumulative_trapezoid(power, time, initial=0.0)
     share = np.gradient(time)  # s that each sample stands for
     share *= (time[-1] - time[0]) / share.sum()
     states = tuple(
@@ -70,7 +71,7 @@ def load_profile(time: Samples, power: Samples) -> LoadProfile:
 
 def by_hour(time: Samples, power: Samples, into: float) -> list[float]:
     """Return the energy (J) of each hour of the clock that a run touches; it began `into` s after an hour began."""
-    spent = np.concatenate([[0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2)])
+    spent = scipy.integrate.cumulative_trapezoid(power, time, initial=0.0)
     since = time - time[0] + into
     ends = np.arange(0.0, since[-1] + 3600.0, 3600.0)
     return [float(joules) for joules in np.diff(np.interp(ends, since, spent))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime, timedelta
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -129,9 +130,7 @@ def read_data_set(folder: Path | str, *, repair: bool = False, commanded: bool =
     runs = tuple(run for run in listed if run.role != PLANNED)
     if not runs:
         raise InputError(f"{file}: every run is planned; a twin needs one that was measured")
-    power_at = table.text("power_at")
-    if power_at is not None and power_at not in POWER_PLACES:
-        raise table.fault("power_at", f'= "{power_at}"; use {" or ".join(POWER_PLACES)}')
+    power_at = table.choice("power_at", POWER_PLACES)
     TomlTable(file, "", document).check_keys(DATA_SET_KEYS)
     urdf = table.path("urdf", folder) if "urdf" in table.values else None
     twin = _optional(file, document, "twin", TWIN_KEYS)
@@ -297,15 +296,8 @@ def _robot(folder: Path, table: TomlTable) -> Robot:
         manufacturer=table.text("manufacturer"),
         type=table.text("type"),
         weight=table.number("weight", least=0.0),
-        feedforward=_feedforward(table),
+        feedforward=table.choice("feedforward", FEEDFORWARD),
     )
-
-
-def _feedforward(table: TomlTable) -> str | None:
-    kind = table.text("feedforward")
-    if kind not in (None, *FEEDFORWARD):
-        raise table.fault("feedforward", f'= "{kind}"; use {" or ".join(FEEDFORWARD)}')
-    return kind
 
 
 def _metered(name: str, table: TomlTable) -> Robot:
@@ -329,9 +321,7 @@ def _pieces(
     """Return the run of a table, in pieces where it has holes in time; what was done in reading; what was mended."""
     table.check_notes(RUN_KEYS)
     path = table.path("file", folder)
-    role = table.text("role", "observed") or ""
-    if role not in ROLES:
-        raise table.fault("role", f'= "{role}"; use {", ".join(ROLES)}')
+    role = table.choice("role", ROLES, "observed")
     planned = role == PLANNED
     signals, notes = read_signals(path, robot, repair=repair, measured=not planned, commanded=commanded, topics=topics)
     if planned:
@@ -467,13 +457,10 @@ def _resolved(runs: list[Run], file: Path) -> tuple[Run, ...]:
 
 
 def _check_circles(repeats: Mapping[str, str | None], file: Path) -> None:
-    for name in repeats:
-        seen: list[str] = []
-        at: str | None = name
-        while at is not None and at not in seen:
-            seen.append(at)
-            at = repeats[at]
-        if at is not None:
-            raise InputError(
-                f"{file}: runs {' and '.join(seen)} repeat each other in a circle; remove repeat_of from the first one"
-            )
+    try:
+        TopologicalSorter({name: [of] for name, of in repeats.items() if of is not None}).prepare()
+    except CycleError as error:
+        raise InputError(
+            f"{file}: runs {' and '.join(error.args[1][1:])} repeat each other in a circle; remove repeat_of from the "
+            "first one"
+        ) from error
