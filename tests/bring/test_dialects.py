@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from tests.bring.dialects import NAME, assert_same, good, per_joint, robot, signals, write_text
 from tests.data_sets import irtwin_does
 from tests.signals.bags import of_run, write
+from tests.signals.test_sources import Numbered
 
 from irtwin.bring.bring import Options, bring
 from irtwin.check.check import check
@@ -22,7 +21,6 @@ from irtwin.errors import InputError
 from irtwin.signals.channels import columns_of
 from irtwin.signals.log import DataSet, read_data_set
 from irtwin.signals.sources import catalogue
-from irtwin.signals.sources.source import Source
 
 MEASURED = Path(__file__).parents[3] / "shared/data"
 STARTED = datetime(2026, 3, 2, 8, 0, 0, 250_000, tzinfo=UTC)
@@ -144,28 +142,14 @@ def test_a_bag_comes_back_to_the_last_bit(tmp_path: Path, form: str) -> None:
     assert_same(read_data_set(tmp_path / "set"), "q dq torque power temperature", tolerance=0)
 
 
-class Numbers(Source):
-    """Samples of a package's own format: one NumPy archive."""
-
-    suffixes: ClassVar[tuple[str, ...]] = (".npz",)
-    counted: ClassVar[str] = "sample"
-
-    def columns(self) -> Sequence[str]:
-        with np.load(self.path) as kept:
-            return list(kept)
-
-    def read(self, columns: Sequence[str], *, repair: bool) -> tuple[pa.Table, list[str]]:
-        with np.load(self.path) as kept:
-            return pa.table({name: kept[name] for name in columns}), ["read by a package"]
-
-
 def test_a_format_that_a_package_brings_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(catalogue, "_registered", lambda: (Numbers,))
-    np.savez(tmp_path / "run.npz", **good())
-    (form,) = bring([tmp_path / "run.npz"], tmp_path / "set", NAME, MAINS)
-    assert form.logs[0].form == ".npz, by tests"
+    monkeypatch.setattr(catalogue, "_registered", lambda: (Numbered,))
+    joints = [good()[f"{prefix}_{joint}"] for prefix in ("q", "tau") for joint in robot().joint_names]
+    np.savetxt(tmp_path / "run.numbered", np.column_stack([good()["time"], *joints]))
+    (form,) = bring([tmp_path / "run.numbered"], tmp_path / "set", NAME, MAINS)
+    assert form.logs[0].form == ".numbered, by tests"
     assert "read by a package" in form.said
-    assert_same(read_data_set(tmp_path / "set"))
+    assert_same(read_data_set(tmp_path / "set"), "time q torque")
 
 
 def recording_of_rtde(folder: Path, delimiter: str = " ") -> Path:

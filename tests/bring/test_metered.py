@@ -53,11 +53,8 @@ def test_power_and_energy_become_power(tmp_path: Path, header: str, values: np.n
 def test_dates_as_meters_write_them(tmp_path: Path, header: str, moment: str) -> None:
     quarters = [divmod(15 * k, 60) for k in range(192)]
     times = [moment.format(day=2 + hour // 24, hour=hour % 24, minute=minute) for hour, minute in quarters]
-    rows = [f"{time};{2 + 0.5 * (k % 3)}".replace(",", ".") for k, time in enumerate(times)]
-    text = "\n".join(
-        [header, *(f"{row.rpartition(';')[0]};{row.rpartition(';')[2].replace('.', ',')}" for row in rows)]
-    )
-    (tmp_path / "meter.csv").write_text(text + "\n")
+    rows = [f"{time};{('2,0', '2,5', '3,0')[k % 3]}" for k, time in enumerate(times)]
+    (tmp_path / "meter.csv").write_text("\n".join([header, *rows, ""]))
     bring([tmp_path / "meter.csv"], tmp_path / "set", None, Options())
     (run,) = read_data_set(tmp_path / "set").runs
     assert run.started is not None and run.started.isoformat() == "2026-03-02T00:00:00+00:00"
@@ -68,12 +65,8 @@ def test_dates_as_meters_write_them(tmp_path: Path, header: str, moment: str) ->
 def test_what_is_no_power_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no column was taken for power or energy; say which it is: --map COLUMN=pow"):
         brought(tmp_path, "time,value", np.full(COUNT, 300.0))
-    assert (
-        brought(
-            tmp_path, "time,value", np.full(COUNT, 3.0), Options(name="Cell 3", maps=("value=power:kW",))
-        ).robot.name
-        == "Cell 3"
-    )
+    named = Options(name="Cell 3", maps=("value=power:kW",))
+    assert brought(tmp_path, "time,value", np.full(COUNT, 3.0), named).robot.name == "Cell 3"
 
 
 def test_names_tell_a_meter() -> None:

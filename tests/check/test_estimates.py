@@ -13,7 +13,7 @@ from tests.synthetic import arm, as_run, measure, swing
 
 from irtwin.check.check import check
 from irtwin.check.estimates import Lateness, estimate_findings
-from irtwin.check.moving import Moving, moving
+from irtwin.check.moving import moving
 from irtwin.signals.channels import Signals
 from irtwin.signals.finding import LogFinding
 from irtwin.signals.log import DataSet
@@ -82,11 +82,6 @@ def test_exchanged_speeds_of_nearly_opposite_motions_are_not_called_reversed():
 
     faulty = spoilt(spoilt(healthy(), nearly_opposite), exchanged(1, 2, "dq"))
     assert found(faulty) == {("swap", "dq_joint_2 <-> dq_joint_3")}
-
-
-def test_nothing_moves_nothing_is_said():
-    still = Moving((), (), np.zeros(4, dtype=bool))
-    assert estimate_findings(ROBOT, still) == []
 
 
 ON_TIME = [(0.001, 0.002), (0.003, 0.002), (0.002, 0.001)]  # s, of the friction of other joints

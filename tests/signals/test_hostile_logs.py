@@ -42,17 +42,14 @@ def rewrite(folder: Path, line: str, instead: str) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("9" * 5000, "not valid TOML: Exceeds the limit"),
-        ("[" * 5000, "not valid TOML: nested too deeply"),
         ("9" * 400, r"run.payload_mass is a number beyond 1e\+300"),
         ("0x" + "f" * 6000, r"run.payload_mass is a number beyond 1e\+300"),
         ("1e999", "should be a number of at least 0, not inf"),
         ("nan", "should be a number of at least 0, not nan"),
-        ('"\\u0000"', "run.payload_mass contains a null character"),
         ('"' + "x" * 5000 + '"', "should be a number of at least 0, not 'xxx"),
         ("\x00", "not valid TOML"),
     ],
-    ids=range(9),
+    ids=range(6),
 )
 def test_values_that_no_toml_should_have(folder, value, message):
     rewrite(folder, "^payload_mass.*$", f"payload_mass = {value}")
@@ -67,10 +64,8 @@ def test_values_that_no_toml_should_have(folder, value, message):
         "[" + ".".join("a" * 50_000) + "]",
         "x = {" + ".".join("a" * 50_000) + " = 1}",
         "x = { y = 1, " + ".".join("a" * 50_000) + " = 1}",
-        ".".join("a" * 40) + " = 1",
-        "x = " + "[" * 40 + "]" * 40,
     ],
-    ids=range(7),
+    ids=range(5),
 )
 def test_tables_in_tables_without_end(folder, line):
     rewrite(folder, "^role.*$", line)
@@ -90,11 +85,6 @@ def test_text_with_many_dots_is_no_table(folder):
 def test_a_folder_whose_name_no_disk_takes(tmp_path):
     with pytest.raises(InputError, match="not found"):
         read_data_set(tmp_path / ("x" * 5000))
-
-
-def test_a_table_of_keys_without_end(folder):
-    rewrite(folder, "^role.*$", 'role = "observed"\n' + "\n".join(f"rolle_{k} = 1" for k in range(1001)))
-    assert re.search(r"run has \d+ keys; keep at most 1000 in a table", refused(folder))
 
 
 @pytest.mark.parametrize("year", ["0001", "1899", "2201", "9999"])
@@ -182,18 +172,6 @@ def test_columns_that_hold_no_numbers(folder, values):
 def test_decimals_are_numbers(folder):
     (run,) = read_data_set(parquet(folder, q_joint_1=pa.array([1] * 200, pa.decimal128(10, 3)))).runs
     np.testing.assert_array_equal(run.signals.q, 1.0)
-
-
-@pytest.mark.slow
-def test_a_small_file_of_many_samples_is_refused_unread(folder):
-    (file,) = (folder / "runs").iterdir()
-    schema = pa.schema([(name, pa.float64()) for name in ("time", "q_joint_1", "tau_joint_1")])
-    batch = pa.table([pa.array(np.zeros(10_000_000))] * 3, schema=schema)
-    with pq.ParquetWriter(file, schema, compression="zstd") as writer:
-        for _ in range(4):
-            writer.write_table(batch)
-    assert file.stat().st_size < 1_000_000
-    assert "40000000 samples of 3 columns" in refused(folder)
 
 
 @pytest.mark.slow

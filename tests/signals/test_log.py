@@ -288,13 +288,3 @@ def test_a_log_alone_is_no_data_set_and_import_makes_one(tmp_path: Path) -> None
 def test_a_folder_without_a_data_set(tmp_path):
     with pytest.raises(InputError, match=r"dataset\.toml: not found"):
         read_data_set(tmp_path)
-
-
-@pytest.mark.system
-@pytest.mark.parametrize("name", ["staubli_tx40", "ur10", "franka_panda", "ur3_power"])
-def test_measured_logs_of_real_robots(name):
-    folder = Path(__file__).parents[3] / "shared/data" / name
-    if not folder.is_dir():
-        pytest.skip("the measured logs are not here")
-    data_set = read_data_set(folder)
-    assert all(len(run.signals.time) > 500 for run in data_set.runs)

@@ -1,7 +1,8 @@
-"""Runs with holes in time, with held positions, and at odd rates."""
+"""Runs with holes in time, with held positions, and at odd rates; a stated cutoff that fits to these."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -17,7 +18,7 @@ from irtwin.errors import InputError
 from irtwin.signals.channels import Signals
 from irtwin.signals.conditioning import choose_cutoff, condition
 from irtwin.signals.log import Run, read_data_set
-from irtwin.signals.sampling import as_sampled, interval
+from irtwin.signals.sampling import as_sampled, checked_cutoff, interval
 from irtwin.twin.identify import identify
 from irtwin.twin.predict import predict
 
@@ -160,3 +161,26 @@ def test_a_run_with_a_hole_is_predicted_on_either_side():
     table, before = predict(twin, cut), predict(twin, replace(whole, signals=whole.signals.rows(slice(300))))
     np.testing.assert_array_equal(table["time"], cut.signals.time)
     np.testing.assert_allclose(table["tau_joint_1"][:300], before["tau_joint_1"])
+
+
+def logged(seconds: float, rate: float) -> Signals:
+    time = np.arange(round(seconds * rate) + 1) / rate
+    return Signals(time, np.zeros((len(time), 1)))
+
+
+TWO_RATES = [logged(20.0, 100.0), logged(5.0, 40.0)]
+
+
+@pytest.mark.parametrize("hz", [0.5, 3.0, 19.9])
+def test_what_runs_can_be_filtered_with_is_taken_as_it_is(hz: float) -> None:
+    assert checked_cutoff(hz, TWO_RATES, "cutoff") == hz
+
+
+@pytest.mark.parametrize("hz", [0.0, -3.0, math.nan, math.inf, 1e9, 0.49, 20.01])
+def test_any_other_is_refused_in_a_line(hz: float) -> None:
+    with pytest.raises(InputError) as refused:
+        checked_cutoff(hz, TWO_RATES, "dataset.toml: [twin] cutoff")
+    assert str(refused.value) == (
+        "dataset.toml: [twin] cutoff should be at least 0.5 Hz, 10 periods in the longest run, and below 20 Hz, half "
+        f"the slowest sampling rate, not {hz:g} Hz"
+    )
