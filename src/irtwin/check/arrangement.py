@@ -18,7 +18,7 @@ import scipy
 
 from irtwin.check.moving import Moving
 from irtwin.check.rigid_body import FEW_ROWS, MOST_JOINTS, RigidBodyRows, rows_of, turned_axes
-from irtwin.check.whole_body import Held, WholeBody
+from irtwin.check.whole_body import Fitted, WholeBody
 from irtwin.robot.description import Robot
 from irtwin.signals.channels import CHANNELS
 from irtwin.signals.finding import LogFinding
@@ -90,13 +90,13 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
     if rows is None:
         return []
     body = WholeBody.of(rows)
-    own = body.held_out(rows.torque)
+    fitted = body.fit(rows.torque)
     faults: list[_Fault | _Axis] = [*_faults(rows, moving.joints), *starmap(_Axis, turned_axes(rows.model))]
-    left = {fault: _left(rows, body, fault) for fault in faults}
+    left = {fault: _cured(rows, body, fault).left for fault in faults}
     fault = min(left, key=lambda candidate: left[candidate])
-    if body.fit(rows.torque).left < left[fault]:
+    if fitted.left < left[fault]:
         return []
-    held = _held(rows, body, fault)
+    own, held = fitted.held_out(), _cured(rows, body, fault).held_out()
     if own.gain(held) < np.log(_GAIN) or own.t(held) < _SURE:
         return []
     if isinstance(fault, _Axis):
@@ -104,7 +104,7 @@ def arrangement_findings(robot: Robot, moving: Moving, reversed_torques: Collect
     if fault.field == "torque" and fault.fault == "scale":
         return []  # is found where its size is estimated
     mirrors = [candidate for candidate in left if isinstance(candidate, _Fault) and candidate.mirrors(fault)]
-    rivals = [mirror for mirror in mirrors if _held(rows, body, mirror).t(held) < _ALIKE]
+    rivals = [mirror for mirror in mirrors if _cured(rows, body, mirror).held_out().t(held) < _ALIKE]
     return [_finding(fault, rivals, own.gain(held), own.t(held), robot, moving)]
 
 
@@ -116,7 +116,7 @@ def says_position(robot: Robot, moving: Moving, joint: int) -> float:
     body, sign = WholeBody.of(rows), np.where(np.arange(len(robot.joints)) == joint, -1.0, 1.0)
     own = np.arange(len(robot.joints))
     of_torque, of_position = (
-        _held(rows, body, _Fault("sign", field, (joint,), sign, own)) for field in ("torque", "q")
+        _cured(rows, body, _Fault("sign", field, (joint,), sign, own)).held_out() for field in ("torque", "q")
     )
     return of_torque.t(of_position)
 
@@ -130,21 +130,11 @@ def _rows(robot: Robot, moving: Moving, reversed_torques: Collection[str]) -> Ri
     return replace(rows, torque=rows.torque * np.where([name in reversed_torques for name in names], -1.0, 1.0))
 
 
-def _left(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> float:
-    body, torque = _cured(rows, body, fault)
-    return body.fit(torque).left
-
-
-def _held(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> Held:
-    body, torque = _cured(rows, body, fault)
-    return body.held_out(torque)
-
-
-def _cured(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> tuple[WholeBody, np.ndarray]:
-    """Return what explains the cured torques, of rows whose motion `body` is of, and these torques (N, n)."""
+def _cured(rows: RigidBodyRows, body: WholeBody, fault: _Fault | _Axis) -> Fitted:
+    """Return the cured torques of rows, whose motion `body` is of, as bodies and friction explain them."""
     cured = fault.cured(rows)
     unmoved = cured.q is rows.q and cured.model is rows.model
-    return body if unmoved else WholeBody.of(cured), cured.torque
+    return (body if unmoved else WholeBody.of(cured)).fit(cured.torque)
 
 
 def _of_another_robot(axis: _Axis, gain: float, t: float, robot: Robot, moving: Moving) -> LogFinding:

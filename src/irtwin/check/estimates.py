@@ -127,7 +127,7 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[LogFinding]:
     ]
     _, joint = min(differing, default=(0.0, -1))  # of one that differs, others seem to differ as well
     alike = _rescaled(fitted, joint, np.exp(scales[joint][0])) if differing else fitted
-    if not differing or not _agree(alike, telling - {joint}) or _gained(fitted, alike) < _SURE:
+    if not differing or not _agree(alike, telling - {joint}) or fitted.held_out().t(alike.held_out()) < _SURE:
         open_to_it = {names[joint] for joint in telling if abs(scales[joint][0]) > np.log(_SCALED) + scales[joint][1]}
         return [finding for finding in scale_findings(robot, moving) if finding.channel in open_to_it]
     log, deviation = scales[joint]
@@ -137,11 +137,6 @@ def _scales(robot: Robot, moving: Moving, fitted: Fitted) -> list[LogFinding]:
         "the torques of other joints; check its unit, torque constant and gear ratio"
     )
     return [LogFinding("scale", names[joint], moving.names, False, False, evidence, say)]
-
-
-def _gained(fitted: Fitted, cured: Fitted) -> float:
-    """Return by how many standard deviations torques that were held out are predicted better once cured."""
-    return fitted.body.held_out(fitted.torque).t(cured.body.held_out(cured.torque))
 
 
 def _agree(fitted: Fitted, telling: set[int]) -> bool:
@@ -187,8 +182,7 @@ def _zeros(robot: Robot, moving: Moving, rows: RigidBodyRows, fitted: Fitted) ->
     if not zeros:
         return []
     _, joint, off, deviation = min(zeros)  # of one that is off, others seem to be off as well
-    own, cured = (WholeBody.of(body_rows).held_out(rows.torque) for body_rows in (rows, _turned(rows, joint, -off)))
-    if own.t(cured) < _SURE:
+    if fitted.held_out().t(_fit(_turned(rows, joint, -off)).held_out()) < _SURE:
         return []
     name = CHANNELS["q"].column(robot.joints[joint].name)
     evidence = {"offset_rad": round(off, 4), "deviation_rad": round(deviation, 4)}

@@ -57,7 +57,7 @@ class WholeBody:
         return _squares(self.columns)
 
     @cached_property
-    def _of_blocks(self) -> np.ndarray:
+    def products_of_blocks(self) -> np.ndarray:
         """The same in each stretch of time, (BLOCKS, n, P, P)."""
         return np.array([_squares(part) for part in _blocks(self.columns)])
 
@@ -70,19 +70,6 @@ class WholeBody:
             left = np.mean((torque - self.columns @ coefficients) ** 2, axis=0)
             weights = 1 / np.maximum(left, _LEAST**2 * variance)
         return Fitted(self, torque, coefficients, weights)
-
-    def held_out(self, torque: np.ndarray) -> Held:
-        """Return what is left of torques (N, n) in each stretch of time, predicted by the others."""
-        weights = self.fit(torque).weights
-        parts = list(zip(_blocks(self.columns), _blocks(torque), strict=True))
-        products = np.tensordot(weights, self._of_blocks, (0, 1))
-        against = np.array([weights @ _against(columns, values) for columns, values in parts])
-        coefficients = _solved(products.sum(axis=0) - products, against.sum(axis=0) - against)
-        left = [
-            np.mean((values - columns @ of) ** 2, axis=0)
-            for (columns, values), of in zip(parts, coefficients, strict=True)
-        ]
-        return Held(np.log(np.maximum(np.array(left) / _variance(torque), _LEAST**2)) / 2)
 
 
 @dataclass(frozen=True)
@@ -102,6 +89,18 @@ class Fitted:
     def left(self) -> float:
         """The logarithm of the product of the shares that are left of all torques' deviations."""
         return float(-0.5 * np.sum(np.log(self.weights * _variance(self.torque))))
+
+    def held_out(self) -> Held:
+        """Return what is left of the torques in each stretch of time, predicted by the others."""
+        parts = list(zip(_blocks(self.body.columns), _blocks(self.torque), strict=True))
+        products = np.tensordot(self.weights, self.body.products_of_blocks, (0, 1))
+        against = np.array([self.weights @ _against(columns, values) for columns, values in parts])
+        coefficients = _solved(products.sum(axis=0) - products, against.sum(axis=0) - against)
+        left = [
+            np.mean((values - columns @ of) ** 2, axis=0)
+            for (columns, values), of in zip(parts, coefficients, strict=True)
+        ]
+        return Held(np.log(np.maximum(np.array(left) / _variance(self.torque), _LEAST**2)) / 2)
 
     @cached_property
     def explained(self) -> np.ndarray:
