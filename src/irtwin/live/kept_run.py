@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,17 +26,15 @@ def keep(place: Workspace, header: Header, samples: np.ndarray, counts: Values, 
     counts: what its live_state says beside. Its energy is worked out from all samples once more, so it is the same
     after a crash. Where its twin's file is gone, or its plan, the run is kept without, and that is announced.
     """
-    if header.performs is not None and not _is_there(place, header.performs):
+    if header.performs is not None and not _has(place, RunRow, header.performs):
         announce(f"{header.run_id}: its plan {header.performs} is no more; kept without")
         header = replace(header, performs=None)
     tables, series = live_run.closed_rows(header, samples, counts)
     twin = _twin(place, header, announce)
     if twin is None:  # what was measured depends on no twin: it is part of the watching
         tables = live_run.together(tables, _measured(header, samples))
-    kept = _is_there(place, header.run_id)
-    with place.reading() as session:
-        known = session.get(RunEnergy, header.run_id) is not None
-    if not kept:  # else a crash came right here
+    known = _has(place, RunEnergy, header.run_id)
+    if not _has(place, RunRow, header.run_id):  # else a crash came right here
         others = {name: rows for name, rows in tables.items() if name != RunRow.__tablename__}
         place.keep_run(RunRow(**tables[RunRow.__tablename__][0]), series, others)
     if twin is not None and not known:
@@ -69,23 +68,19 @@ def energy_tables(energy: LiveEnergy, header: Header, began: float) -> Tables:
     if energy.known is None:
         return energy.tables(live_run.activities(header.run_id)[0])
     made = energy.tables(activity_id)
-    if not made:
-        return {}
     uses = live_energy.used(header.run_id, energy.known)
-    return {
-        "activity": [live_run.activity(header, activity_id, "energy", began)],
-        "activity_use": [_use(activity_id, entity) for entity in uses],
-        **made,
-    }
+    return _of_activity(live_run.activity(header, activity_id, "energy", began), uses, made) if made else {}
 
 
-def _use(activity_id: str, read: str) -> Values:
-    return {"activity_id": activity_id, "entity": read, "relation": relation_to(read)}
+def _of_activity(about: Values, read: Iterable[str], made: Tables) -> Tables:
+    """Return the rows of an activity, of what it read, and of what it made."""
+    uses = [{"activity_id": about["activity_id"], "entity": each, "relation": relation_to(each)} for each in read]
+    return {"activity": [about], "activity_use": uses, **made}
 
 
-def _is_there(place: Workspace, run_id: str) -> bool:
+def _has(place: Workspace, kind: type[RunRow | RunEnergy], run_id: str) -> bool:
     with place.reading() as session:
-        return session.get(RunRow, run_id) is not None
+        return session.get(kind, run_id) is not None
 
 
 def _twin(place: Workspace, header: Header, announce: Announce) -> KnownTwin | None:
@@ -106,8 +101,6 @@ def _keep_energy(place: Workspace, header: Header, watched: Values) -> Tables:
     made = live_energy.provide(place, header.run_id)
     if not made.rows:
         return {}
-    activity_id = live_run.activities(header.run_id)[1]
-    about = {**watched, "activity_id": activity_id, "provider": "energy"}
+    about = {**watched, "activity_id": live_run.activities(header.run_id)[1], "provider": "energy"}
     place.replace_activity(Activity(**about), made.used, made.rows, made.series)
-    uses = [_use(activity_id, entity) for entity in sorted(set(made.used))]
-    return {"activity": [about], "activity_use": uses, **tables_of(made.rows)}
+    return _of_activity(about, sorted(set(made.used)), tables_of(made.rows))
