@@ -42,6 +42,9 @@ class RunText:
     columns: Sequence[Taken] = ()
 
 
+_EXAMPLE = RunText("runs/NAME.csv", "relative to this file")
+
+
 def data_set_text(
     robot: Robot | None,
     name: str,
@@ -53,7 +56,7 @@ def data_set_text(
     gear_ratios: dict[str, float] | None = None,
 ) -> str:
     """Return the text for a robot and its runs; of an empty data set where there are none."""
-    said = {"robot": robot, "name": name, "runs": runs, "origin": origin}
+    said = {"robot": robot, "name": name, "runs": runs, "origin": origin, "example": _EXAMPLE}
     power = {"power_at": power_at, "power_at_why": power_at_why}
     return _template().render(**said, **power, gear_ratios=gear_ratios or {}, sheet=_SHEET, baseline=BASELINE)
 
@@ -68,7 +71,7 @@ def _template() -> jinja2.Template:
     return environment.from_string(Path(__file__).with_name("dataset.toml.jinja").read_text(encoding="utf-8"))
 
 
-def _line(key: str, value: Any, comment: str, stated: bool = True) -> str:
+def _line(key: str, value: Any, comment: str, stated: object = True) -> str:
     text = f"{'' if stated else '# '}{key} = {_value(value)}"
     return _printable(f"{text:<{_WIDE}}  # {comment}" if comment else text)
 
