@@ -17,10 +17,11 @@ from typing import Any
 from irtwin.alarms.mqtt import Broker, BrokerConnection
 from irtwin.announce import Announce
 
-METRICS = {"energy_Wh": "Energy/Wh", "power_W": "Power/W", "state": "State"}  # by column of `plant_now`
 _REBIRTH, _BD_SEQ = "Node Control/Rebirth", "bdSeq"
 _NO_ID = re.compile(r"[/+#\0]")  # what the id of a device must not have
 _UINT64, _DOUBLE, _BOOLEAN, _STRING = 8, 10, 11, 12  # Sparkplug's types of metrics
+# by column of `plant_now`: name and type
+_METRICS = {"energy_Wh": ("Energy/Wh", _DOUBLE), "power_W": ("Power/W", _DOUBLE), "state": ("State", _STRING)}
 _PATIENCE = 2.0  # s for the death to leave at the end
 
 Metric = tuple[str, int, Any]  # name, type, value; None: not known
@@ -43,7 +44,10 @@ class EdgeNode(BrokerConnection):
 
     def tell(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Tell what is new of robots since the last time: births of new ones, data, deaths of those that are gone."""
-        now = {_NO_ID.sub("_", row["robot"]): _metrics(row) for row in rows}
+        now = {
+            _NO_ID.sub("_", row["robot"]): tuple((*metric, row[column]) for column, metric in _METRICS.items())
+            for row in rows
+        }
         with self._lock:
             before, self._robots = self._robots, now
             if not self._born:
@@ -91,11 +95,6 @@ class EdgeNode(BrokerConnection):
 
     def _topic(self, kind: str, robot: str | None = None) -> str:
         return "/".join(["spBv1.0", self._group, kind, self._node, *([] if robot is None else [robot])])
-
-
-def _metrics(row: Mapping[str, Any]) -> tuple[Metric, ...]:
-    kinds = {column: _STRING if column == "state" else _DOUBLE for column in METRICS}
-    return tuple((name, kinds[column], row[column]) for column, name in METRICS.items())
 
 
 def payload(metrics: Iterable[Metric], sequence: int | None = None) -> bytes:

@@ -191,9 +191,7 @@ class TakenLogs:
     def _supply_current(self, amperes: list[np.ndarray], _: list[int], si: str) -> UnitEvidence:
         if not self._of("meter_voltage"):
             return evidence.by_size(si, amperes, _SUPPLY)
-        column = self._of("meter_voltage")[0]
-        volts = [self.units[column.column][0].to_si(log.columns[column.column]) for log in self.logs]
-        watts = [volt * ampere for volt, ampere in zip(volts, amperes, strict=True)]
+        watts = [volts[:, 0] * ampere for volts, ampere in zip(self._si("meter_voltage"), amperes, strict=True)]
         return evidence.power(self.robot, self.motions, watts, si)
 
     def _seconds(self, positions: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[datetime | None]]:

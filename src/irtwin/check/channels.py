@@ -23,19 +23,14 @@ _FEWEST = 200  # samples, for all of these
 
 def channel_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the columns that are dead, held, cut off or coarse, and times that jump about."""
-    findings = [finding for finding in (_jitter(moving),) if finding is not None]
-    known = {
-        column: [columns_of(run.signals, robot.joint_names)[column] for run in moving.runs]
-        for column in _columns(robot, moving)
-    }
-    for column, values in known.items():
-        speeds = column in CHANNELS["dq"].columns(robot.joint_names)  # held against the positions elsewhere
-        for check in (_held,) if speeds else (_dead, _held, _cut_off, _coarse):
-            finding = check(column, values, moving)
-            if finding is not None:
-                findings.append(finding)
-                break
-    return findings
+    findings = [_jitter(moving)]
+    logged = [columns_of(run.signals, robot.joint_names) for run in moving.runs]
+    speeds = CHANNELS["dq"].columns(robot.joint_names)  # held against the positions elsewhere
+    for column in _columns(robot, moving):
+        values = [columns[column] for columns in logged]
+        checks = (_held,) if column in speeds else (_dead, _held, _cut_off, _coarse)
+        findings.append(next((found for check in checks if (found := check(column, values, moving))), None))
+    return [finding for finding in findings if finding is not None]
 
 
 def _columns(robot: Robot, moving: Moving) -> Iterator[str]:

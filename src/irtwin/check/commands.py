@@ -19,6 +19,8 @@ _FOLLOWS = 0.8  # correlation of positions with commands, from which a joint goe
 _DEGREES = (50.0, 65.0)  # commands over positions, as slope: 180/pi is between
 _UNMOVED = 0.1  # rad or m: a joint that is told to go farther moves, whatever its friction and play
 _STEP, _LATEST, _MOST = 0.02, 1.0, 20_000  # s between looks, s by which positions may be behind, looks at a run
+_LAGS = np.arange(-round(_LATEST / _STEP), round(_LATEST / _STEP) + 1)  # steps by which positions are looked for behind
+_BEHIND = _LAGS >= 0  # of the lags: those of positions that are not ahead of commands
 _LEAST = 3  # times that, of a run that tells
 _STANDS = 5.0  # s that a command stands while its joint settles
 _LEAD = 0.1  # s: no filter of positions or feed-forward brings these as much ahead of commands
@@ -69,14 +71,14 @@ class _Log:
     @cached_property
     def products(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Sums of command times position (L, n, n), by lag, of squared commands (L, n) and positions (n,)."""
-        lags, n, time = _lags(), self.q.shape[1], self.run.signals.time
-        most, both, of_told = lags.max(), np.zeros((len(lags), n, n)), np.zeros((len(lags), n))
+        n, time = self.q.shape[1], self.run.signals.time
+        most, both, of_told = _LAGS.max(), np.zeros((len(_LAGS), n, n)), np.zeros((len(_LAGS), n))
         at = time[0] + _STEP * np.arange(min(_MOST, (time[-1] - time[0]) // _STEP))
         if len(at) <= _LEAST * most:
             return both, of_told, np.zeros(n)
         told, q = (np.column_stack([np.interp(at, time, column) for column in some.T]) for some in (self.told, self.q))
         q = q[most:-most] - q[most:-most].mean(axis=0)
-        for place, lag in enumerate(lags):
+        for place, lag in enumerate(_LAGS):
             earlier = told[most - lag : len(at) - most - lag]
             earlier = earlier - earlier.mean(axis=0)
             both[place], of_told[place] = earlier.T @ q, (earlier**2).sum(axis=0)
@@ -86,7 +88,7 @@ class _Log:
 def _exchanged(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
     """Yield that commands stand in each other's columns: there they leave half of what they leave in their own."""
     _, moves = _spans(logs)
-    left = np.where(moves, _left(logs)[_behind()].min(axis=0), 1.0) + _LEFT
+    left = np.where(moves, _left(logs)[_BEHIND].min(axis=0), 1.0) + _LEFT
     _, place = scipy.optimize.linear_sum_assignment(np.log(left.T))  # by joint, whose commands it follows
     own = np.arange(len(moves))
     followed = (place != own) & moves
@@ -156,7 +158,7 @@ def _by_joint(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
 def _foreign(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
     """Yield that the joints do not follow the commands."""
     joints = _followed(logs)
-    left = _left(logs)[_behind()].min(axis=0).diagonal()[joints]
+    left = _left(logs)[_BEHIND].min(axis=0).diagonal()[joints]
     if len(joints) and (1 - left).mean() < _FOREIGN:
         yield _finding(
             "foreign", logs[0].run, CHANNELS["command"].prefix + "_JOINT", "is not followed by the joints that it "
@@ -170,10 +172,9 @@ def _late(robot: Robot, logs: Sequence[_Log]) -> Iterator[LogFinding]:
     left = _left(logs)[:, joints, joints] + _LEFT
     if not len(joints):
         return
-    lags = _lags() * _STEP
-    behind, ahead = (left[some].min(axis=0) for some in (_behind(), lags <= -_LEAD))
+    behind, ahead = (left[some].min(axis=0) for some in (_BEHIND, _LAGS * _STEP <= -_LEAD))
     if np.log(behind / ahead).mean() > np.log(_GAIN):
-        by = -lags[np.log(left).mean(axis=1).argmin()]
+        by = -_STEP * _LAGS[np.log(left).mean(axis=1).argmin()]
         yield _finding(
             "delay", logs[0].run, CHANNELS["command"].prefix + "_JOINT", f"comes some {by:.2g} s after the positions "
             "that follow it; give both by one clock",
@@ -189,17 +190,6 @@ def _spans(logs: Sequence[_Log]) -> np.ndarray:
 def _followed(logs: Sequence[_Log]) -> np.ndarray:
     """Return the joints that are told to move, and do."""
     return np.flatnonzero(_spans(logs).all(axis=0))
-
-
-def _lags() -> np.ndarray:
-    """By how many steps positions are looked for behind commands."""
-    most = round(_LATEST / _STEP)
-    return np.arange(-most, most + 1)
-
-
-def _behind() -> np.ndarray:
-    """By lag, whether positions are not ahead."""
-    return _lags() >= 0
 
 
 def _left(logs: Sequence[_Log]) -> np.ndarray:

@@ -28,7 +28,7 @@ def plausibility_findings(data_set: DataSet, moving: Moving) -> list[LogFinding]
     """Return what cannot be, by the robot's own sizes and limits."""
     findings = [
         urdf_finding(data_set.robot),
-        *(_payload(data_set)),
+        _payload(data_set),
         *(_position(moving, index, joint) for index, joint in enumerate(data_set.robot.joints)),
         _time(data_set.robot, moving),
         _power(data_set.robot, moving),
@@ -45,15 +45,15 @@ def urdf_finding(robot: Robot) -> LogFinding | None:
     return LogFinding("implausible", "robot.urdf", (), True, False, {"length_m": longest}, say)
 
 
-def _payload(data_set: DataSet) -> list[LogFinding]:
+def _payload(data_set: DataSet) -> LogFinding | None:
     own = data_set.robot.weight or sum(link.mass for link in data_set.robot.links)
     heavy = [run for run in data_set.runs if own > 0 and run.payload_mass > _HEAVIEST * own]
     if not heavy:
-        return []
+        return None
     mass = max(run.payload_mass for run in heavy)
     say = f"payload_mass = {mass:g} is more than a robot of {own:.3g} kg can carry: it looks like g; give kg"
     names = tuple(run.name for run in heavy)
-    return [LogFinding("unit", "payload_mass", names, True, False, {"payload_kg": mass, "robot_kg": own}, say)]
+    return LogFinding("unit", "payload_mass", names, True, False, {"payload_kg": mass, "robot_kg": own}, say)
 
 
 def _position(moving: Moving, index: int, joint: Joint) -> LogFinding | None:
