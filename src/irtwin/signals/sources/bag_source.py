@@ -77,18 +77,10 @@ class BagSource(Source):
 
     def _states_topic(self, topics: Sequence[Topic]) -> str:
         names = [topic.name for topic in topics if topic.kind == JOINT_STATE and topic.count]
-        if (named := self.topics.get("joint_states")) is not None:
-            if named not in names:
-                raise InputError(f"{self.path}: {named} of [topics] holds no joint states; {_there(names)}")
-            return named
-        if not names:
+        chosen = self._chosen("joint_states", "joint states", names, names, "hold joint states")
+        if chosen is None:
             raise InputError(f"{self.path}: holds no joint states (sensor_msgs/JointState); record /joint_states")
-        if len(names) > 1:
-            raise InputError(
-                f"{self.path}: several topics hold joint states: {', '.join(names)}; "
-                f'say which in dataset.toml: [topics] joint_states = "{names[0]}"'
-            )
-        return names[0]
+        return chosen
 
     def _number_topics(self, topics: Sequence[Topic]) -> dict[str, str]:
         """Return the topic of each column that is one of numbers."""
@@ -96,18 +88,23 @@ class BagSource(Source):
         result: dict[str, str] = {}
         for column, name in number_topics(self.robot).items():
             matching = [topic for topic in numbers if topic.rpartition("/")[2] in (column, name)]
-            if (named := self.topics.get(column)) is not None:
-                if named not in numbers:
-                    raise InputError(f"{self.path}: {named} of [topics] holds no numbers; {_there(numbers)}")
-                matching = [named]
-            if len(matching) > 1:
-                raise InputError(
-                    f"{self.path}: several topics could be {column}: {', '.join(matching)}; "
-                    f'say which in dataset.toml: [topics] {column} = "{matching[0]}"'
-                )
-            if matching:
-                result[column] = matching[0]
+            if (chosen := self._chosen(column, "numbers", numbers, matching, f"could be {column}")) is not None:
+                result[column] = chosen
         return result
+
+    def _chosen(self, key: str, content: str, topics: list[str], matching: list[str], share: str) -> str | None:
+        """Return the topic that [topics] names for a key, else the only one that matches; None where none does."""
+        if (named := self.topics.get(key)) is not None:
+            if named not in topics:
+                there = f"there are {', '.join(topics[:10])}" if topics else "there is none"
+                raise InputError(f"{self.path}: {named} of [topics] holds no {content}; {there}")
+            return named
+        if len(matching) > 1:
+            raise InputError(
+                f"{self.path}: several topics {share}: {', '.join(matching)}; "
+                f'say which in dataset.toml: [topics] {key} = "{matching[0]}"'
+            )
+        return matching[0] if matching else None
 
     def _messages(
         self, bag: BagFile, states: str, numbers: Sequence[str]
@@ -212,7 +209,3 @@ def _numbers_at(messages: _Numbers, recorded: np.ndarray) -> tuple[np.ndarray, n
 
 def _width(robot: Robot) -> int:
     return len(FIELDS) * len(robot.joints) + 1
-
-
-def _there(topics: Sequence[str]) -> str:
-    return f"there are {', '.join(topics[:10])}" if topics else "there is none"
