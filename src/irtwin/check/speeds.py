@@ -11,8 +11,6 @@ from irtwin.signals.channels import CHANNELS
 from irtwin.signals.conditioning import differentiate
 from irtwin.signals.filter import low_pass
 from irtwin.signals.finding import LogFinding
-from irtwin.signals.log import Run
-from irtwin.signals.motion import Motion
 from irtwin.signals.sampling import interpolated
 
 _ALIKE = 0.9  # correlation of two speeds of one joint
@@ -25,14 +23,15 @@ _SURE = 4.0  # standard deviations of a delay from none
 _BEYOND = 2.0  # standard deviations by which it exceeds a filter's
 _SLOW = 0.25  # of the cutoff, which is ten times the motion's band: above, derivatives are noise, which hides a delay
 
+_Speeds = tuple[float, float, np.ndarray, np.ndarray]
+
 
 def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
     """Return the speed channels that contradict the positions, or `time` where its unit alone explains it."""
-    pairs = [_speeds(run, motion) for run, motion in zip(moving.runs, moving.motions, strict=True)]
-    pairs = [pair for pair in pairs if pair is not None]
-    if not pairs:
+    speeds = _speeds(moving)
+    if not speeds:
         return []
-    derived, logged = (np.vstack(parts) for parts in zip(*pairs, strict=True))
+    derived, logged = (np.vstack([of_run[place] for of_run in speeds]) for place in (2, 3))
     alike = _correlation(derived, logged)
     names = CHANNELS["dq"].columns(robot.joint_names)
     joints = np.flatnonzero(moving.joints).tolist()
@@ -49,9 +48,9 @@ def speed_findings(robot: Robot, moving: Moving) -> list[LogFinding]:
                 advice = "stand in each other's columns: name them by their joints"
                 findings.append(_finding("swap", f"{name} <-> {names[other]}", moving, {}, advice))
         elif joint in gains:
-            findings += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving)
+            findings += _scaled(name, gains[joint], moving) or _delayed(name, joint, moving, speeds)
         else:
-            findings += _delayed(name, joint, moving)
+            findings += _delayed(name, joint, moving, speeds)
     return findings
 
 
@@ -62,13 +61,15 @@ def _finding(fault: str, channel: str, moving: Moving, evidence: dict[str, float
     )  # fmt: skip
 
 
-def _speeds(run: Run, motion: Motion) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return speeds (N, n) of the positions and as logged, filtered alike; None where none were logged."""
-    signals = run.signals
-    if signals.dq is None or motion.cutoff is None:
-        return None
-    logged = low_pass(interpolated(signals.time, signals.dq, motion.time), motion.rate, motion.cutoff)
-    return differentiate(motion.q, motion.rate), logged
+def _speeds(moving: Moving) -> list[_Speeds]:
+    """Return rate and cutoff, Hz, of runs, and speeds (N, n) of their positions and as logged, filtered alike."""
+    speeds = []
+    for run, motion in zip(moving.runs, moving.motions, strict=True):
+        if run.signals.dq is not None and motion.cutoff is not None:
+            even = interpolated(run.signals.time, run.signals.dq, motion.time)
+            logged = low_pass(even, motion.rate, motion.cutoff)
+            speeds.append((motion.rate, motion.cutoff, differentiate(motion.q, motion.rate), logged))
+    return speeds
 
 
 def _correlation(derived: np.ndarray, logged: np.ndarray) -> np.ndarray:
@@ -115,17 +116,16 @@ def _scaled(name: str, gain: float, moving: Moving) -> list[LogFinding]:
     return []
 
 
-def _delayed(name: str, joint: int, moving: Moving) -> list[LogFinding]:
+def _delayed(name: str, joint: int, moving: Moving, speeds: list[_Speeds]) -> list[LogFinding]:
     """Return the finding where a logged speed comes late or early.
 
     For short delays d, the speed v(t - d) is v - d dv/dt.
     """
     columns, values = [], []
-    for run, motion in zip(moving.runs, moving.motions, strict=True):
-        if (pair := _speeds(run, motion)) is not None and motion.cutoff is not None:
-            derived, logged = (low_pass(speed[:, joint], motion.rate, _SLOW * motion.cutoff) for speed in pair)
-            columns.append(np.column_stack([derived, differentiate(derived, motion.rate)]))
-            values.append(logged)
+    for rate, cutoff, *both in speeds:
+        derived, logged = (low_pass(speed[:, joint], rate, _SLOW * cutoff) for speed in both)
+        columns.append(np.column_stack([derived, differentiate(derived, rate)]))
+        values.append(logged)
     delay_fit = fit(np.vstack(columns), np.concatenate(values))
     gain, change = delay_fit.coefficients
     t = abs(delay_fit.t(np.array([0.0, 1.0])))
