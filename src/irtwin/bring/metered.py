@@ -44,18 +44,11 @@ def with_power(log: Recording) -> Recording:
     with np.errstate(divide="ignore", invalid="ignore"):
         power = spent / np.diff(time)
     power = np.append(power, power[-1:]) if counter else np.insert(power, 0, power[:1])
-    columns = {
-        POWER if column == name else column: power if column == name else of for column, of in log.columns.items()
-    }
-    explanation = (
-        "a counter: power is its step over the time to the next reading"
-        if counter
-        else ("of each reading: power is it over the time since the reading before")
-    )
-    units = {POWER if column == name else column: unit for column, unit in log.units.items()} | {POWER: "W"}
-    return replace(
-        log, columns=columns, units=units, said=(*log.said, f"{log.path}: column {name} is energy, {explanation}")
-    )
+    columns = {column: of for column, of in log.columns.items() if column != name} | {POWER: power}
+    step = "a counter: power is its step over the time to the next reading"
+    explanation = step if counter else "of each reading: power is it over the time since the reading before"
+    said = (*log.said, f"{log.path}: column {name} is energy, {explanation}")
+    return replace(log, columns=columns, units={**log.units, POWER: "W"}, said=said)
 
 
 def _joules(name: str, unit: str | None) -> float | None:
