@@ -94,6 +94,7 @@ def test_who_asks_later_gets_the_last_minutes_though_nobody_looked_on(tmp_path: 
     with Broadcast(tmp_path) as told:
         for at, power in enumerate([400.0, math.nan, 402.5]):
             told.state(state(float(at), power))
+            told.state(state(float(at), robot="another"))
         told.stretches("r", [SimpleNamespace(motion=motion, power=np.array([5.0, 6.0, 7.0]), begins=True)])
         assert json.loads(answer(tmp_path, b"r\n")) == {
             "robot": "r",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from irtwin.live.recent import BIN, SECONDS, Curve, Recent
+from irtwin.live.recent import BIN, SECONDS, Curve
 
 
 def curve_of(time: np.ndarray, value: np.ndarray) -> Curve:
@@ -47,13 +47,3 @@ def test_after_a_pause_what_is_older_is_not_told() -> None:
 def test_a_clock_that_is_set_back_begins_anew() -> None:
     curve = curve_of(np.array([100.0, 101.0, 50.0, 51.0]), np.array([1.0, 2.0, 3.0, 4.0]))
     assert curve.points().tolist() == [[50.0, 3.0], [51.0, 4.0]]
-
-
-def test_robots_and_curves_are_kept_apart_and_questions_leave_nothing() -> None:
-    recent = Recent()
-    recent.add("a", "measured", [1.0, 2.0], [10.0, 20.0])
-    recent.add("b", "measured", [1.0], [30.0])
-    assert recent.points("a", "measured").tolist() == [[1.0, 10.0], [2.0, 20.0]]
-    assert recent.points("b", "measured").tolist() == [[1.0, 30.0]]
-    assert recent.points("a", "modelled").shape == recent.points("c", "measured").shape == (0, 2)
-    assert len(recent._curves) == 2

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from irtwin.live.joint_stream import State
-from irtwin.live.recent import Recent
+from irtwin.live.recent import Curve
 from irtwin.twin.so_far import WatchedStretch
 
 SOCKET = "samples.sock"
@@ -47,7 +47,8 @@ class Broadcast:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._path = folder / SOCKET
-        self._recent = Recent()
+        self._curves: dict[tuple[str, str], Curve] = {}  # of power, W, by robot_id and name
+        self._remembering = threading.Lock()
         self._newest: dict[str, State] = {}
         self._lines: deque[tuple[str, bytes | State]] = deque(maxlen=_HELD)
         self._clients: list[_Client] = []
@@ -80,7 +81,7 @@ class Broadcast:
         self._newest[state.robot_id] = state
         power = state.of("power")[0]
         if not math.isnan(power):
-            self._recent.add(state.robot_id, "measured", (state.time,), (power,))
+            self._remember(state.robot_id, "measured", (state.time,), (power,))
         self._tell(state.robot_id, state)
 
     def stretches(self, robot_id: str, stretches: Sequence[WatchedStretch]) -> None:
@@ -88,8 +89,14 @@ class Broadcast:
         for stretch in stretches:
             new = slice(0 if stretch.begins else 1, None)
             times, power = _rounded(stretch.motion.time[new]), _rounded(stretch.power[new])
-            self._recent.add(robot_id, "modelled", times, power)
+            self._remember(robot_id, "modelled", times, power)
             self._tell(robot_id, _encoded({"robot": robot_id, "modelled": {"time": times, "power": power}}))
+
+    def _remember(self, robot_id: str, name: str, times: Sequence[float], powers: Sequence[float]) -> None:
+        with self._remembering:
+            curve = self._curves.setdefault((robot_id, name), Curve())
+            for time, power in zip(times, powers, strict=True):
+                curve.add(time, power)
 
     def _tell(self, robot_id: str, line: bytes | State) -> None:
         if any(client.robot_id == robot_id for client in self._clients):
@@ -124,7 +131,8 @@ class Broadcast:
     def _last_minutes(self, robot_id: str) -> bytes:
         curves = {}
         for name in ("measured", "modelled"):
-            times, power = self._recent.points(robot_id, name).T
+            with self._remembering:
+                times, power = self._curves.get((robot_id, name), Curve()).points().T
             curves[name] = {"time": _rounded(times), "power": _rounded(power)}
         newest = self._newest.get(robot_id)
         return _encoded({"robot": robot_id, "recent": curves, "newest": None if newest is None else _told(newest)})

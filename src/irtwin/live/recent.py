@@ -1,9 +1,6 @@
-"""The last minutes of the power of each robot that is watched, for a page that begins to look on."""
+"""The last minutes of a power of a robot that is watched, for a page that begins to look on."""
 
 from __future__ import annotations
-
-import threading
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -48,24 +45,3 @@ class Curve:
         self._write()
         ends = self._ends.reshape(-1, 2)
         return np.unique(ends[ends[:, 0] > self._newest - SECONDS], axis=0)  # one where the lowest is the highest
-
-
-class Recent:
-    """Curves of robots by name, W; more than one thread may ask."""
-
-    def __init__(self) -> None:
-        self._curves: dict[tuple[str, str], Curve] = {}
-        self._lock = threading.Lock()
-
-    def add(self, robot_id: str, name: str, times: Sequence[float], values: Sequence[float]) -> None:
-        """Take samples of a robot's curve."""
-        with self._lock:
-            curve = self._curves.setdefault((robot_id, name), Curve())
-            for time, value in zip(times, values, strict=True):
-                curve.add(time, value)
-
-    def points(self, robot_id: str, name: str) -> np.ndarray:
-        """Return the points of a robot's curve, (M, 2): times, s since 1970, and values; none of a robot not seen."""
-        with self._lock:
-            curve = self._curves.get((robot_id, name))
-            return np.empty((0, 2)) if curve is None else curve.points()
