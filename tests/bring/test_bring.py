@@ -128,7 +128,7 @@ def test_one_joint_that_is_given_tells_those_that_are_counted_on(
     speeds = np.gradient(good()["q_joint_a1"], good()["time"])
     log = plain(tmp_path, **{f"speed{k}": speeds for k in range(1, 7)})
     (form,) = bring([log], tmp_path / "set", NAME, Options(maps=(f"speed{number}=dq_joint_a1:rad/s",)))
-    assert [one.channel for one in form.taken.columns if one.column.startswith("speed")] == channels
+    assert [one.channel for one in form.columns if one.column.startswith("speed")] == channels
 
 
 @pytest.mark.parametrize(

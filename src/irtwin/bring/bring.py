@@ -12,14 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from irtwin.bring import rtde_names
-from irtwin.bring.aligned import aligned
-from irtwin.bring.choice import meanings
 from irtwin.bring.data_set_text import RunText, data_set_text
 from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.metered import with_power
 from irtwin.bring.recording import Recording, read_recording
 from irtwin.bring.robot_library import robot_of, with_fixed
-from irtwin.bring.taken import TakenLogs, TakenRun
+from irtwin.bring.taken import LogsAlike, TakenRun
 from irtwin.bring.told import UserSaid, roles, told
 from irtwin.check.check import check
 from irtwin.check.plausibility import urdf_finding
@@ -86,7 +84,7 @@ def bring(
     name = options.name or described.name
     runs: dict[Path, tuple[RunText, TakenRun]] = {}
     for form in forms:
-        for recording, run in zip(form.logs, form.taken.runs, strict=True):
+        for recording, run in zip(form.logs, form.runs, strict=True):
             text = _run_text(recording, run, _name(recording.path, runs), form, options)
             runs[recording.path] = replace(text, role=role[recording.path]), run
     listed = [runs[file] for file in dict.fromkeys(files)]
@@ -122,20 +120,6 @@ def init(out: Path, robot: str | None, name: str | None) -> None:
 def _metered(files: Sequence[Path]) -> Robot:
     """Return the robot of a meter's logs, named by the first until somebody names it."""
     return Robot(re.sub(r"[^\w\-]+", "_", files[0].stem).strip("_") or "meter", (), (), "")
-
-
-class LogsAlike:
-    """Logs of the same columns, taken together: what one of them tells of a unit holds for all.
-
-    `said`: a line for each thing that was done in reading.
-    """
-
-    def __init__(self, logs: Sequence[Recording], robot: Robot, user_said: UserSaid, repair: bool) -> None:
-        self.logs = logs
-        means = meanings(logs[0], robot, user_said)
-        usable = [aligned(log, means, repair=repair) for log in logs]
-        self.said = [line for log in usable for line in (*log.recording.said, *log.said)]
-        self.taken = TakenLogs(usable, means, robot, user_said)
 
 
 _Settled = tuple[UserSaid, list[LogsAlike], tuple[str | None, str]]
@@ -190,9 +174,9 @@ def _of_one_form(logs: Sequence[Recording]) -> list[list[Recording]]:
 
 
 def _one_place(forms: Sequence[LogsAlike]) -> tuple[str | None, str]:
-    places = {form.taken.power_at: form.taken.power_at_why for form in forms if form.taken.power_at is not None}
+    places = {form.power_at: form.power_at_why for form in forms if form.power_at is not None}
     if len(places) > 1:
-        files = " and ".join(f"{form.logs[0].path} ({form.taken.power_at})" for form in forms if form.taken.power_at)
+        files = " and ".join(f"{form.logs[0].path} ({form.power_at})" for form in forms if form.power_at)
         raise InputError(f"power was measured at two places: {files}; make two data sets, or give --power-at")
     return next(iter(places.items()), (None, ""))
 
@@ -222,7 +206,7 @@ def _run_text(log: Recording, run: TakenRun, name: str, form: LogsAlike, options
         f"runs/{name}.parquet",
         f"from {log.path.name} ({log.form}): {lasts}",
         started=run.started,
-        columns=form.taken.columns if log is form.logs[0] else (),
+        columns=form.columns if log is form.logs[0] else (),
     )
     return text if load is None else replace(text, payload_mass=load[0], payload_com=load[1], payload_why=why)
 

@@ -9,11 +9,12 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from irtwin.bring import evidence
-from irtwin.bring.aligned import Aligned
-from irtwin.bring.choice import OF_POWER
+from irtwin.bring.aligned import Aligned, aligned
+from irtwin.bring.choice import OF_POWER, meanings
 from irtwin.bring.column_name import Meaning
 from irtwin.bring.doubt import DoubtError, WayOut
 from irtwin.bring.evidence import MeasuredRun, UnitEvidence
+from irtwin.bring.recording import Recording
 from irtwin.bring.rtde_names import POWER_AT, is_rtde
 from irtwin.bring.told import LEFT_OUT, UserSaid
 from irtwin.check.torque import has_no_sign
@@ -53,21 +54,29 @@ class TakenRun:
     started: datetime | None
 
 
-class TakenLogs:
-    """Logs of one form: their `columns`, `runs`, and where power was measured, `power_at`, None where it was not."""
+class LogsAlike:
+    """Logs of the same columns, taken together as runs: what one of them tells of a unit holds for all.
 
-    def __init__(self, logs: Sequence[Aligned], meanings: Sequence[Meaning], robot: Robot, told: UserSaid) -> None:
-        """Take logs of the same columns as runs. Raises DoubtError where a unit, or a place, cannot be told."""
-        self.logs, self.meanings, self.robot, self.told = logs, meanings, robot, told
-        self.where = ", ".join(str(log.recording.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
+    `columns`: what each was taken for; `power_at`: where power was measured, None where it was not; `said`: a line for
+    each thing that was done in reading.
+    """
+
+    def __init__(self, logs: Sequence[Recording], robot: Robot, told: UserSaid, repair: bool) -> None:
+        """Take them. Raises DoubtError where a column's meaning or unit, or a place, cannot be told."""
+        self.logs, self.robot, self.told = logs, robot, told
+        self.meanings = meanings(logs[0], robot, told)
+        self.usable = [aligned(log, self.meanings, repair=repair) for log in logs]
+        self.said = [line for log in self.usable for line in (*log.recording.said, *log.said)]
+        self.where = ", ".join(str(log.path) for log in logs[:3]) + (" ..." if len(logs) > 3 else "")
         self.units: Units = {}
         self.motions: list[MeasuredRun] = []
         self.unsigned = False  # torque, of no use beside commands
         seconds, started = self._find_units()
         self.power_at, self.power_at_why = self._power_at()
-        self.columns = tuple(self._row(meaning) for meaning in meanings)
+        self.columns = tuple(self._row(meaning) for meaning in self.meanings)
         self.runs = tuple(
-            TakenRun(self._columns(log, time), start) for log, time, start in zip(logs, seconds, started, strict=True)
+            TakenRun(self._columns(log, time), start)
+            for log, time, start in zip(self.usable, seconds, started, strict=True)
         )
 
     def _find_units(self) -> tuple[list[np.ndarray], list[datetime | None]]:
@@ -127,8 +136,8 @@ class TakenLogs:
         """Return a channel of each log, in its own units: (N, joints), or (N,) of the whole robot's."""
         columns = self._of(field)
         if not CHANNELS[field].per_joint:
-            return [self._values(log, columns[0]) for log in self.logs]
-        return [np.column_stack([self._values(log, columns[joint]) for joint in joints]) for log in self.logs]
+            return [self._values(log, columns[0]) for log in self.usable]
+        return [np.column_stack([self._values(log, columns[joint]) for joint in joints]) for log in self.usable]
 
     def _si(self, field: str) -> list[np.ndarray]:
         columns = self._of(field)
@@ -139,7 +148,7 @@ class TakenLogs:
                     *(self.units[meaning.column][0].to_si(self._values(log, meaning)) for meaning in columns),
                 ]
             )
-            for log in self.logs
+            for log in self.usable
         ]
 
     def _si_unit(self, meaning: Meaning) -> str:
@@ -197,17 +206,17 @@ class TakenLogs:
     def _seconds(self, positions: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[datetime | None]]:
         """Return the times of each log, s, and when it started where its times say that."""
         (column,) = self._of("time")
-        if self.logs[0].time.dtype.kind == "M":
+        if self.usable[0].time.dtype.kind == "M":
             self.units[column.column] = units("s")[0], "from the first date and time on"
             return (
-                [(log.time - log.time[0]).astype("int64") / 1e9 for log in self.logs],
-                [_moment(int(log.time[0].astype("int64"))) for log in self.logs],
+                [(log.time - log.time[0]).astype("int64") / 1e9 for log in self.usable],
+                [_moment(int(log.time[0].astype("int64"))) for log in self.usable],
             )
-        pairs = [(log.time.astype(float), q) for log, q in zip(self.logs, positions, strict=True)]
+        pairs = [(log.time.astype(float), q) for log, q in zip(self.usable, positions, strict=True)]
         self._share([column], "s", lambda: evidence.time(self.robot, pairs))
         unit = self.units[column.column][0]
         clocks: list[tuple[np.ndarray, datetime | None]] = []
-        for log in self.logs:
+        for log in self.usable:
             first = float(log.time[0]) * unit.factor
             if not _EPOCH[0] <= first < _EPOCH[1]:
                 clocks.append((unit.to_si(log.time.astype(float)), None))
@@ -227,7 +236,7 @@ class TakenLogs:
             return self.told.power_at, "as --power-at says"
         if not self.robot.joints:
             return "mains", "as a plant's meters are; nothing says otherwise"
-        if is_rtde(self.logs[0].recording.columns):
+        if is_rtde(self.logs[0].columns):
             return POWER_AT, "RTDE's voltage and current are those of the arm's 48 V"
         words = {word for meaning in columns for word in meaning.words}
         for place, there in (("mains", _MAINS), ("dc_bus", _BUS)):
@@ -267,7 +276,7 @@ class TakenLogs:
         if unit.offset:
             steps.append(f"{'+' if unit.offset > 0 else '-'} {abs(unit.offset):.6g}")
         name = f"{MOTOR}{unit.name}" if meaning.motor else unit.name
-        if self.logs[0].time.dtype.kind == "M" and meaning.field == "time":
+        if self.usable[0].time.dtype.kind == "M" and meaning.field == "time":
             name = "date and time"
         why = meaning.why if unit_why in ("", meaning.why) else f"{meaning.why}; {unit.name} {unit_why}"
         if self.unsigned and meaning.field == "torque":

@@ -14,9 +14,8 @@ from irtwin.errors import InputError
 from irtwin.location import Location
 
 if TYPE_CHECKING:
-    from irtwin.bring.bring import LogsAlike
     from irtwin.bring.doubt import DoubtError, WayOut
-    from irtwin.bring.taken import Taken
+    from irtwin.bring.taken import LogsAlike, Taken
 
 _WIDE = 160  # characters of a table that goes into a file
 
@@ -178,7 +177,7 @@ def _show(forms: list[LogsAlike]) -> None:
         table = Table("column", "channel", "unit", "conversion", "why", title=title)
         table.title_justify = "left"
         rows: dict[tuple[str, ...], list[Taken]] = {}
-        for each in form.taken.columns:
+        for each in form.columns:
             rows.setdefault((each.unit, each.conversion, each.why) if each.channel else ("", "", each.why), []).append(
                 each
             )
