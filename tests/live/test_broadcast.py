@@ -15,15 +15,14 @@ from tests.waiting import wait_for
 
 from irtwin.live import broadcast
 from irtwin.live.broadcast import SOCKET, Broadcast, reachable
-from irtwin.live.joint_stream import STREAMED, State
+from irtwin.live.joint_stream import State, state_of
 
 NOTHING: dict[str, list[float]] = {"time": [], "power": []}
 
 
 def state(at: float, power: float = 400.0, robot: str = "r") -> State:
-    values = {"q": (0.5, -0.25), "power": (power,)}
-    unsaid = [(math.nan,) * (2 if channel.per_joint else 1) for channel in STREAMED.values()]
-    return State(robot, at, tuple(values.get(field, no) for field, no in zip(STREAMED, unsaid, strict=True)))
+    measured = {} if math.isnan(power) else {"power": (power,)}
+    return state_of(robot, 2, at, {"q": (0.5, -0.25), **measured}, where="a test")
 
 
 def asked(folder: Path, robot: bytes) -> socket.socket:

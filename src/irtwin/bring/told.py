@@ -36,17 +36,15 @@ class UserSaid:
 
     def of(self, column: str) -> Target | None:
         """Return what was said of a column: of it alone before what is said of many."""
-        if column in self.columns:
-            return self.columns[column]
-        patterns = (pattern for pattern in self.columns if "*" in pattern and fits(pattern, column))
-        closest = max(patterns, key=len, default=None)
+        patterns = (pattern for pattern in self.columns if fits(pattern, column))
+        closest = max(patterns, key=lambda pattern: (pattern == column, len(pattern)), default=None)
         return None if closest is None else self.columns[closest]
 
     def check(self, columns: Iterable[str]) -> None:
         """Raise InputError where something was said of a column that no file has."""
         names = list(columns)
         for pattern in self.columns:
-            if pattern not in names and not any("*" in pattern and fits(pattern, name) for name in names):
+            if not any(fits(pattern, name) for name in names):
                 raise InputError(f"--map {pattern}=...: no file has such a column; there are {', '.join(names[:12])}")
 
 
