@@ -137,7 +137,7 @@ def carried(true: Held, faulty: DataSet, channel: str, fault: str) -> bool:
 def left(data_set: DataSet) -> Held:
     rows = rows_of(data_set.robot, moving(data_set), ROWS)
     assert rows is not None
-    return WholeBody.of(rows).held_out(rows.torque)
+    return WholeBody.of(rows).fit(rows.torque).held_out()
 
 
 def with_torque(data_set: DataSet) -> DataSet:
