@@ -12,8 +12,8 @@ from tests.report.robots import answered
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import ID, IRT
 from irtwin.report.plant import overview, page
-from irtwin.report.plant.actions import actions, actions_sheet
 from irtwin.report.plant.choice import Selection
+from irtwin.report.plant.overview import actions, actions_sheet
 from irtwin.report.questions import ask
 
 

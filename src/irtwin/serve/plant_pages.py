@@ -13,7 +13,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 
 from irtwin.errors import InputError
-from irtwin.report.plant import actions, choice, comparison, curves, links, overview, page, robot, sheet
+from irtwin.report.plant import choice, comparison, curves, links, overview, page, robot, sheet
 from irtwin.report.plant.page import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion
@@ -72,7 +72,7 @@ class PlantPages:
 
         def drawn() -> str:
             plant = overview.overview(answers, asked)
-            beside = {"actions": actions.actions(answers, asked), "writable": self._updates.allowed}
+            beside = {"actions": overview.actions(answers, asked), "writable": self._updates.allowed}
             names = self._reports.names()
             return page.render("page.html.jinja", answers, {}, found=plant, reports=names, **beside, **values)
 
@@ -130,7 +130,7 @@ class PlantPages:
         asked, _ = self._chosen(request)
         known = {name: page.questions()[name] for name in ("robots", "actions")}
         answers = await self._asking.answers(request, known, {})
-        return await table(request, "actions", lambda: actions.actions_sheet(actions.actions(answers, asked)))
+        return await table(request, "actions", lambda: overview.actions_sheet(overview.actions(answers, asked)))
 
     async def _done(self, request: Request) -> Response:
         """Keep that an action was done, and lead back to the list."""

@@ -1,4 +1,4 @@
-"""All robots of a plant: what each does, took, cost and emitted, and what is wrong with it."""
+"""All robots of a plant: what each does, took, cost and emitted, what is wrong with it, and what would save."""
 
 from __future__ import annotations
 
@@ -133,6 +133,29 @@ def made_sheet(answers: Answers) -> Sheet:
             for row in answers["made"].rows
         ],
     )  # fmt: skip
+
+
+def actions(answers: Answers, asked: Selection = ALL) -> tuple[Row, ...]:
+    """Return what to do to save energy, as `actions.rq` answers it, of those `robots.rq` that are asked for."""
+    robots = {robot["robot"] for robot in answers["robots"].rows if asked.finds(robot)}
+    return tuple(row for row in answers["actions"].rows if row["robot"] in robots)
+
+
+def actions_sheet(rows: tuple[Row, ...]) -> Sheet:
+    """Return the actions as a table."""
+    columns = (
+        "robot", "action", "place", "state", "done_on", "by", "saving_a_year_kWh", "saving_a_run_kWh", "runs_before",
+        "runs_after", "compared_for_each", "baseline_adjusted_kWh", "saved_kWh", "lower_kWh", "upper_kWh", "iri",
+    )  # fmt: skip
+    cells = [
+        (
+            *(row[name] for name in ("name", "what", "place", "state", "done_on", "by")), kwh(row["year_j"]),
+            kwh(row["run_j"]), row["before"], row["after"], row["unit"],
+            *(kwh(row[name]) for name in ("adjusted_j", "saved_j", "lower_j", "upper_j")), row["action"],
+        )
+        for row in rows
+    ]  # fmt: skip
+    return Sheet(columns, cells)
 
 
 def _groups(answers: Answers, asked: Selection) -> list[Group]:
