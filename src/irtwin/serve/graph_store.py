@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pyoxigraph import NamedNode, RdfFormat, parse, serialize
 
-from irtwin.serve.protocol import Operation, Refusal
+from irtwin.serve.protocol import Operation, Refusal, named
 
 _ALL = "CONSTRUCT { ?s ?p ?o } WHERE { ?s ?p ?o }"
 Parameters = Mapping[str, Sequence[str]]
@@ -19,10 +19,10 @@ def names_graph(parameters: Parameters) -> bool:
 
 def read(parameters: Parameters) -> Operation:
     """Return the query for a graph, by its IRI or all together (section 5.2)."""
-    named = parameters.get("graph", ())
-    if len(named) > 1 or (named and "default" in parameters):
+    graphs = parameters.get("graph", ())
+    if len(graphs) > 1 or (graphs and "default" in parameters):
         raise Refusal(400, "ask for one graph: `graph=IRI` or `default`")
-    return Operation("query", _ALL, tuple(_iri(name).value for name in named))
+    return Operation("query", _ALL, tuple(_iri(name).value for name in graphs))
 
 
 def replaced(parameters: Parameters, content_type: str, body: bytes, base: str) -> Operation:
@@ -51,14 +51,11 @@ def dropped(parameters: Parameters) -> Operation:
 
 
 def _own(parameters: Parameters) -> NamedNode:
-    named = parameters.get("graph", ())
-    if len(named) != 1 or "default" in parameters:
+    graphs = parameters.get("graph", ())
+    if len(graphs) != 1 or "default" in parameters:
         raise Refusal(400, "name the one graph that is changed: `graph=IRI`")
-    return _iri(named[0])
+    return _iri(graphs[0])
 
 
 def _iri(name: str) -> NamedNode:
-    try:
-        return NamedNode(name)
-    except ValueError:
-        raise Refusal(400, f"{name!r} is no absolute IRI") from None
+    return named(name, 400, f"{name!r} is no absolute IRI")

@@ -20,7 +20,7 @@ from irtwin.serve import negotiation, ontology
 from irtwin.serve.asking import Asking
 from irtwin.serve.guard import noted
 from irtwin.serve.plant_pages import html
-from irtwin.serve.protocol import Refusal
+from irtwin.serve.protocol import Refusal, named
 
 _FORMS = {
     "ttl": "text/turtle", "jsonld": "application/ld+json", "nt": "application/n-triples", "rdf": "application/rdf+xml",
@@ -65,8 +65,4 @@ def _iri(request: Request, base: str) -> str:
     raw = request.scope.get("raw_path", b"").decode("ascii", errors="replace").partition("?")[0]
     path = _NOT_ASCII.sub(lambda match: unquote(match[0]), raw)
     above = base if path.startswith(urlsplit(base).path) else ONTOLOGY
-    iri = above.removesuffix(urlsplit(above).path) + path
-    try:
-        return NamedNode(iri).value
-    except ValueError:
-        raise Refusal(404, "no individual has this address") from None
+    return named(above.removesuffix(urlsplit(above).path) + path, 404, "no individual has this address").value

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pyoxigraph import NamedNode
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
@@ -17,14 +16,13 @@ from irtwin.report.plant import choice, comparison, curves, links, overview, pag
 from irtwin.report.plant.page import page_number
 from irtwin.report.plant.sheet import Sheet
 from irtwin.report.questions import Answers, PageQuestion
-from irtwin.serve.asking import Asking, Bindings
+from irtwin.serve.asking import Asking
+from irtwin.serve.forms import KNOWN, SaidValue, read_done, read_value
 from irtwin.serve.guard import noted
 from irtwin.serve.pool import Limits
-from irtwin.serve.protocol import Refusal, read_body
+from irtwin.serve.protocol import Refusal, named, read_body
 from irtwin.serve.report_files import ReportFiles
-from irtwin.serve.saving_form import KNOWN, read_form
 from irtwin.serve.updates import Updates
-from irtwin.serve.value_form import SaidValue, read_value
 from irtwin.storage.tariff import FILE, Tariff, read_tariff
 
 POLICY = (
@@ -134,7 +132,7 @@ class PlantPages:
 
     async def _done(self, request: Request) -> Response:
         """Keep that an action was done, and lead back to the list."""
-        done = read_form(await read_body(request, self._limits.request, self._limits.seconds))
+        done = read_done(await read_body(request, self._limits.request, self._limits.seconds))
         self._updates.admit(done.authorization)
         if not await self._asking.holds(request, KNOWN, {"action": done.action}):
             raise Refusal(404, f"the graph knows no saving action {done.action}")
@@ -204,8 +202,11 @@ class PlantPages:
             return None, answers
         asked = {name: question for name, question in page.questions("comparison").items() if "first" in question.bind}
         robot_iri = self._individual("robot", request.query_params["robot"])
+        for side in sides:
+            if side is not None and side.run is not None:
+                named(side.run, 404, "no run has this name")
         before, after = [
-            await self._asking.answers(request, asked, {"robot": robot_iri, **_iris(side.bindings())})
+            await self._asking.answers(request, asked, {"robot": robot_iri, **side.bindings()})
             for side in sides if side is not None
         ]  # fmt: skip
         return comparison.comparison(before, after), {**answers, **before}
@@ -257,18 +258,7 @@ class PlantPages:
         }
 
     def _individual(self, kind: str, tail: str) -> str:
-        try:
-            return NamedNode(f"{self._asking.base}{kind}/{tail}").value
-        except ValueError:
-            raise Refusal(404, f"no {kind} has this name") from None
-
-
-def _iris(bindings: Bindings) -> Bindings:
-    """Return bindings as they are. Refusal where a text is no IRI."""
-    try:
-        return {name: NamedNode(value).value if isinstance(value, str) else value for name, value in bindings.items()}
-    except ValueError:
-        raise Refusal(404, "no run has this name") from None
+        return named(f"{self._asking.base}{kind}/{tail}", 404, f"no {kind} has this name").value
 
 
 async def html(drawn: Callable[[], str], policy: str = POLICY) -> Response:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs
 
+from pyoxigraph import NamedNode
+
 if TYPE_CHECKING:  # a worker has no need of it
     from starlette.requests import Request
 
@@ -107,6 +109,14 @@ def read_parameters(encoded: str) -> dict[str, list[str]]:
 def read_fields(body: bytes) -> dict[str, str]:
     """Read a form that a page sends: the last value of each field."""
     return {name: values[-1] for name, values in read_parameters(body.decode("ascii", errors="replace")).items()}
+
+
+def named(iri: str, status: int, why: str) -> NamedNode:
+    """Return the node that an IRI names. Raises Refusal, with a status and why, where it is none."""
+    try:
+        return NamedNode(iri)
+    except ValueError:
+        raise Refusal(status, why) from None
 
 
 def _text(body: bytes) -> str:
