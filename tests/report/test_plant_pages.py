@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from datetime import datetime
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -17,6 +18,7 @@ from irtwin.report.plant.energies import KINDS, days, kind
 from irtwin.report.questions import Answer, Answers, ask
 
 UTC = ZoneInfo("UTC")
+FRIDAY = datetime(2026, 3, 6, 22, tzinfo=UTC)
 
 
 @pytest.fixture(scope="module")
@@ -268,3 +270,33 @@ def test_each_line_is_on_one_page() -> None:
 )
 def test_an_address_says_its_page_or_nonsense(said: str | None, number: int) -> None:
     assert page.page_number(said) == number
+
+
+def test_hours_are_those_of_the_plants_clock() -> None:
+    rows = [{"first_hour": FRIDAY, "by_hour": "10,20,40"}]
+    found = robot.load(rows, UTC)
+    taken = {(cell["weekday"], cell["hour"]): cell["energy_j"] for row in found["week"] for cell in row}
+    assert {at: energy for at, energy in taken.items() if energy} == {
+        ("Friday", 22): 10.0, ("Friday", 23): 20.0, ("Saturday", 0): 40.0
+    }  # fmt: skip
+    assert [(shift["name"], shift["hours"], shift["energy_j"]) for shift in found["shifts"]] == [
+        (robot.NIGHT, 2, 30.0),
+        (robot.WEEKEND, 1, 40.0),
+    ]
+    assert found["greatest"] == {"weekday": "Saturday", "hour": 0, "energy_j": 40.0, "height": 1.0}
+    tokyo = robot.load(rows, ZoneInfo("Asia/Tokyo"))
+    assert [shift["name"] for shift in tokyo["shifts"]] == [robot.WEEKEND]
+
+
+def test_the_same_hour_of_several_weeks_is_its_mean() -> None:
+    mondays = [datetime(2026, 3, day, 6, tzinfo=UTC) for day in (2, 9)]
+    rows = [{"first_hour": day, "by_hour": energy} for day, energy in zip(mondays, ("10", "30"), strict=True)]
+    found = robot.load(rows, UTC)
+    assert found["week"][0][6]["energy_j"] == 20.0
+    assert [(shift["name"], shift["hours"], shift["energy_j"]) for shift in found["shifts"]] == [(robot.EARLY, 2, 40.0)]
+
+
+def test_nothing_and_nothing_taken() -> None:
+    assert robot.load([], UTC) is None
+    found = robot.load([{"first_hour": FRIDAY, "by_hour": "0"}], UTC)
+    assert found["greatest"]["height"] == 0.0

@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 from irtwin.effects.effect import force_unit
 from irtwin.report.colours import PALETTE
 from irtwin.report.page import report_page
-from irtwin.report.traces import Figure, axis, plain, trace
+from irtwin.report.traces import TIME, Figure, axis, plain, trace
 from irtwin.report.wording import angle, angular_speed
 from irtwin.resources import shipped
 from irtwin.robot.description import Joint
@@ -25,7 +25,6 @@ from irtwin.virtual.performance import Performance
 from irtwin.virtual.scene import scene_html
 
 _MOST_POINTS = 4000  # of a curve: more than a screen shows
-_TIME = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def _figures(twin: Twin, motion: Motion, torque: np.ndarray, power: np.ndarray) 
     line = trace("power", _short(motion.time), _short(power), "W", line={"color": PALETTE[0], "width": 2})
     return figures | {
         "torque": _curves(twin.robot.joints, motion.time, torque, "torque", ("N m", "N")),
-        "power": {"data": [line], "layout": {"xaxis": _TIME, "yaxis": axis("power", "W")}},
+        "power": {"data": [line], "layout": {"xaxis": TIME, "yaxis": axis("power", "W")}},
     }
 
 
@@ -114,7 +113,7 @@ def _curves(
         for colour, joint, column, unit in zip(cycle(PALETTE), joints, values.T, own, strict=False)
     ]
     title = f"{quantity}, {' or '.join(dict.fromkeys(own))}"
-    return {"data": data, "layout": {"xaxis": _TIME, "yaxis": {"title": {"text": title}}}}
+    return {"data": data, "layout": {"xaxis": TIME, "yaxis": {"title": {"text": title}}}}
 
 
 def _short(values: np.ndarray) -> list[float]:

@@ -9,6 +9,7 @@ from typing import Any
 from irtwin.report.colours import LIMIT
 
 Figure = dict[str, Any]  # {"data": [...], "layout": {...}}
+TIME: Figure = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}  # an axis
 
 
 def plain(text: str) -> str:

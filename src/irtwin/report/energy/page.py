@@ -7,7 +7,7 @@ from functools import cache
 
 from irtwin.errors import InputError
 from irtwin.packing import Fragment
-from irtwin.report.energy import lead, tables, verdict
+from irtwin.report.energy import lead, tables
 from irtwin.report.energy.figures import figures
 from irtwin.report.energy.flows import flows
 from irtwin.report.explorer import Columns, ReadSeries, explorer
@@ -64,8 +64,8 @@ def render(
         made=lead.made(answers),
         trust=lead.trust(answers),
         constant=lead.constant_power(answers),
-        torque=verdict.torque(answers),
-        energy=verdict.energy(answers),
+        torque=lead.torque(answers),
+        energy=lead.energy(answers),
         limits=limits(answers),
         parameters=tables.parameters(answers["parameters"].rows, answers["joints"].rows),
         conclusions=tables.conclusions(answers["conclusions"].rows, explain),

@@ -10,7 +10,7 @@ from irtwin.document.curves import Curves, Followed, PlannedMotion
 from irtwin.report import wording
 from irtwin.report.colours import LIMIT, MEASURED, PALETTE, effect_colour
 from irtwin.report.questions import Answers, Row
-from irtwin.report.traces import Figure, axis, band, bars, beside, level, plain, trace
+from irtwin.report.traces import TIME, Figure, axis, band, bars, beside, level, plain, trace
 
 BEFORE, AFTER, FLOOR = MEASURED, PALETTE[2], LIMIT
 _SHADES = [[0.0, "#FFFFFF"], [0.25, "#FDE3C4"], [0.6, "#EE9A4D"], [1.0, "#E07020"]]
@@ -191,9 +191,8 @@ def experiment(curve: PlannedMotion) -> Figure:
         trace(plain(joint), curve.time, q, unit, line={"width": 1.5, "color": PALETTE[place % len(PALETTE)]})
         for place, (joint, unit, q) in enumerate(drawn)
     ]
-    xaxis = {"type": "linear", "title": {"text": "time, s"}, "zeroline": False}
     units = " or ".join(sorted(set(curve.units), reverse=True))
-    return {"data": lines, "layout": {"xaxis": xaxis, "yaxis": {"title": {"text": f"position, {units}"}}}}
+    return {"data": lines, "layout": {"xaxis": TIME, "yaxis": {"title": {"text": f"position, {units}"}}}}
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
