@@ -305,12 +305,17 @@ def diagnose(
 
 
 def _play(dataset: Path, simulator: Path, joints: Sequence[str], asked: Mapping[str, Any]) -> None:
-    from irtwin.cli.play import tell
     from irtwin.diagnosing import play
+    from irtwin.report.gap import summary
+    from irtwin.report.terminal import show
 
     own = ("json_file", "repair")
     refuse({*asked, "simulator_file", "workspace"} - {*own}, "is of a diagnosis, and does not go with --play")
-    tell(play(dataset, simulator, joints=joints, announce=announce, **{name: asked[name] for name in own}))
+    log = play(dataset, simulator, joints=joints, announce=announce, **{name: asked[name] for name in own})
+    for place, table in enumerate(summary.played(log)):
+        if place:
+            click.echo()
+        show(table, counted=False)
 
 
 @click.command()

@@ -1,9 +1,13 @@
-"""A diagnosis for the terminal: one line, the gap before and after its causes are added, and these causes."""
+"""A diagnosis for the terminal: one line, the gap before and after its causes are added, and these causes.
+
+Or, where nothing is diagnosed, how far a model is from the robot that it plays.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from irtwin.document.curves import Curves, RunError
 from irtwin.document.document import Cause, CauseParameter, Document, Finding, pooled
@@ -15,6 +19,10 @@ from irtwin.report.gap import findings
 from irtwin.report.gap.verdict import agrees, closes, differing, left, where
 from irtwin.report.wording import listed
 
+if TYPE_CHECKING:  # a diagnosis has no need of it
+    from irtwin.simulator.played_log import PlayedLog
+
+_TRACKING, _TORQUE = "tracking error, rad (m)", "torque, N m (N)"  # of a log that is played
 _DIGITS = 3  # significant ones: more than any interval leaves sure
 _MENDED = 3  # lines on what was done with logs, on a terminal
 _CALLED_BACK = "dead_band"  # what is played that no file holds and a callback does
@@ -132,6 +140,43 @@ def horizons(diagnosis: Document) -> AnswerTable:
     columns = ("s since it was begun anew", "tracking error, rad", "with the causes, rad")
     rows = [(horizon.seconds, _short(horizon.before), _short(horizon.after)) for horizon in diagnosis.horizons or ()]
     return _table(columns, rows)
+
+
+def played(log: PlayedLog) -> Iterator[AnswerTable]:
+    """Yield how far a model is from the robot that it plays: by run, by joint, by how long ago it was where that is.
+
+    A table has no columns that are empty.
+    """
+    by_run: list[Row] = [
+        {
+            "run": run.run,
+            _TRACKING: _together(run.position_rmse.values()),
+            "flange, m": _together([run.flange_rmse]),
+            _TORQUE: _together((run.torque_rmse or {}).values()),
+            "energy error, %": _short(run.energy_error_percent),
+        }
+        for run in log.runs
+    ]
+    by_joint: list[Row] = [
+        {
+            "joint": joint,
+            _TRACKING: _together(run.position_rmse[joint] for run in log.runs),
+            _TORQUE: _together(run.torque_rmse[joint] for run in log.runs if run.torque_rmse),
+        }
+        for joint in log.runs[0].position_rmse
+    ]
+    by_horizon: list[Row] = [
+        {"s since it was begun anew": horizon.seconds, _TRACKING: _short(horizon.position_rmse)}
+        for horizon in log.horizons
+    ]
+    for rows in (by_run, by_joint, by_horizon):
+        columns = tuple(column for column in rows[0] if any(row[column] is not None for row in rows))
+        yield AnswerTable(columns, tuple(rows))
+
+
+def _together(errors: Iterable[float]) -> float | None:
+    known = list(errors)
+    return _short(pooled(known)) if known else None
 
 
 def filtered(diagnosis: Document) -> list[str]:
