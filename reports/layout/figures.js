@@ -7,14 +7,9 @@
   const PAPER_WIDTH = 680; // CSS pixels between the margins of an A4 page
   let theme = chooseTheme(false);
 
-  function values(packed) {
-    const text = atob(packed.data), count = text.length / 2, result = new Array(count);
-    for (let i = 0; i < count; i++) {
-      const raw = text.charCodeAt(2 * i) | (text.charCodeAt(2 * i + 1) << 8);
-      const level = raw > 32767 ? raw - 65536 : raw;
-      result[i] = level === -32768 ? null : packed.offset + packed.scale * level;
-    }
-    return result;
+  function values({ data, offset, scale }) {
+    const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+    return Array.from(new Int16Array(bytes.buffer), (level) => (level === -32768 ? null : offset + scale * level));
   }
 
   function curves(chart, unit, suffix, legend) {

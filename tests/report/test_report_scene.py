@@ -1,26 +1,24 @@
 import numpy as np
 import pyarrow as pa
 import pytest
-from tests.virtual.scene_data import embedded
+from tests.virtual.scene_data import bare, embedded
 
 from irtwin.errors import InputError
 from irtwin.report.energy.scene import draw_scene
 from irtwin.report.explorer import Columns
-from irtwin.robot.urdf import parse_urdf
 
-ARM = """<robot name="arm"><link name="base"/><link name="mid"/><link name="tip"><inertial><mass value="1"/>
-<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="a" type="revolute"><parent link="base"/><child link="mid"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
-<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
-<joint name="b" type="revolute"><parent link="mid"/><child link="tip"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
-<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
-SERIES = {"time": [5.0, 6.0, 7.0], "q_a": [0.0, 0.1, 0.2], "energy_model": [0.0, 50.0, 99.0], "power_model": [50.0] * 3}
+SERIES = {
+    "time": [5.0, 6.0, 7.0],
+    "q_turn": [0.0, 0.1, 0.2],
+    "energy_model": [0.0, 50.0, 99.0],
+    "power_model": [50.0] * 3,
+}
 
 
 def test_the_scene_performs_the_modelled_series_from_their_start():
-    series = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1]}))
-    modelled = Columns.of(pa.table(SERIES | {"q_b": [0.0, 0.0, 0.1], "tau_a_model": [1.0, 2.0, 3.0]}))
-    data = embedded(draw_scene(parse_urdf(ARM, source="arm"), {}, [("first", series), ("second", modelled)], 1))
+    series = Columns.of(pa.table(SERIES | {"q_lift": [0.0, 0.0, 0.1]}))
+    modelled = Columns.of(pa.table(SERIES | {"q_lift": [0.0, 0.0, 0.1], "tau_turn_model": [1.0, 2.0, 3.0]}))
+    data = embedded(draw_scene(bare(), {}, [("first", series), ("second", modelled)], 1))
     assert data["opens"] == 1
     first, second = data["runs"]
     assert (first["name"], first["start"], first["torque"]) == ("first", 0.0, None)
@@ -28,5 +26,5 @@ def test_the_scene_performs_the_modelled_series_from_their_start():
 
 
 def test_a_series_without_a_joint_is_told():
-    with pytest.raises(InputError, match="the series of a run has no column 'q_b'"):
-        draw_scene(parse_urdf(ARM, source="arm"), {}, [("run", Columns.of(pa.table(SERIES)))], 0)
+    with pytest.raises(InputError, match="the series of a run has no column 'q_lift'"):
+        draw_scene(bare(), {}, [("run", Columns.of(pa.table(SERIES)))], 0)

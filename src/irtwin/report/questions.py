@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from irtwin.input_file import read_text
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.report.wording import local_name
 from irtwin.resources import MOST_BYTES, Resource, Resources
 
 Row = Mapping[str, Any]  # a variable's Python value, None where it is unbound
 
 _HEADER = re.compile(r"^# (title|bind): (.*)\n", re.MULTILINE)
-
-
-class Graph(Protocol):
-    """What a page needs of a knowledge graph."""
-
-    def query(self, text: str, bindings: Mapping[str, str] = ...) -> Sequence[Row]:
-        """Answer a SELECT over the union of all named graphs; `bindings` maps variables to IRIs."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +63,7 @@ def read_questions(files: Iterable[Path]) -> dict[str, PageQuestion]:
     return {file.stem: _parse(file) for file in files}
 
 
-def ask(graph: Graph, questions: Mapping[str, PageQuestion], bindings: Mapping[str, str]) -> dict[str, Answer]:
+def ask(graph: KnowledgeGraph, questions: Mapping[str, PageQuestion], bindings: Mapping[str, str]) -> dict[str, Answer]:
     """Ask every question; one whose variables are not all in `bindings` has no rows."""
     return {name: Answer(question, _rows(graph, question, bindings)) for name, question in questions.items()}
 
@@ -95,7 +89,7 @@ def _parse(file: Path) -> PageQuestion:
     return PageQuestion(file.stem, header["title"], bind, _HEADER.sub("", text).strip())
 
 
-def _rows(graph: Graph, question: PageQuestion, bindings: Mapping[str, str]) -> tuple[Row, ...]:
+def _rows(graph: KnowledgeGraph, question: PageQuestion, bindings: Mapping[str, str]) -> tuple[Row, ...]:
     if not set(question.bind) <= set(bindings):
         return ()
     return tuple(graph.query(question.text, {name: bindings[name] for name in question.bind}))

@@ -54,10 +54,11 @@ def asset(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in _names():
         raise Refusal(404, "no such file")
-    content = _read(name)
-    headers = {"Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+    content, headers = _packed(name), {"Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     if "gzip" in request.headers.get("accept-encoding", ""):
-        content, headers["Content-Encoding"] = _packed(name), "gzip"
+        headers["Content-Encoding"] = "gzip"
+    else:
+        content = gzip.decompress(content)
     return Response(content, media_type=_TYPES[Path(name).suffix], headers=headers)
 
 
@@ -74,7 +75,3 @@ def _packed(name: str) -> bytes:
         return gzip.compress(_MADE[name]().encode("utf-8"), mtime=0)
     packed = FOLDER / f"{name}.gz"
     return packed.read_bytes() if packed.exists() else gzip.compress((FOLDER / name).read_bytes(), mtime=0)
-
-
-def _read(name: str) -> bytes:
-    return gzip.decompress(_packed(name))

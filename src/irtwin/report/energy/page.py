@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 from irtwin.errors import InputError
+from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.packing import Fragment
 from irtwin.report.energy import lead, tables
 from irtwin.report.energy.figures import figures
 from irtwin.report.energy.flows import flows
 from irtwin.report.explorer import Columns, ReadSeries, explorer
 from irtwin.report.page import report_page
-from irtwin.report.questions import Graph, ask, limits, questions_of
+from irtwin.report.questions import ask, limits, questions_of
 from irtwin.resources import Resources, shipped
 from irtwin.storage.files import InsidePath, write
 
@@ -20,7 +21,7 @@ DrawScene = Callable[[Sequence[tuple[str, Columns]], int], Fragment]  # runs wit
 
 
 def render(
-    graph: Graph,
+    graph: KnowledgeGraph,
     robot_iri: str,
     read_series: ReadSeries,
     out: InsidePath,

@@ -216,19 +216,17 @@ def within(interval: Sequence[float]) -> str:
     return f"(95 % interval {' to '.join(map(wording.share, interval))})"
 
 
-def folded(count: int, channel: str, share: float) -> str:
-    """Say how many findings there are that are not told by themselves, and what they close together."""
-    closed = wording.part(share) if share > 0 else "nothing"
-    words = "1 finding closes" if count == 1 else f"{count} findings together close"
-    return f"{words} {closed} of the gap in {channel}"
-
-
 def counted(findings: Sequence[ToldFinding]) -> str:
     """Count findings, by channel, with what they close together; empty where there are none."""
     of_channel: dict[str, list[float]] = {}
     for finding in findings:
         of_channel.setdefault(finding.channel, []).append(finding.share)
-    return wording.listed([folded(len(shares), channel, sum(shares)) for channel, shares in of_channel.items()])
+    said = []
+    for channel, shares in of_channel.items():
+        closed = wording.part(sum(shares)) if sum(shares) > 0 else "nothing"
+        words = "1 finding closes" if len(shares) == 1 else f"{len(shares)} findings together close"
+        said.append(f"{words} {closed} of the gap in {channel}")
+    return wording.listed(said)
 
 
 def _together(alternatives: Sequence[Alternative]) -> float:

@@ -26,7 +26,7 @@ from irtwin.report.gap import verdict as gap_verdict
 from irtwin.report.gap.experiment import experiment
 from irtwin.report.gap.findings import NOT_REPEATING, counted
 from irtwin.report.page import report_page
-from irtwin.report.questions import Answers, Graph, ask, questions_of
+from irtwin.report.questions import Answers, ask, questions_of
 from irtwin.resources import Resources, shipped
 from irtwin.robot.description import Robot
 from irtwin.robot.meshes import Mesh
@@ -40,7 +40,7 @@ DescribeRobot = Callable[[], tuple[Robot, Mapping[str, Mesh]]]  # with its meshe
 
 
 def render_gap(
-    graph: Graph,
+    graph: KnowledgeGraph,
     robot: str,
     read_document: ReadDocument,
     out: Path,
