@@ -248,7 +248,7 @@ def meanings(diagnosis: Document) -> list[str]:
         graph.load_ontology()
         meaning = {(row["effect"].removeprefix(EFFECT), row["name"]): row["meaning"] for row in graph.query(_MEANINGS)}
     known = [
-        f"{name} of {effect.replace('_', ' ')}: {meaning[effect, name]}"
+        f"{name} of {_words(effect)}: {meaning[effect, name]}"
         for effect, name in parameters
         if (effect, name) in meaning
     ]
