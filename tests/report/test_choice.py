@@ -57,7 +57,7 @@ def test_what_saves_most_comes_first(answers: Answers) -> None:
     said = instead(answers, waiting=(ten, fifty))
     found = overview.overview(said)
     assert [line["name"] for line in found.groups[0].lines] == ["Arm_B", "Arm_A"]
-    assert found.saving_j == pytest.approx(60 * kwh)
+    assert found.electrical.total("saving_j") == pytest.approx(60 * kwh)
     html = page.render("page.html.jinja", said, {}, found=found, trouble="", file="", excel=True, reports=[])
     assert "could save a year, EUR" in html and "1.80 to 2.20" in html
     assert "saving_a_year_kWh" in overview.sheet(found).columns

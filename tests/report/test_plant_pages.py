@@ -42,9 +42,9 @@ def test_mechanical_energy_stands_apart_and_has_no_price(answers: Answers) -> No
     (mechanical,) = (group.lines[0] for group in found.groups if group.kind is KINDS["mechanical"])
     assert mechanical["energy_j"] == 840.0
     assert {mechanical[name] for name in ("cost", "co2_kg", "standby")} == {None}
-    assert found.electrical_j == 5900.0
-    assert found.cost == pytest.approx(5900 / 3.6e6 * 0.2)
-    assert found.co2_kg == pytest.approx(5900 / 3.6e6 * 0.4)
+    assert found.electrical.total("energy_j") == 5900.0
+    assert found.electrical.total("cost") == pytest.approx(5900 / 3.6e6 * 0.2)
+    assert found.electrical.total("co2_kg") == pytest.approx(5900 / 3.6e6 * 0.4)
     assert [(of.name, [bar.energy_j for bar in trend]) for of, trend in found.trends] == [
         ("measured", [3500.0, 1600.0, 800.0]), ("mechanical", [400.0, 440.0])
     ]  # fmt: skip
@@ -116,7 +116,7 @@ def test_more_than_a_hundred_robots(answers: Answers) -> None:
     answers = plants.many(answers, 30)
     found = overview.overview(answers)
     assert found.robots == sum(len(group.lines) for group in found.groups) == 120
-    assert found.electrical_j == 30 * 5900.0
+    assert found.electrical.total("energy_j") == 30 * 5900.0
     html = drawn(answers)
     assert html.count('class="state"') == 50 + 30 + 30  # the 60 that are measured take two pages
     assert "Page 1 of 2; 60 robots." in html and '<a href="?page=2#measured">Next</a>' in html

@@ -65,14 +65,13 @@ class PlantPages:
     async def _plant(self, request: Request) -> Response:
         asked, wrong = self._chosen(request)
         answers = await self._asking.answers(request, asked.of_days(page.questions()), {})
-        values = {**self._beside(request), "number": page_number(request.query_params.get("page")), "asked": asked}
+        values = {**self._beside(request), "asked": asked}
         values |= {"trouble": wrong} if wrong else {}
 
         def drawn() -> str:
             plant = overview.overview(answers, asked)
-            beside = {"actions": overview.actions(answers, asked), "writable": self._updates.allowed}
-            names = self._reports.names()
-            return page.render("page.html.jinja", answers, {}, found=plant, reports=names, **beside, **values)
+            beside = {"actions": overview.actions(answers, asked), "reports": self._reports.names()}
+            return page.render("page.html.jinja", answers, {}, found=plant, **beside, **values)
 
         return await html(drawn)
 
@@ -80,8 +79,7 @@ class PlantPages:
         iri = self._individual("robot", request.path_params["name"])
         answers = await self._known(request, robot.questions(), {"robot": iri}, "robot")
         values = self._beside(request) | self._reports.of_robot(links.tail(iri, self._asking.base))
-        values["number"] = page_number(request.query_params.get("page"))
-        values |= {"writable": self._updates.allowed, "refused": refused, "said": said}
+        values |= {"refused": refused, "said": said}
         shown = {**robot.of_robot(answers, values["zone"]), **values}
         return await html(lambda: page.render("robot/page.html.jinja", answers, {"robot": iri}, **shown))
 
@@ -240,8 +238,8 @@ class PlantPages:
     def _beside(self, request: Request) -> dict[str, Any]:
         """Return what each page says beside its answers.
 
-        That is base, the plant's clock as it is now, or what is wrong with its file, and how the graph stands that
-        answered.
+        That is base, the plant's clock as it is now, or what is wrong with its file, how the graph stands that
+        answered, which page of a long table is asked for, and whether users may say something.
         """
         zone, trouble = Tariff().zone, ""
         try:
@@ -255,6 +253,8 @@ class PlantPages:
             "excel": sheet.excel_is_there(),
             "base": self._asking.base,
             "graph_stands": noted(request),
+            "number": page_number(request.query_params.get("page")),
+            "writable": self._updates.allowed,
         }
 
     def _individual(self, kind: str, tail: str) -> str:

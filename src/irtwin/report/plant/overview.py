@@ -26,7 +26,7 @@ class Group:
 
     A line is a robot's: what `robots.rq` and `_robots` say of it, with `runs`, `time_s`, `energy_j` and `trend` of that
     kind; of electrical energy also `cost`, `co2_kg`, `standby` (share of energy) and `saving` (J in a year, were it off
-    while it waits, with its 95 % interval).
+    while it waits, with its 95 % interval; `saving_j` without).
     """
 
     kind: EnergyKind | None
@@ -42,11 +42,6 @@ class Group:
         parts = tuple((name, Group(self.kind, tuple(own))) for name, own in groupby(self.lines, key=itemgetter("of")))
         return parts if len(parts) > 1 else ()
 
-    @property
-    def saving_j(self) -> float | None:
-        """What its robots would save in a year, as far as that is known."""
-        return _sum(line["saving"]["energy_j"] for line in self.lines if line["saving"] is not None)
-
 
 @dataclass(frozen=True)
 class Overview:
@@ -55,11 +50,8 @@ class Overview:
     groups: tuple[Group, ...]
     trends: tuple[tuple[EnergyKind, Days], ...]
     robots: int
-    electrical_j: float | None
-    cost: float | None
-    co2_kg: float | None
+    electrical: Group  # energies of whatever kind
     standby: float | None
-    saving_j: float | None  # a year
     tariff: Row
 
     @property
@@ -79,17 +71,14 @@ def overview(answers: Answers, asked: Selection = ALL) -> Overview:
     daily = by_day(answers["days"].rows)
     plants = ((energy, days(added_up(of for (_, name), of in daily.items() if name == energy.name), PLANT_TREND))
               for energy in KINDS.values())  # fmt: skip
-    electrical = [group for group in groups if group.kind is not None and group.kind.electrical]
+    electrical = (line for group in groups if group.kind is not None and group.kind.electrical for line in group.lines)
     rows = [row for row in energies if kind(row["energy_from"]).electrical]
     return Overview(
         groups=groups,
         trends=tuple((energy, trend) for energy, trend in plants if trend is not None),
         robots=len({line["robot"] for group in groups for line in group.lines}),
-        electrical_j=_sum(group.total("energy_j") for group in electrical),
-        cost=_sum(group.total("cost") for group in electrical),
-        co2_kg=_sum(group.total("co2_kg") for group in electrical),
+        electrical=Group(None, tuple(electrical)),
         standby=share(_sum(row["standby_j"] for row in rows), _sum(row["modelled_j"] for row in rows)),
-        saving_j=_sum(group.saving_j for group in electrical),
         tariff=answers["tariff"].rows[0],
     )
 
@@ -201,20 +190,21 @@ def _robots(answers: Answers, asked: Selection) -> Iterator[Row]:
 
 def _of_energy(robot: Row, energy: Row | None, of: EnergyKind | None) -> Row:
     """Return what a line says of an energy of a robot; only an electrical one has a price."""
-    nothing = dict.fromkeys(("energy_j", "cost", "co2_kg", "standby", "saving"))
+    nothing = dict.fromkeys(("energy_j", "cost", "co2_kg", "standby", "saving", "saving_j"))
     if energy is None or of is None:
         return {**nothing, "runs": robot["runs"] or 0}
     line = {**nothing, **{name: energy[name] for name in ("runs", "time_s", "energy_j")}}
     if of.electrical:
         line |= {name: energy[name] for name in ("cost", "co2_kg")}
-        line |= {"standby": share(energy["standby_j"], energy["modelled_j"]), "saving": robot["waiting"]}
+        waiting = robot["waiting"]
+        line |= {"saving": waiting, "saving_j": waiting and waiting["energy_j"]}
+        line |= {"standby": share(energy["standby_j"], energy["modelled_j"])}
     return line
 
 
 def _place(line: Row, by: str) -> tuple[Any, ...]:
     """Return what a line is sorted by: its group; then what is asked for, else what it could save; then its energy."""
-    saving = line["saving"]["energy_j"] if line["saving"] is not None else None
-    first = saving if by in ("", "saving") else line["energy_j" if by == "energy" else by]
+    first = line[{"": "saving_j", "saving": "saving_j", "energy": "energy_j"}.get(by, by)]
     return line["of"], -(first if first is not None else -1.0), -(line["energy_j"] or 0.0), line["name"]
 
 
