@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -25,20 +25,6 @@ from irtwin.virtual.performance import Performance
 from irtwin.virtual.scene import scene_html
 
 _MOST_POINTS = 4000  # of a curve: more than a screen shows
-
-
-@dataclass(frozen=True)
-class JointUse:
-    """What a motion asks of a joint, in words, and which share of its limits; None where it has no such limit."""
-
-    joint: str
-    range: str
-    limits: str
-    speed: str
-    speed_share: float | None
-    torque: float  # N m or N
-    torque_share: float | None
-    unit: str  # of torque
 
 
 def write_page(twin: Twin, motion: Motion, name: str, facts: Sequence[tuple[str, str]], out: Path) -> None:
@@ -70,18 +56,19 @@ def write_page(twin: Twin, motion: Motion, name: str, facts: Sequence[tuple[str,
     write(out, page.encode())
 
 
-def _use(joint: Joint, q: np.ndarray, dq: np.ndarray, torque: np.ndarray) -> JointUse:
+def _use(joint: Joint, q: np.ndarray, dq: np.ndarray, torque: np.ndarray) -> dict[str, Any]:
+    """Say in words what a motion asks of a joint, with its torque (N m or N), and which share of its limits, if any."""
     speed, most = float(np.abs(dq).max()), float(np.abs(torque).max())
-    return JointUse(
-        joint=joint.name,
-        range=f"{angle(float(q.min()), joint.kind)} … {angle(float(q.max()), joint.kind)}",
-        limits=f"{angle(joint.lower, joint.kind)} … {angle(joint.upper, joint.kind)}",
-        speed=angular_speed(speed, joint.kind),
-        speed_share=_share(speed, joint.velocity),
-        torque=most,
-        torque_share=_share(most, joint.effort),
-        unit=force_unit(joint),
-    )
+    return {
+        "joint": joint.name,
+        "range": f"{angle(float(q.min()), joint.kind)} … {angle(float(q.max()), joint.kind)}",
+        "limits": f"{angle(joint.lower, joint.kind)} … {angle(joint.upper, joint.kind)}",
+        "speed": angular_speed(speed, joint.kind),
+        "speed_share": _share(speed, joint.velocity),
+        "torque": most,
+        "torque_share": _share(most, joint.effort),
+        "unit": force_unit(joint),
+    }
 
 
 def _share(most: float, limit: float) -> float | None:
