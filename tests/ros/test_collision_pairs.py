@@ -31,7 +31,7 @@ def arm(*links: str, lower: float = -3.1, upper: float = 3.1) -> Robot:
 
 def reasons(robot: Robot) -> dict[tuple[str, str], str]:
     pairs = free_pairs(robot, CollisionModel(robot), structure_of(robot).solids)
-    return {(pair.first, pair.second): pair.reason for pair in pairs}
+    return {(first, second): reason for first, second, reason in pairs}
 
 
 def test_each_pair_is_told_by_why_it_needs_no_check() -> None:

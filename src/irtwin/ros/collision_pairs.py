@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -16,20 +15,12 @@ from irtwin.robot.structure import Solid
 _POSES = 10_000  # drawn at random, as many as MoveIt's setup takes
 
 
-@dataclass(frozen=True)
-class FreePair:
-    """Two links that need no check; `reason` in MoveIt's words: "Adjacent", "Always" or "Never" (in contact)."""
+def free_pairs(robot: Robot, model: CollisionModel, solids: Sequence[Solid]) -> Iterator[tuple[str, str, str]]:
+    """Yield the pairs of links with collision shapes that need no check, base to flange, each with the reason.
 
-    first: str
-    second: str
-    reason: str
-
-
-def free_pairs(robot: Robot, model: CollisionModel, solids: Sequence[Solid]) -> Iterator[FreePair]:
-    """Yield the pairs of links with collision shapes that need no check, base to flange.
-
-    Never in contact are those that met at none of 10,000 random poses within the limits. Of links with a mesh, which
-    is not opened, only adjacent ones are known to need none.
+    In MoveIt's words that is "Adjacent", "Always" or "Never" (in contact). Never in contact are those that met at none
+    of 10,000 random poses within the limits. Of links with a mesh, which is not opened, only adjacent ones are known to
+    need none.
     """
     shaped = dict.fromkeys(solid.link for solid in solids if solid.purpose == "collision")
     unknown = {solid.link for solid in solids if solid.purpose == "collision" and solid.kind == "mesh"}
@@ -38,9 +29,9 @@ def free_pairs(robot: Robot, model: CollisionModel, solids: Sequence[Solid]) -> 
     for first, second in combinations(shaped, 2):
         pair = frozenset((first, second))
         if joined(robot.model.parents, carried[first], carried[second]):
-            yield FreePair(first, second, "Adjacent")
+            yield first, second, "Adjacent"
         elif not pair & unknown and pair not in met:
-            yield FreePair(first, second, "Never" if pair in checked else "Always")
+            yield first, second, "Never" if pair in checked else "Always"
 
 
 def home(robot: Robot, model: CollisionModel) -> np.ndarray:
