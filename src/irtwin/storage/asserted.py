@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Column, ForeignKey, Table, delete, exists, select
+from sqlalchemy import Column, ForeignKey, Table, exists, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from irtwin.storage.schema import Base, TwinRow
@@ -103,28 +103,12 @@ def value_of(column: Column[Any], value: str | None) -> Any:
     return None if value is None else column.type.python_type(value)
 
 
-def keep(session: Session, facts: Sequence[AssertedFact], withdrawn: Iterable[str]) -> None:
-    """Keep facts, have the rows follow that they are about, and drop others by their ids."""
-    session.execute(delete(AssertedFact).where(AssertedFact.fact_id.in_(list(withdrawn))))
-    for fact in facts:
-        if fact.place is not None:
-            setattr(row_of(session, fact), fact.column.name, value_of(fact.column, fact.value))
-    session.add_all(facts)
-
-
 def row_of(session: Session, fact: AssertedFact) -> Base | None:
     """Return the row that a fact is about; None where there is none."""
     key = json.loads(str(fact.row_key))
     mapper = next(candidate for candidate in Base.registry.mappers if candidate.local_table is fact.table)
     ident = tuple(value_of(column, key[column.name]) for column in fact.table.primary_key)
     return session.get(mapper.class_, ident)
-
-
-def facts_about(session: Session, robot_id: str) -> list[AssertedFact]:
-    """Return the facts that rows of a robot follow, the earliest first."""
-    of_robot = AssertedFact.about_robot == robot_id
-    query = select(AssertedFact).where(of_robot, AssertedFact.place.is_not(None)).order_by(AssertedFact.time)
-    return list(session.scalars(query))
 
 
 def is_newer_than_twin(session: Session, robot_id: str, facts: Sequence[AssertedFact]) -> bool:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, Self
 
 import pyarrow as pa
-from sqlalchemy import URL, Engine, Table, exists, func, select, update
+from sqlalchemy import URL, Engine, Table, delete, exists, func, insert, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -32,6 +32,7 @@ from irtwin.storage.schema import (
     Activity,
     ActivityUse,
     Base,
+    Individuals,
     RobotRow,
     RunEnergy,
     RunRow,
@@ -86,7 +87,7 @@ class Workspace:
             ) from None
         for name in _OWN:
             inside(folder, name)
-        if url is None:
+        if url is None and not (folder / _DATABASE).exists():
             _check_that_nothing_is_lost(folder)
         self.engine = engine.open_engine(url or URL.create("sqlite", database=str(folder / _DATABASE)))
         engine.use_write_ahead_log(self.engine)
@@ -181,7 +182,7 @@ class Workspace:
         if missing:
             raise ValueError(f"runs and series differ: {sorted(missing)}")
         rows = [robot, *parts, *runs]
-        with self._writing() as session:
+        with engine.writing(self.engine) as session:
             known = bool(session.scalar(select(exists().where(RobotRow.robot_id == robot.robot_id))))
             is_followed = not asserted.is_newer_than_twin(session, robot.robot_id, facts)
             if known and is_followed and self._holds(session, robot.robot_id, rows):
@@ -196,7 +197,7 @@ class Workspace:
                 )
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
-            stored = [row for run in runs for row in self._store({run.run_id: series[run.run_id]}, _told(run), None)]
+            stored = [self._store(run.run_id, series[run.run_id], _told(run)) for run in runs]
             robot_rows.insert_rows(session, [*rows[1 if known else 0 :], *stored])
             robot_rows.release_plans(session, robot.robot_id)
         self.remove_orphans()
@@ -229,7 +230,7 @@ class Workspace:
         read_rows = [
             ActivityUse(activity_id=of, entity=entity, relation=relation_to(entity)) for of, entity in sorted(uses)
         ]
-        with self._writing() as session:
+        with engine.writing(self.engine) as session:
             same = select(Activity.activity_id).where(
                 Activity.provider.in_((*(kept.provider for kept, _ in made), instead_of)),
                 Activity.subject == activity.subject,
@@ -237,37 +238,46 @@ class Workspace:
             robot_rows.drop_activities(session, robot_rows.with_dependents(session, set(session.scalars(same))))
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
-            modelled = self._store(series or {}, MODELLED, activity.activity_id)
+            modelled = [
+                self._store(run_id, table, MODELLED, activity.activity_id) for run_id, table in (series or {}).items()
+            ]
             robot_rows.insert_rows(session, [*(kept for kept, _ in made), *read_rows, *rows, *modelled])
         self.remove_orphans()
 
     def keep_run(self, run: RunRow, series: pa.Table, rows: Tables | None = None) -> None:
         """Keep a run of no data set with its samples, and further rows about it, by table."""
-        with self._writing() as session:
-            (stored,) = self._store({run.run_id: series}, _told(run), None)
+        with engine.writing(self.engine) as session:
+            stored = self._store(run.run_id, series, _told(run))
             run.file, run.sha256 = stored.path, stored.series_id
             robot_rows.insert_rows(session, [run, stored])
             robot_rows.insert_values(session, rows or {})
 
     def facts_about(self, robot_id: str) -> list[AssertedFact]:
         """Return the facts that rows of a robot follow, the earliest first."""
+        followed = AssertedFact.about_robot == robot_id, AssertedFact.place.is_not(None)
         with self.reading() as session:
-            return asserted.facts_about(session, robot_id)
+            return list(session.scalars(select(AssertedFact).where(*followed).order_by(AssertedFact.time)))
 
     def keep_facts(self, facts: Sequence[AssertedFact], withdrawn: Iterable[str]) -> None:
         """Keep what a user asserted, with the rows that follow; drop what was taken back, by `fact_id`."""
-        with self._writing() as session:
-            asserted.keep(session, facts, withdrawn)
+        with engine.writing(self.engine) as session:
+            session.execute(delete(AssertedFact).where(AssertedFact.fact_id.in_(list(withdrawn))))
+            for fact in facts:
+                if fact.place is not None:
+                    setattr(
+                        asserted.row_of(session, fact), fact.column.name, asserted.value_of(fact.column, fact.value)
+                    )
+            session.add_all(facts)
 
     def drop_robot(self, robot_id: str) -> None:
         """Forget a robot and everything derived from it."""
-        with self._writing() as session:
+        with engine.writing(self.engine) as session:
             robot_rows.drop_robot(session, robot_id)
         self.remove_orphans()
 
     def drop_run(self, run_id: str, subject: str) -> None:
         """Forget a run that no twin knows, and what providers made of it, their `subject` by its IRI."""
-        with self._writing() as session:
+        with engine.writing(self.engine) as session:
             robot_rows.drop_run(session, run_id, subject)
         self.remove_orphans()
 
@@ -291,7 +301,7 @@ class Workspace:
 
     def remove_orphans(self) -> None:
         """Remove files that no row names, which a crash or a replaced data set leaves behind."""
-        with self._writing() as session:
+        with engine.writing(self.engine) as session:
             named = {file.path for file in robot_rows.named_files(session.connection())}
             for file in [file for name in _FOLDERS for file in (self.folder / name).glob("*")]:
                 if file.is_file() and file.relative_to(self.folder).as_posix() not in named:
@@ -307,25 +317,17 @@ class Workspace:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _writing(self) -> AbstractContextManager[Session]:
-        return engine.writing(self.engine)
-
-    def _store(self, series: Mapping[str, pa.Table], kind: str, activity_id: str | None) -> list[Series]:
-        rows = []
-        for run_id, table in series.items():
-            path, series_id = write_series(self.folder, table)
-            rows.append(
-                Series(
-                    series_id=series_id,
-                    run_id=run_id,
-                    kind=kind,
-                    path=path,
-                    row_count=table.num_rows,
-                    columns=",".join(table.column_names),
-                    activity_id=activity_id,
-                )
-            )
-        return rows
+    def _store(self, run_id: str, table: pa.Table, kind: str, activity_id: str | None = None) -> Series:
+        path, series_id = write_series(self.folder, table)
+        return Series(
+            series_id=series_id,
+            run_id=run_id,
+            kind=kind,
+            path=path,
+            row_count=table.num_rows,
+            columns=",".join(table.column_names),
+            activity_id=activity_id,
+        )
 
     def _holds(self, session: Session, robot_id: str, rows: Sequence[Base]) -> bool:
         """Whether exactly these source rows are stored already, with their series and meshes undamaged."""
@@ -357,11 +359,15 @@ class Workspace:
             kept = robot_rows.base_of(connection)
         if base is None or base == kept:
             return kept
-        with self._writing() as session:
-            try:
-                robot_rows.keep_base(session.connection(), base)
-            except InputError as error:
-                raise InputError(f"{self.folder}: {error}") from None
+        with engine.writing(self.engine) as session:
+            kept = robot_rows.base_of(session.connection())  # another process may have said one meanwhile
+            if base != kept and session.scalar(select(exists().where(RobotRow.robot_id.is_not(None)))):
+                raise InputError(
+                    f"{self.folder}: the individuals of this workspace lie below {kept}, and others may name them so; "
+                    f"they cannot move to {base}: take the data sets into a new workspace with that base"
+                )
+            session.execute(delete(Individuals))
+            session.execute(insert(Individuals).values(base_iri=base))
         return base
 
     def _make_tables(self) -> None:
@@ -371,7 +377,7 @@ class Workspace:
         if not any(table.name in there for table in tables):  # readers need not wait for the lock
             if self.engine.dialect.name == "sqlite":
                 _check_that_nothing_is_lost(self.folder, "its database holds no tables")
-            with self._writing() as session:
+            with engine.writing(self.engine) as session:
                 Base.metadata.create_all(session.connection())
                 stamp(session.connection())
         migrate(self.engine)
@@ -393,7 +399,7 @@ class Workspace:
         """Make the tables that are not there, and anew those of another version: providers can fill them again."""
         outdated = [table for table in tables if table.name in there and not _is_of_now(table, there)]
         if outdated or not all(table.name in there for table in tables):
-            with self._writing() as session:
+            with engine.writing(self.engine) as session:
                 Base.metadata.drop_all(session.connection(), outdated)
                 Base.metadata.create_all(session.connection(), list(tables))
 
@@ -423,8 +429,6 @@ def _is_of_now(table: Table, there: Mapping[str, set[str]]) -> bool:
 
 def _check_that_nothing_is_lost(folder: Path, problem: str = f"{_DATABASE} is missing") -> None:
     """Raise InputError where files lie in a workspace that only a database could have named."""
-    if problem.startswith(_DATABASE) and (folder / _DATABASE).exists():
-        return
     for name in ("graph", *_FOLDERS):
         if next((folder / name).glob("[!.]*"), None) is not None:
             raise InputError(f"{folder}: {problem}, though {name}/ is full; {_FROM_A_BACKUP}")

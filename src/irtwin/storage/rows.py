@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,16 +11,17 @@ from sqlalchemy import (
     Connection,
     Select,
     Table,
+    and_,
     delete,
     exists,
     insert,
     inspect,
     select,
+    true,
     update,
 )
 from sqlalchemy.orm import Session, aliased
 
-from irtwin.errors import InputError
 from irtwin.storage import base_iri
 from irtwin.storage.energy_schema import RunPrice
 from irtwin.storage.schema import (
@@ -110,11 +110,24 @@ def insert_values(session: Session, rows: Tables) -> None:
 
 def recorded_rows(session: Session, robot_id: str) -> Tables:
     """Return the rows of a robot, its data set, its plans and what was derived from them: all but its live runs."""
+    runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, RunRow.kind.not_in(WATCHED_RUNS))
+    activities = select(Activity.activity_id).where(
+        Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
+    )
+    made = set(session.scalars(activities))  # by name: a query within that of each table takes longer to compile
     there = filled(session.connection())
-    return {
-        table.name: [dict(row) for row in session.execute(query).mappings()] if table in there else []
-        for table, query in _recorded(session, robot_id)
-    }
+    found: Tables = {}
+    for table in Base.metadata.sorted_tables:
+        if table.name in (RunRow.__tablename__, Series.__tablename__):
+            recorded: ColumnElement[bool] = table.columns["run_id"].in_(runs)
+        elif "activity_id" in table.columns:
+            recorded = table.columns["activity_id"].in_(made)
+        elif "robot_id" in table.columns:
+            recorded = table.columns["robot_id"] == robot_id
+        else:
+            continue
+        found[table.name] = _rows(session, table, recorded) if table in there else []
+    return found
 
 
 def filled(connection: Connection) -> list[Table]:
@@ -130,9 +143,13 @@ def modelled_of_live_runs(session: Session, robot_id: str) -> Tables:
     """Return the rows of what a robot's twin says of its live runs."""
     made = set(session.scalars(_of_live(robot_id)))
     return {
-        table.name: [dict(row) for row in session.execute(_made_by(table, made)).mappings()] if made else []
+        table.name: _rows(session, table, table.columns["activity_id"].in_(made)) if made else []
         for table in _made_tables()
     }
+
+
+def _rows(session: Session, table: Table, which: ColumnElement[bool]) -> list[Values]:
+    return [dict(row) for row in session.execute(select(table).where(which)).mappings()]
 
 
 def named_files(connection: Connection) -> list[NamedFile]:
@@ -158,32 +175,31 @@ def drop_data_set(session: Session, robot_id: str) -> None:
 
     The robot stays, and so do runs of no data set and the prices of plans among them.
     """
-    kept = select(RunPrice.activity_id).join(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None))
-    _drop(session, robot_id, RunRow.role.is_not(None), set(session.scalars(kept)))
+    prices = select(RunPrice.activity_id).join(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None))
+    made = and_(Activity.provider != LIVE, Activity.activity_id.not_in(prices))
+    _drop(session, robot_id, RunRow.role.is_not(None), made)
 
 
 def drop_recorded(session: Session, robot_id: str) -> None:
     """Drop all that `recorded_rows` returns but the robot itself."""
-    _drop(session, robot_id, RunRow.kind.not_in(WATCHED_RUNS))
-
-
-def _drop(session: Session, robot_id: str, which: ColumnElement[bool], kept: AbstractSet[str] = frozenset()) -> None:
-    made = select(Activity.activity_id).where(Activity.robot_id == robot_id, Activity.provider != LIVE)
-    drop_activities(session, set(session.scalars(made)) - kept)
-    runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, which)
-    session.execute(delete(Series).where(Series.run_id.in_(runs)))
-    session.execute(delete(RunRow).where(RunRow.robot_id == robot_id, which))
-    _drop_parts(session, robot_id)
+    _drop(session, robot_id, RunRow.kind.not_in(WATCHED_RUNS), Activity.provider != LIVE)
 
 
 def drop_robot(session: Session, robot_id: str) -> None:
     """Drop a robot and all that is known of it."""
-    made = select(Activity.activity_id).where(Activity.robot_id == robot_id)
+    _drop(session, robot_id, true(), true())
+    session.execute(delete(RobotRow).where(RobotRow.robot_id == robot_id))
+
+
+def _drop(session: Session, robot_id: str, runs: ColumnElement[bool], activities: ColumnElement[bool]) -> None:
+    """Drop some of a robot's runs and activities, and its parts."""
+    made = select(Activity.activity_id).where(Activity.robot_id == robot_id, activities)
     drop_activities(session, set(session.scalars(made)))
-    session.execute(delete(Series).where(Series.run_id.in_(select(RunRow.run_id).where(RunRow.robot_id == robot_id))))
-    _drop_parts(session, robot_id)
-    for kind in (RunRow, RobotRow):
-        session.execute(delete(kind).where(kind.robot_id == robot_id))
+    dropped = RunRow.robot_id == robot_id, runs
+    session.execute(delete(Series).where(Series.run_id.in_(select(RunRow.run_id).where(*dropped))))
+    session.execute(delete(RunRow).where(*dropped))
+    for table in part_tables():
+        session.execute(delete(table).where(table.columns["robot_id"] == robot_id))
 
 
 def drop_run(session: Session, run_id: str, subject: str) -> None:
@@ -205,11 +221,6 @@ def release_plans(session: Session, robot_id: str) -> None:
             .values({column: None, **also})
             .execution_options(synchronize_session=False)
         )
-
-
-def _drop_parts(session: Session, robot_id: str) -> None:
-    for table in part_tables():
-        session.execute(delete(table).where(table.columns["robot_id"] == robot_id))
 
 
 def drop_activities(session: Session, activities: set[str]) -> None:
@@ -243,33 +254,12 @@ def with_dependents(session: Session, activities: set[str]) -> set[str]:
     return whole
 
 
-def _recorded(session: Session, robot_id: str) -> Iterator[tuple[Table, Select[Any]]]:
-    """Yield each table with the query of a robot's rows in it, without its live runs'."""
-    runs = select(RunRow.run_id).where(RunRow.robot_id == robot_id, RunRow.kind.not_in(WATCHED_RUNS))
-    activities = select(Activity.activity_id).where(
-        Activity.robot_id == robot_id, Activity.provider != LIVE, Activity.activity_id.not_in(_of_live(robot_id))
-    )
-    made = set(session.scalars(activities))  # by name: a query within that of each table takes longer to compile
-    for table in Base.metadata.sorted_tables:
-        rows = select(table)
-        if table.name == RunRow.__tablename__ or table.name == Series.__tablename__:
-            yield table, rows.where(table.columns["run_id"].in_(runs))
-        elif "activity_id" in table.columns:
-            yield table, _made_by(table, made)
-        elif "robot_id" in table.columns:
-            yield table, rows.where(table.columns["robot_id"] == robot_id)
-
-
 def _of_live(robot_id: str) -> Select[Any]:
     """Return the query of the activities in which a twin worked out the energy of a robot's live runs."""
     energies = (
         select(RunEnergy.activity_id).join(RunRow).where(RunRow.robot_id == robot_id, RunRow.kind.in_(WATCHED_RUNS))
     )
     return energies.where(RunEnergy.twin_id.is_not(None))
-
-
-def _made_by(table: Table, activities: AbstractSet[str]) -> Select[Any]:
-    return select(table).where(table.columns["activity_id"].in_(activities))
 
 
 def _made_tables() -> list[Table]:
@@ -280,17 +270,3 @@ def base_of(connection: Connection) -> str:
     """Return the base that a database keeps; the default where none was said."""
     base: str | None = connection.scalar(select(Individuals.base_iri))
     return base or base_iri.DEFAULT
-
-
-def keep_base(connection: Connection, base: str) -> None:
-    """Keep a base. Raises InputError where robots have another one already."""
-    current = base_of(connection)
-    if base == current:
-        return
-    if connection.scalar(select(exists().where(RobotRow.robot_id.is_not(None)))):
-        raise InputError(
-            f"the individuals of this workspace lie below {current}, and others may name them so; they cannot move to "
-            f"{base}: take the data sets into a new workspace with that base"
-        )
-    connection.execute(delete(Individuals))
-    connection.execute(insert(Individuals).values(base_iri=base))
