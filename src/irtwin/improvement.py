@@ -9,13 +9,13 @@ from irtwin.announce import Announce
 from irtwin.location import Location
 from irtwin.modelling import sound
 from irtwin.next_experiment import NextExperiment, next_experiment
-from irtwin.providers.improvement import Round
 from irtwin.providers.improvement import improve as improve_twin
 from irtwin.providers.names import check_run_name, find_robot
 from irtwin.providers.records import keep_run, load_robot, load_twin
 from irtwin.rewriting import fill, rewriting
 from irtwin.signals.log import read_log
 from irtwin.storage.database import Workspace
+from irtwin.storage.schema import ImprovementRound
 from irtwin.storage.staging import staged
 from irtwin.workflow import populate_apart, write_report
 
@@ -27,7 +27,7 @@ class Improvement:
     report: the robot's energy report.
     """
 
-    rounds: tuple[Round, ...]
+    rounds: tuple[ImprovementRound, ...]
     within: bool
     limit: float
     next: NextExperiment | None
@@ -69,9 +69,9 @@ def improve(
             with staged(place, robot_id) as apart:
                 for run in runs:
                     keep_run(apart, robot_id, known.joint_names, run)
-                improved = improve_twin(apart, robot_id, [run.name for run in runs], limit, announce)
+                rounds, within = improve_twin(apart, robot_id, [run.name for run in runs], limit, announce)
                 populate_apart(apart, announce)
             fill(place, graph, announce)  # live runs by the new twin
             following = next_experiment(place, graph, robot_id)
         report = write_report(place, robot_id)
-        return Improvement(improved.rounds, improved.within, limit, following, report)
+        return Improvement(rounds, within, limit, following, report)

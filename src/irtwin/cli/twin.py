@@ -351,7 +351,8 @@ def improve(robot: str, new_log: Path | None, location: Location, **asked: Any) 
     improved = improvement.improve(robot, new_log, location, announce=announce, **asked)
     for number, trial in enumerate(improved.rounds, start=1):
         click.echo(
-            f"round {number}, {trial.tried}: {trial.before:.3g} % before, {trial.after:.3g} % after; {trial.outcome}"
+            f"round {number}, {trial.tried}: {trial.error_before_percent:.3g} % before, "
+            f"{trial.error_after_percent:.3g} % after; {trial.outcome}"
         )
     if improved.within:
         click.echo(f"The twin is within the limit of {improved.limit:g} % on every run.")

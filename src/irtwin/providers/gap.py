@@ -54,10 +54,8 @@ def record(
         joints = session.scalars(select(JointRow).where(JointRow.robot_id == robot_id)).all()
     row, parts, documents = _rows(robot_id, joints, runs, diagnosis, curves, twin, motion)
     used = inputs(workspace, robot_id, [run.run_id for run in runs])
-    diagnosis_id = row.diagnosis_id
     keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)
-    with workspace.reading() as session:
-        return session.get_one(GapDiagnosis, diagnosis_id)
+    return row
 
 
 def unrecorded(data_set: DataSet, diagnosis: Document, curves: Curves) -> tuple[list[Base], dict[str, bytes]]:
@@ -115,7 +113,11 @@ def _rows(
     motion: str | None = None,
 ) -> tuple[GapDiagnosis, list[OfDiagnosis], dict[str, bytes]]:
     """Return the row of a diagnosis, those of its parts, and the documents that it names, by their path."""
-    texts = _texts(diagnosis, curves, twin, motion)
+    given = {
+        ".json": _text(diagnosis.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
+        ".motion.csv": motion,
+    }  # fmt: skip
+    texts = {ending: text for ending, text in given.items() if text is not None}
     sums = {kind: hashlib.sha256(text.encode()).hexdigest() for kind, text in texts.items()}
     diagnosis_id = f"{robot_id}.{sums['.json'][:12]}"
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}" for kind in texts}
@@ -137,15 +139,6 @@ def _rows(
     )
     documents = {files[kind]: text.encode() for kind, text in texts.items()}
     return row, [*gap_rows.rows(diagnosis, curves, of)], documents
-
-
-def _texts(document: Document, curves: Curves, twin: str | None, motion: str | None) -> dict[str, str]:
-    """Return the files that hold a diagnosis, by their endings."""
-    given = {
-        ".json": _text(document.to_json()), ".evidence.json": _text(curves.to_json()), ".twin.json": twin,
-        ".motion.csv": motion,
-    }  # fmt: skip
-    return {kind: text for kind, text in given.items() if text is not None}
 
 
 def _run_id(runs: Mapping[str, str], name: str) -> str:

@@ -30,27 +30,8 @@ from irtwin.twin.identify import identify
 from irtwin.twin.twin import Twin
 from irtwin.twin.validate import validate
 
-WITHIN, BETTER, NO_BETTER = "within the limit", "better", "no better"
 _SAME, _CHOSEN, _DIAGNOSED = "same effects", "effects that the data show", "effects of a diagnosis"
 _ROUNDS = "improvement_round/"
-
-
-@dataclass(frozen=True)
-class Round:
-    """A try: what was fitted, the worst energy error on what neither twin was fitted to (%), and how it ended."""
-
-    tried: str
-    before: float
-    after: float
-    outcome: str
-
-
-@dataclass(frozen=True)
-class Improved:
-    """The rounds, and whether the twin is within the limit on every run."""
-
-    rounds: tuple[Round, ...]
-    within: bool
 
 
 @dataclass
@@ -64,8 +45,10 @@ class _Twin:
 
 def improve(
     workspace: Workspace, robot_id: str, names: Sequence[str], limit: float, announce: Announce = lambda line: None
-) -> Improved:
+) -> tuple[tuple[ImprovementRound, ...], bool]:
     """Better a robot's twin by new logs that the workspace holds already, `names`; limit: energy error, %.
+
+    Returns the rounds, and whether the twin is within the limit on every run.
 
     A round fits the effects of the twin again. Where that leaves it beyond the limit, another chooses them anew, if
     nobody named them, and one adds the effects that a diagnosis of the fitted data finds. A twin that is no better than
@@ -97,7 +80,7 @@ def improve(
                 loop.try_out(_DIAGNOSED, lambda: fit(effects), parts)
     _, made = twin_made(workspace, robot_id, loop.best.twin, known, loop.best.parts)  # the parts that runs now take
     keep(workspace, "identification", made, datetime.now(UTC), instead_of="adoption")
-    return Improved(tuple(loop.rounds), loop.within)
+    return tuple(loop.rounds), loop.within
 
 
 @dataclass
@@ -110,7 +93,7 @@ class _Loop:
     limit: float
     announce: Announce
     best: _Twin
-    rounds: list[Round] = field(default_factory=list)
+    rounds: list[ImprovementRound] = field(default_factory=list)
 
     @property
     def within(self) -> bool:
@@ -127,34 +110,31 @@ class _Loop:
         earlier = self.best.twin_id
         if after < before:
             self.best = fitted
-        outcome = NO_BETTER if after >= before else WITHIN if self.within else BETTER
-        self.rounds.append(Round(tried, before, after, outcome))
+        outcome = "no better" if after >= before else "within the limit" if self.within else "better"
         self.announce(
             f"  worst energy error on what neither was fitted to: {before:.3g} %, then {after:.3g} %: {outcome}"
         )
-        row = self._row(self.rounds[-1], earlier, fitted)
+        of_robot = ImprovementRound.robot_id == self.robot_id
+        with self.workspace.reading() as session:
+            number = 1 + (session.scalar(select(func.max(ImprovementRound.number)).where(of_robot)) or 0)
+        row = ImprovementRound(
+            round_id=f"{self.robot_id}.{number}",
+            robot_id=self.robot_id,
+            number=number,
+            tried=tried,
+            effects=",".join(twin.effect_ids),
+            earlier_twin_id=earlier,
+            tried_twin_id=fitted.twin_id,
+            error_before_percent=before,
+            error_after_percent=after,
+            limit_percent=self.limit,
+            outcome=outcome,
+        )
+        self.rounds.append(row)
         read = {motion.run for motion in (*parts.fit, *parts.held_out)}
         run_ids = [run_id for name, run_id in self.known.keys.items() if name in read]
         used = [twin_iri(earlier), *inputs(self.workspace, self.robot_id, run_ids)]
         keep(self.workspace, "improvement", Made(self.robot_id, used, [row]), started, f"{_ROUNDS}{row.round_id}")
-
-    def _row(self, tried: Round, earlier: str, fitted: _Twin) -> ImprovementRound:
-        of_robot = ImprovementRound.robot_id == self.robot_id
-        with self.workspace.reading() as session:
-            last = session.scalar(select(func.max(ImprovementRound.number)).where(of_robot)) or 0
-        return ImprovementRound(
-            round_id=f"{self.robot_id}.{last + 1}",
-            robot_id=self.robot_id,
-            number=last + 1,
-            tried=tried.tried,
-            effects=",".join(fitted.twin.effect_ids),
-            earlier_twin_id=earlier,
-            tried_twin_id=fitted.twin_id,
-            error_before_percent=tried.before,
-            error_after_percent=tried.after,
-            limit_percent=self.limit,
-            outcome=tried.outcome,
-        )
 
 
 def _parts_before(workspace: Workspace, known: RobotMotions, twin_id: str, new: Sequence[str]) -> Split:
