@@ -77,7 +77,7 @@ class Resource:
 
     @property
     def asked(self) -> str:
-        """By which name the user trusts it."""
+        """Folder and name: by this the user trusts it."""
         return f"{self.kind}/{self.name}"
 
     def __str__(self) -> str:
@@ -102,9 +102,9 @@ class Resources:
         """Return the files of a folder whose names have an ending."""
         return tuple(file for file in self.files if file.kind == kind and file.name.endswith(ending))
 
-    def paths(self, kind: str, ending: str = "") -> list[Path]:
+    def paths(self, kind: str) -> list[Path]:
         """Return where the files of a folder lie."""
-        return [file.path for file in self.of(kind, ending)]
+        return [file.path for file in self.of(kind)]
 
     def path(self, kind: str, name: str) -> Path:
         """Return where one file lies."""
@@ -161,7 +161,7 @@ def shipped() -> Resources:
 
 @cache
 def _installed() -> Resources:
-    known, brought = shipped(), dict[tuple[str, str], str]()
+    known, brought = shipped(), dict[str, str]()
     for point in sorted(entry_points(group=GROUP), key=lambda point: (point.value, point.name)):
         origin = f"{point.dist.name} {point.dist.version}" if point.dist else point.value
         spec = find_spec(point.value)
@@ -171,20 +171,17 @@ def _installed() -> Resources:
             )
         own = _found(Path(next(iter(spec.submodule_search_locations))), origin)
         for file in own:
-            other = brought.setdefault((file.kind, file.name), origin)
+            other = brought.setdefault(file.asked, origin)
             if other != origin:
-                raise InputError(
-                    f"{file.path}: {other} brings {file.kind}/{file.name} too; take one of the packages out"
-                )
+                raise InputError(f"{file.path}: {other} brings {file.asked} too; take one of the packages out")
         known = _joined(known, own)
     return known
 
 
 def _joined(known: Resources, added: Iterable[Resource]) -> Resources:
-    files = {(file.kind, file.name): file for file in known.files}
+    files = {file.asked: file for file in known.files}
     for file in added:
-        key = (file.kind, file.name)
-        files[key] = replace(file, replaces=key in files)
+        files[file.asked] = replace(file, replaces=file.asked in files)
     order = list(KINDS)
     return Resources(tuple(sorted(files.values(), key=lambda file: (order.index(file.kind), file.name))))
 

@@ -107,7 +107,9 @@ def _planned(workspace: Workspace, run: RunRow, twin_id: str, twin: Twin) -> Mad
     run_id, scaled = run.run_id, run.time_scaling_of
     motion = condition(load_run(workspace, twin.robot, run_id), twin.robot, twin.cutoff)
     taken = cost(twin, [motion])
-    saved = None if scaled is None else _saving(workspace, scaled, twin, motion)
+    saved = None
+    if scaled is not None and twin.knows_power:  # against the run as it was, and rest until the scaled one would end
+        saved = saving(twin, motion, condition(load_run(workspace, twin.robot, scaled), twin.robot, twin.cutoff))
     row = RunPrice(
         run_id=run_id,
         twin_id=twin_id,
@@ -124,17 +126,6 @@ def _planned(workspace: Workspace, run: RunRow, twin_id: str, twin: Twin) -> Mad
         rows=[row],
         series={run_id: modelled_series(twin, motion, nothing)},
     )
-
-
-def _saving(workspace: Workspace, scaled: str, twin: Twin, motion: Motion) -> Figure | None:
-    """Return what a time scaling of a run saves against the run as it was, and standing still until the scaling ends.
-
-    None where the twin knows nothing of power.
-    """
-    if not twin.knows_power:
-        return None
-    quick = condition(load_run(workspace, twin.robot, scaled), twin.robot, twin.cutoff)
-    return saving(twin, motion, quick)
 
 
 def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 
 from sqlalchemy import select
 
@@ -19,7 +18,7 @@ from irtwin.providers import gap_rows
 from irtwin.providers.gap_rows import Of
 from irtwin.providers.identification import twin_made
 from irtwin.providers.motions import robot_motions
-from irtwin.providers.names import identifier, robot_iri
+from irtwin.providers.names import robot_iri
 from irtwin.providers.provider import Made, activity, keep
 from irtwin.providers.records import inputs, rows_of
 from irtwin.signals.log import DataSet
@@ -122,7 +121,7 @@ def _rows(
     diagnosis_id = f"{robot_id}.{sums['.json'][:12]}"
     files = {kind: f"{DIAGNOSES}/{diagnosis_id}{kind}" for kind in texts}
     ids = {run.run_id.removeprefix(f"{robot_id}."): run.run_id for run in runs}
-    of = Of(diagnosis_id, robot_id, partial(_run_id, ids), {joint.name: joint.kind for joint in joints})
+    of = Of(diagnosis_id, robot_id, ids, {joint.name: joint.kind for joint in joints})
     row = GapDiagnosis(
         diagnosis_id=diagnosis_id,
         robot_id=robot_id,
@@ -139,14 +138,6 @@ def _rows(
     )
     documents = {files[kind]: text.encode() for kind, text in texts.items()}
     return row, [*gap_rows.rows(diagnosis, curves, of)], documents
-
-
-def _run_id(runs: Mapping[str, str], name: str) -> str:
-    if identifier(name) not in runs:
-        raise InputError(
-            f'run "{name}" of the diagnosis is not in the workspace; run `irtwin run` on its data set first'
-        )
-    return runs[identifier(name)]
 
 
 def _text(value: object) -> str:

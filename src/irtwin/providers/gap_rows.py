@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,21 +12,27 @@ from irtwin.document.document import Document
 from irtwin.document.tables import DOCUMENT, OF_CURVES, Column, Table, reached
 from irtwin.document.words import UNITS
 from irtwin.errors import InputError
+from irtwin.providers.names import identifier
 from irtwin.storage.gap_schema import CLASSES, OfDiagnosis
 from irtwin.storage.rows import Values
 
 
 @dataclass(frozen=True)
 class Of:
-    """What the rows of a diagnosis belong to; `run_id` gives a run's, by its name in the document.
-
-    `joints` of the robot, with their kinds.
-    """
+    """What the rows of a diagnosis belong to; `runs` by their identifiers, `joints` of the robot with their kinds."""
 
     diagnosis_id: str
     robot_id: str
-    run_id: Callable[[str], str]
+    runs: Mapping[str, str]
     joints: Mapping[str, str]
+
+    def run_id(self, name: str) -> str:
+        """Return the run_id of a run, by its name in the document. Raises InputError where it is not there."""
+        if identifier(name) not in self.runs:
+            raise InputError(
+                f'run "{name}" of the diagnosis is not in the workspace; run `irtwin run` on its data set first'
+            )
+        return self.runs[identifier(name)]
 
     def unit(self, word: str, joint: str | None) -> str:
         """Return the unit of what a word says, of the whole robot or at a joint."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 from xml.etree import ElementTree
 
 import numpy as np
@@ -117,20 +117,11 @@ def scatter(data: Data, deviations: dict[str, float], rng: np.random.Generator) 
 def read_drawings(file: Path, urdf: Path) -> Drawings:
     """Read a robot's drawings, a TOML file, and its URDF."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
-    parts = {
-        "tolerance": Tolerance,
-        "drive": DriveData,
-        "friction": FrictionData,
-        "thermal": ThermalData,
-        "control": ControlData,
-        "supply": SupplyData,
-        "sensors": SensorData,
-    }
-    for key, part in parts.items():
-        table[key] = _typed(part, table[key])
-    table["urdf"] = _bodies(urdf.read_text(encoding="utf-8"))
-    table["acceleration"] = np.asarray(table["acceleration"], dtype=float)
-    return Drawings(**table)
+    for name, part in get_type_hints(Drawings).items():
+        if isinstance(part, type) and is_dataclass(part):
+            table[name] = _typed(part, table[name])
+    drawings: Drawings = _typed(Drawings, table | {"urdf": _bodies(urdf.read_text(encoding="utf-8"))})
+    return drawings
 
 
 def _bodies(urdf: str) -> str:
