@@ -84,9 +84,7 @@ def proposal_files(place: Workspace, robot_id: str) -> tuple[InsidePath, InsideP
 
 def _designed(place: Workspace, robot_id: str, out: InsidePath) -> list[str]:
     """Write the motion of the diagnosis' programme; return how to play it. Nothing where no diagnosis designed any."""
-    with place.reading() as session:
-        of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
-        row = session.scalars(of_robot).one_or_none()
+    row = place.first(select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id))
     if row is None:
         return []
     document = parse_json(place.read_document(row.file, row.sha256))

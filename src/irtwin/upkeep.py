@@ -102,8 +102,7 @@ def _check_that_it_may_go(place: Workspace, run: RunRow) -> None:
         )
     if run.kind == MEASURED_RUN:
         raise InputError(f'{place.folder}: the twin was bettered or judged by "{run.name}"; it goes with its robot')
-    with place.reading() as session:
-        done = session.scalars(select(RunRow).where(RunRow.performs == run.run_id)).first()
+    done = place.first(select(RunRow).where(RunRow.performs == run.run_id))
     if done is not None:
         of_data_set = "take its `performs` out of the data set first"
         first = "remove that one first" if done.kind in WATCHED_RUNS else of_data_set if done.role else "both stay"

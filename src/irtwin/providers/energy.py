@@ -29,16 +29,14 @@ from irtwin.twin.validate import validate
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's energy, its ledger, and its modelled series; of a live run its gap as well; of a plan its price."""
-    with workspace.reading() as session:
-        run = session.get_one(RunRow, run_id)
+    run = workspace.row(RunRow, run_id)
     if run.kind in WATCHED_RUNS:
         return live_energy.provide(workspace, run_id)
     robot_id = run.robot_id
     twin_id, twin = load_twin(workspace, robot_id)
     if run.kind == PLANNED_RUN:
         return _planned(workspace, run, twin_id, twin)
-    with workspace.reading() as session:
-        role = session.get_one(TwinRun, (twin_id, run_id))
+    role = workspace.row(TwinRun, (twin_id, run_id))
     motion = robot_motions(workspace, robot_id).motions[run_id]
     entries = account(twin, motion)
     shares = [share for entry in entries for share in entry.shares]
@@ -137,9 +135,7 @@ def _figure(name: str, unit: str, figure: Figure) -> dict[str, float | None]:
 
 def stored_price(workspace: Workspace, run_id: str) -> Price | None:
     """Return what a planned run takes, as it was stored; None where its robot's twin knows nothing of power."""
-    with workspace.reading() as session:
-        seconds = session.get_one(RunRow, run_id).run_time_s
-        row = session.get_one(RunPrice, run_id)
+    row = workspace.row(RunPrice, run_id)
     if row.energy_from != "modelled":
         return None
 
@@ -147,7 +143,7 @@ def stored_price(workspace: Workspace, run_id: str) -> Price | None:
         return Figure(value, None if upper is None else upper - value)
 
     return Price(
-        seconds,
+        workspace.row(RunRow, run_id).run_time_s,
         energy=figure(row.energy_j, row.energy_upper_j),
         peak=figure(row.peak_power_w, row.peak_power_upper_w),
         mean=figure(row.mean_power_w, row.mean_power_upper_w),

@@ -81,9 +81,7 @@ def adopt(workspace: Workspace, robot_id: str) -> str:
     Raises InputError where there is no diagnosis, or it added nothing to the twin.
     """
     started = datetime.now(UTC)
-    with workspace.reading() as session:
-        of_robot = select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id)
-        diagnosis = session.scalars(of_robot).one_or_none()
+    diagnosis = workspace.first(select(GapDiagnosis).where(GapDiagnosis.robot_id == robot_id))
     if diagnosis is None:
         raise InputError(f"{robot_id}: no diagnosis in {workspace.folder}; run `irtwin diagnose` with it first")
     if diagnosis.twin_file is None or diagnosis.twin_sha256 is None:

@@ -139,11 +139,8 @@ class _Loop:
 
 def _parts_before(workspace: Workspace, known: RobotMotions, twin_id: str, new: Sequence[str]) -> Split:
     """Return the parts that runs took in a twin; new logs are held out of it."""
-    with workspace.reading() as session:
-        rows = session.scalars(select(TwinRun).where(TwinRun.twin_id == twin_id)).all()
-        rule = session.get_one(TwinRow, twin_id).split
     fit, held_out = [], []
-    for row in rows:
+    for row in workspace.all(select(TwinRun).where(TwinRun.twin_id == twin_id)):
         motion = known.motions[row.run_id]
         cut = None if row.held_out_from_s is None else int((motion.time < row.held_out_from_s).sum())
         if row.part in ("fit", "both"):
@@ -151,7 +148,7 @@ def _parts_before(workspace: Workspace, known: RobotMotions, twin_id: str, new: 
         if row.part in ("held_out", "both"):
             held_out.append(motion if cut is None else motion.part(cut, len(motion.time)))
     held_out += [motion for motion in known.motions.values() if motion.run in new]
-    return Split(tuple(fit), tuple(held_out), rule)
+    return Split(tuple(fit), tuple(held_out), workspace.row(TwinRow, twin_id).split)
 
 
 def _parts_with(known: RobotMotions, before: Split, new: Sequence[str]) -> Split:

@@ -29,7 +29,6 @@ from irtwin.storage.schema import (
     LIVE_RUN,
     GapExcursion,
     GapState,
-    JointRow,
     RunEnergy,
     RunRow,
     TwinRun,
@@ -193,10 +192,8 @@ def used(run_id: str, known: KnownTwin | None) -> list[str]:
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make the energy, the ledger, the gap and the modelled series of a live run that is stored."""
-    with workspace.reading() as session:
-        run = session.get_one(RunRow, run_id)
-        in_order = select(JointRow.name).where(JointRow.robot_id == run.robot_id).order_by(JointRow.position)
-        joints = tuple(session.scalars(in_order))
+    run = workspace.row(RunRow, run_id)
+    joints = records.joint_names(workspace, run.robot_id)
     known = known_twin(workspace, run.robot_id)
     com = (run.payload_com_x_m, run.payload_com_y_m, run.payload_com_z_m)
     energy = LiveEnergy(run_id, run.robot_id, joints, known, run.payload_kg, com, run.kind)
@@ -251,8 +248,7 @@ def _bands(workspace: Workspace, twin_id: str, joints: tuple[str, ...]) -> dict[
         .order_by(RunRow.start_time.desc())
         .limit(_MOST_RUNS)
     )
-    with workspace.reading() as session:
-        runs = session.scalars(newest).all()
+    runs = workspace.all(newest)
     of_runs = [band(windows) for run_id in runs if len(windows := _windows(workspace, run_id, joints))]
     if not of_runs:
         return {}

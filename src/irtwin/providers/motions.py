@@ -60,12 +60,10 @@ def robot_motions(workspace: Workspace, robot_id: str) -> RobotMotions:
 def _conditioned(workspace: Workspace, robot_id: str) -> RobotMotions:
     robot = load_robot(workspace, robot_id)
     in_order = select(RunRow.run_id).order_by(RunRow.start_time, RunRow.run_id)
-    with workspace.reading() as session:
-        stated = session.get_one(RobotRow, robot_id).cutoff_hz
-        run_ids = session.scalars(in_order.where(RunRow.robot_id == robot_id, RunRow.kind == MEASURED_RUN)).all()
+    run_ids = workspace.all(in_order.where(RunRow.robot_id == robot_id, RunRow.kind == MEASURED_RUN))
     runs = {run_id: load_run(workspace, robot, run_id) for run_id in run_ids}
     own = own_runs(list(runs.values()))
-    cutoff = cutoff_for(robot, own, stated)
+    cutoff = cutoff_for(robot, own, workspace.row(RobotRow, robot_id).cutoff_hz)
     motions = {run_id: condition(run, robot, cutoff.hz) for run_id, run in runs.items()}
     own_names = {run.name for run in own}
     return RobotMotions(

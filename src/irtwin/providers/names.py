@@ -58,10 +58,7 @@ def find_run(workspace: Workspace, robot_id: str, name: str, kind: str | None = 
     kind: PLANNED_RUN or MEASURED_RUN.
     """
     of_robot = select(RunRow).where(RunRow.robot_id == robot_id)
-    with workspace.reading() as session:
-        rows = session.scalars(of_robot if kind is None else of_robot.where(RunRow.kind == kind))
-        known = {row.name: row for row in rows}
-        session.expunge_all()
+    known = {row.name: row for row in workspace.all(of_robot if kind is None else of_robot.where(RunRow.kind == kind))}
     for row in known.values():
         if name == row.run_id or identifier(row.name) == identifier(name):
             return row
@@ -82,9 +79,7 @@ def check_name(workspace: Workspace, name: str) -> None:
 
 def check_run_name(workspace: Workspace, robot_id: str, name: str) -> None:
     """Raise InputError where a robot has a run of this name, in any form of Unicode, upper or lower case."""
-    with workspace.reading() as session:
-        known = session.scalars(select(RunRow.name).where(RunRow.robot_id == robot_id)).all()
-    for other in known:
+    for other in workspace.all(select(RunRow.name).where(RunRow.robot_id == robot_id)):
         if _folded(other) == _folded(name):
             raise InputError(f'{workspace.folder}: the robot has a run "{other}" already; choose another name')
 

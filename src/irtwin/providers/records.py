@@ -150,14 +150,11 @@ def keep_run(workspace: Workspace, robot_id: str, joint_names: Sequence[str], ru
 
 def _check_kept_runs(workspace: Workspace, robot_id: str, data_set: log.DataSet, runs: Sequence[RunRow]) -> None:
     """Raise InputError where a data set does not go with the runs of no data set that the workspace keeps."""
-    with workspace.reading() as session:
-        kept = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None))).all()
-        joints = session.scalars(
-            select(JointRow.name).where(JointRow.robot_id == robot_id).order_by(JointRow.position)
-        ).all()
+    kept = workspace.all(select(RunRow).where(RunRow.robot_id == robot_id, RunRow.role.is_(None)))
+    joints = joint_names(workspace, robot_id)
     plans = {row.run_id: row.name for row in kept if row.kind == PLANNED_RUN}
     toml = data_set.folder / "dataset.toml"
-    if any(row.kind not in WATCHED_RUNS for row in kept) and tuple(joints) != data_set.robot.joint_names:
+    if any(row.kind not in WATCHED_RUNS for row in kept) and joints != data_set.robot.joint_names:
         raise InputError(
             f"{toml}: the workspace keeps runs of this robot with the joints {', '.join(joints)}; remove the robot "
             "with `irtwin workspace drop` first, or give it another name"
@@ -187,8 +184,7 @@ def inputs(workspace: Workspace, robot_id: str, run_ids: Iterable[str]) -> list[
 
 def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robot) -> log.DataSet:
     """Return what the data set of a robot said, but for its runs."""
-    with workspace.reading() as session:
-        row = session.get_one(RobotRow, robot_id)
+    row = workspace.row(RobotRow, robot_id)
     notes = parse_json(row.notes)
     return log.DataSet(
         folder=Path(robot_id),
@@ -206,8 +202,13 @@ def stored_data_set(workspace: Workspace, robot_id: str, robot: description.Robo
 
 def is_described(workspace: Workspace, robot_id: str) -> bool:
     """Whether a robot's joints are known; they are not where a meter alone was logged."""
-    with workspace.reading() as session:
-        return bool(session.get_one(RobotRow, robot_id).urdf)
+    return bool(workspace.row(RobotRow, robot_id).urdf)
+
+
+def joint_names(workspace: Workspace, robot_id: str) -> tuple[str, ...]:
+    """Return the names of a robot's joints, base to flange."""
+    in_order = select(JointRow.name).where(JointRow.robot_id == robot_id).order_by(JointRow.position)
+    return tuple(workspace.all(in_order))
 
 
 def load_robot(workspace: Workspace, robot_id: str) -> description.Robot:
@@ -243,8 +244,7 @@ def _with_sheets(robot: description.Robot, row: RobotRow, sheets: Mapping[str, J
 
 def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log.Run:
     """Give back a run with its signals, measured or planned."""
-    with workspace.reading() as session:
-        row = session.get_one(RunRow, run_id)
+    row = workspace.row(RunRow, run_id)
     planned = row.kind == PLANNED_RUN
     samples = workspace.read_series(run_id, PLANNED if planned else MEASURED)
     return log.Run(
@@ -282,8 +282,7 @@ def load_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin]:
 
 def known_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin] | None:
     """Give back a robot's twin with its twin_id; None where it has none. Raises InputError where its file is gone."""
-    with workspace.reading() as session:
-        row = session.scalars(select(TwinRow).where(TwinRow.robot_id == robot_id)).one_or_none()
+    row = workspace.first(select(TwinRow).where(TwinRow.robot_id == robot_id))
     if row is None:
         return None
     document = workspace.read_document(row.file, row.sha256)

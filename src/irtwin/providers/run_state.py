@@ -17,8 +17,7 @@ from irtwin.storage.schema import SIMULATED, JointState, RunEnergy, RunRow, RunS
 
 def provide(workspace: Workspace, run_id: str) -> Made:
     """Make a run's RunState and the JointState of each joint at its last sample; of a meter's log what power says."""
-    with workspace.reading() as session:
-        run = session.get_one(RunRow, run_id)
+    run = workspace.row(RunRow, run_id)
     robot_id = run.robot_id
     if not is_described(workspace, robot_id):
         return _metered(workspace, run)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import pyarrow as pa
-from sqlalchemy import URL, Engine, Table, delete, exists, func, insert, select, update
+from sqlalchemy import URL, Engine, Select, Table, delete, exists, insert, select, update
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -43,6 +43,7 @@ from irtwin.storage.schema import (
 from irtwin.storage.series import FOLDER, is_whole, read_series, write_series
 from irtwin.storage.structure_schema import LinkShape
 
+T = TypeVar("T")
 Outcome = Literal["new", "unchanged", "replaced"]
 _DATABASE = "irtwin.db"
 _FROM_A_BACKUP = (
@@ -137,8 +138,7 @@ class Workspace:
 
     def knows_robots(self) -> bool:
         """Whether the database knows of any robot."""
-        with self.reading() as session:
-            return bool(session.scalar(select(func.count()).select_from(RobotRow)))
+        return self.first(select(RobotRow.robot_id)) is not None
 
     @property
     def mapped_rows(self) -> Path:
@@ -160,6 +160,21 @@ class Workspace:
     def reading(self) -> Session:
         """Give a session to read with, which its block closes; nothing done in it is kept."""
         return Session(self.engine)
+
+    def row(self, kind: type[T], key: Any) -> T:
+        """Return the row of a class by its key. NoResultFound where there is none."""
+        with self.reading() as session:
+            return session.get_one(kind, key)
+
+    def all(self, query: Select[T]) -> Sequence[T]:
+        """Return all that a query of one class or column finds."""
+        with self.reading() as session:
+            return session.scalars(query).all()
+
+    def first(self, query: Select[T]) -> T | None:
+        """Return the first that such a query finds."""
+        with self.reading() as session:
+            return session.scalars(query).first()
 
     def ingest(
         self,
@@ -252,11 +267,10 @@ class Workspace:
             robot_rows.insert_rows(session, [run, stored])
             robot_rows.insert_values(session, rows or {})
 
-    def facts_about(self, robot_id: str) -> list[AssertedFact]:
+    def facts_about(self, robot_id: str) -> Sequence[AssertedFact]:
         """Return the facts that rows of a robot follow, the earliest first."""
         followed = AssertedFact.about_robot == robot_id, AssertedFact.place.is_not(None)
-        with self.reading() as session:
-            return list(session.scalars(select(AssertedFact).where(*followed).order_by(AssertedFact.time)))
+        return self.all(select(AssertedFact).where(*followed).order_by(AssertedFact.time))
 
     def keep_facts(self, facts: Sequence[AssertedFact], withdrawn: Iterable[str]) -> None:
         """Keep what a user asserted, with the rows that follow; drop what was taken back, by `fact_id`."""
