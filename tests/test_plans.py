@@ -229,8 +229,7 @@ def test_a_live_run_outlasts_the_plan_of_an_earlier_data_set(watched: Path, tmp_
             connection.execute(later.values(performs="arm_2.later"))
         with staged(place, "arm_2") as apart:
             ingest(apart, read_data_set(write(tmp_path / "logs", recorded())))
-        with place.reading() as session:
-            runs = {run.name: run for run in session.scalars(select(schema.RunRow))}
+        runs = {run.name: run for run in place.all(select(schema.RunRow))}
     assert "later" not in runs
     assert [run.performs for name, run in runs.items() if name.startswith("live_")] == [None]
 

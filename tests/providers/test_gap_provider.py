@@ -93,8 +93,7 @@ def workspace(tmp_path: Path):
 
 
 def count(workspace: Workspace, table: Any) -> int:
-    with workspace.reading() as session:
-        return len(session.execute(select(table)).all())
+    return len(workspace.all(select(table)))
 
 
 def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
@@ -114,10 +113,9 @@ def test_a_diagnosis_replaces_the_earlier_one(workspace: Workspace) -> None:
 
 def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> None:
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
-    with workspace.reading() as session:
-        cause = session.scalars(select(CLASSES["gap_cause"])).one()
-        run = session.scalars(select(CLASSES["gap_cause_run"])).one()
-        weighed = session.scalars(select(CLASSES["gap_cause_competitor"])).all()
+    (cause,) = workspace.all(select(CLASSES["gap_cause"]))
+    (run,) = workspace.all(select(CLASSES["gap_cause_run"]))
+    weighed = workspace.all(select(CLASSES["gap_cause_competitor"]))
     assert (cause.acts_from_s, cause.acts_until_s, run.run_id) == (1.5, 2.5, f"{ROBOT}.swing_3")
     assert cause.cause_id == run.cause_id == "coulomb_friction@all"
     assert (cause.gain, cause.log_odds) == (4.0, 7.0)
@@ -126,10 +124,9 @@ def test_what_acts_for_a_while_in_some_runs_is_kept(workspace: Workspace) -> Non
 
 def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> None:
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
-    with workspace.reading() as session:
-        finding = session.scalars(select(CLASSES["gap_finding"])).one()
-        joints = set(session.scalars(select(CLASSES["gap_finding_joint"].joint)))
-        members = session.scalars(select(CLASSES["gap_finding_member"])).all()
+    (finding,) = workspace.all(select(CLASSES["gap_finding"]))
+    joints = set(workspace.all(select(CLASSES["gap_finding_joint"].joint)))
+    members = workspace.all(select(CLASSES["gap_finding_member"]))
     (said,) = diagnosis().findings
     assert (finding.finding_id, finding.family, finding.rank, finding.matters) == (said.id, "friction", 1, True)
     assert (finding.share, finding.confidence) == (said.share, 0.9)
@@ -144,15 +141,12 @@ def test_a_finding_is_kept_with_its_joints_and_members(workspace: Workspace) -> 
 def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
     found = record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     twin_id = adopt(workspace, ROBOT)
-    with workspace.reading() as session:
-        twin = session.scalars(select(schema.TwinRow)).one()
-        assert twin.twin_id == twin_id
-        assert "a diagnosis of all these runs" in twin.split
-        assert set(session.scalars(select(schema.TwinEffect.effect))) == set(FULL)
-        used = session.scalars(
-            select(schema.ActivityUse.entity).where(schema.ActivityUse.activity_id == twin.activity_id)
-        )
-        assert f"gap_diagnosis/{found.diagnosis_id}" in set(used)
+    (twin,) = workspace.all(select(schema.TwinRow))
+    assert twin.twin_id == twin_id
+    assert "a diagnosis of all these runs" in twin.split
+    assert set(workspace.all(select(schema.TwinEffect.effect))) == set(FULL)
+    used = workspace.all(select(schema.ActivityUse.entity).where(schema.ActivityUse.activity_id == twin.activity_id))
+    assert f"gap_diagnosis/{found.diagnosis_id}" in set(used)
     assert count(workspace, schema.RunEnergy) == 0
     assert count(workspace, GapDiagnosis) == 1
     keep(workspace, ROBOT, "energy", run_iri(f"{ROBOT}.swing_1"), energy.provide(workspace, f"{ROBOT}.swing_1"))
@@ -163,11 +157,10 @@ def test_adopting_makes_the_twin_the_robots(workspace: Workspace) -> None:
 def test_an_adopted_twin_is_judged_on_what_it_was_not_fitted_to(workspace: Workspace) -> None:
     record(workspace, ROBOT, diagnosis(), NOTHING, workspace.better)
     adopt(workspace, ROBOT)
-    with workspace.reading() as session:
-        row = session.scalars(select(schema.TwinRow)).one()
-        assert set(load(workspace.folder / row.file).fitted) == {"swing_1", "swing_2"}
-        parts = {one.run_id: one.part for one in session.scalars(select(schema.TwinRun))}
-        fits = session.scalars(select(schema.TorqueFit)).all()
+    (row,) = workspace.all(select(schema.TwinRow))
+    assert set(load(workspace.folder / row.file).fitted) == {"swing_1", "swing_2"}
+    parts = {one.run_id: one.part for one in workspace.all(select(schema.TwinRun))}
+    fits = workspace.all(select(schema.TorqueFit))
     # of the two runs that the diagnosis took for the twin, each is cut in time; the third is not of its time
     assert parts == {f"{ROBOT}.swing_{k}": part for k, part in ((1, "both"), (2, "both"), (3, "apart"))}
     assert {(fit.run_id[-1], fit.part) for fit in fits} == {(k, part) for k in "12" for part in ("fit", "held_out")}

@@ -73,8 +73,7 @@ def send(twin: LiveTwin, numbers: Iterable[int], late: float = 0.0, said: bool =
 
 
 def live_runs(place: Workspace) -> list[RunRow]:
-    with place.reading() as session:
-        return list(session.scalars(select(RunRow).where(RunRow.kind == LIVE_RUN).order_by(RunRow.start_time)))
+    return list(place.all(select(RunRow).where(RunRow.kind == LIVE_RUN).order_by(RunRow.start_time)))
 
 
 def counts(place: Workspace) -> list[tuple[float, int]]:
@@ -201,8 +200,7 @@ def test_a_data_set_taken_in_again_leaves_live_runs(place: Workspace, graph: Kno
     assert place.ingest(robot, joints, runs, series) == "replaced"
     assert place.read_series(live_run(place).run_id).num_rows == 2
     place.drop_robot(rows.ROBOT)
-    with place.reading() as session:
-        assert not session.scalars(select(RunRow)).all()
+    assert not place.all(select(RunRow))
 
 
 def test_a_long_stream_becomes_several_runs(

@@ -90,8 +90,7 @@ def test_all_providers_of_a_job_condition_each_run_once_with_one_cutoff(
     adopt(workspace, NAME)
     assert len({choose_cutoff([run]) for run in RUNS}) == len(RUNS)
     assert sorted(conditioned) == [(run.name, choose_cutoff(RUNS)) for run in RUNS]
-    with workspace.reading() as session:
-        twin = session.scalars(select(schema.TwinRow)).one()
+    (twin,) = workspace.all(select(schema.TwinRow))
     document = workspace.read_document(twin.file, twin.sha256).decode()
     assert twin.cutoff_why == WHY
     assert twin.cutoff_hz == from_json(document, Path("twin.json")).cutoff == choose_cutoff(RUNS)

@@ -45,8 +45,7 @@ def test_the_same_letters_in_two_forms_are_one_name():
 def test_runs_that_differ_in_punctuation_alone_are_two(tmp_path):
     with Workspace(tmp_path) as workspace:
         ingest(workspace, data_set(run("a b"), run("a.b"), run("a_b")))
-        with workspace.reading() as session:
-            found = session.scalars(select(Row.run_id)).all()
+        found = workspace.all(select(Row.run_id))
     assert len(set(found)) == 3
     assert all(run_id.count(".") == 1 for run_id in found)
 

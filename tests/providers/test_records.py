@@ -43,9 +43,8 @@ def test_a_data_set_comes_back_as_it_was(database_url, tmp_path):
         robot = load_robot(workspace, identifier("One arm"))
         assert robot == replace(data_set(first).robot)
         back = load_run(workspace, robot, f"{identifier('One arm')}.second")
-        with workspace.reading() as session:
-            said = session.get_one(Row, f"{identifier('One arm')}.first")
-            unsaid = session.get_one(Row, f"{identifier('One arm')}.second")
+        said = workspace.row(Row, f"{identifier('One arm')}.first")
+        unsaid = workspace.row(Row, f"{identifier('One arm')}.second")
     began = datetime(2026, 3, 1, 12, 0, 0, 250_001, UTC)
     assert (said.started, said.ended) == (began, began + timedelta(seconds=1))
     assert (unsaid.started, unsaid.ended, unsaid.start_time_from) == (None, None, "ingest")

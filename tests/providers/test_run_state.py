@@ -50,11 +50,10 @@ def test_a_meters_log(tmp_path: Path) -> None:
         graph.load_ontology()
         map_rows(place, graph)
         reason(graph)
-        with place.reading() as session:
-            energy = session.scalars(select(RunEnergy)).one()
-            load = session.scalars(select(MeteredLoad)).one()
-            states = {row.state: row.seconds for row in session.scalars(select(SupplyStateRow))}
-            assert session.scalars(select(TwinRow)).all() == []
+        (energy,) = place.all(select(RunEnergy))
+        (load,) = place.all(select(MeteredLoad))
+        states = {row.state: row.seconds for row in place.all(select(SupplyStateRow))}
+        assert place.all(select(TwinRow)) == []
         whole = float(np.trapezoid(power, time))
         assert (energy.energy_from, energy.energy_consumption_j) == ("measured", pytest.approx(whole))
         assert (load.cycle_count, load.cycle_time_s) == (58, 120.0)

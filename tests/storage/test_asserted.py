@@ -52,8 +52,7 @@ def test_a_kept_fact_changes_its_row_and_makes_the_data_set_one_to_fit_anew(tmp_
         rows.identify(place, f"{rows.ROBOT}.t")
         before = next(run for run in runs if run.run_id == WORK).payload_kg
         place.keep_facts([fact("5.5", str(before))], [])
-        with place.reading() as session:
-            assert session.get_one(RunRow, WORK).payload_kg == 5.5
+        assert place.row(RunRow, WORK).payload_kg == 5.5
         for outcome in ("replaced", "unchanged"):
             robot, parts, runs, series = rows.data_set()
             facts = place.facts_about(rows.ROBOT)

@@ -55,10 +55,9 @@ def test_a_data_set_is_taken_in(workspace: Workspace) -> None:
     assert workspace.ingest(*rows.data_set()) == "new"
     assert workspace.read_series(WORK).equals(rows.samples(1))
     assert workspace.read_series(WORK, columns=["power"]).column_names == ["power"]
-    with workspace.reading() as session:
-        stored = session.scalars(select(Series).where(Series.run_id == WORK)).one()
-        assert workspace.read_file(stored.path, stored.series_id).equals(rows.samples(1))
-        assert session.get_one(RunRow, f"{rows.ROBOT}.again").repeat_of == WORK
+    (stored,) = workspace.all(select(Series).where(Series.run_id == WORK))
+    assert workspace.read_file(stored.path, stored.series_id).equals(rows.samples(1))
+    assert workspace.row(RunRow, f"{rows.ROBOT}.again").repeat_of == WORK
 
 
 def test_the_same_data_set_changes_nothing(workspace: Workspace) -> None:
@@ -101,8 +100,7 @@ def test_another_robot_is_left_alone(workspace: Workspace) -> None:
     populate(workspace)
     assert workspace.ingest(*another_robot()) == "new"
     workspace.drop_robot(rows.ROBOT)
-    with workspace.reading() as session:
-        assert session.scalars(select(RunRow.run_id)).all() == ["Other.alone"]
+    assert workspace.all(select(RunRow.run_id)) == ["Other.alone"]
     assert workspace.read_series("Other.alone").num_rows == 5
     assert len(list((workspace.folder / "series").iterdir())) == 1
 
@@ -121,10 +119,9 @@ def test_a_provider_replaces_what_it_made_of_the_same_subject(workspace: Workspa
     populate(workspace)
     workspace.replace_activity(rows.activity("state.2", "run_state", "run"), [], rows.run_state())
     workspace.replace_activity(rows.activity("state.3", "other", "run"), ["a", "a"], [])
-    with workspace.reading() as session:
-        assert session.scalars(select(RunState.activity_id)).all() == ["state.2"]
-        assert session.scalars(select(ActivityUse.entity).where(ActivityUse.activity_id == "state.3")).all() == ["a"]
-        assert set(session.scalars(select(Activity.activity_id))) == {"state.2", "state.3", "twin.1", "energy.1"}
+    assert workspace.all(select(RunState.activity_id)) == ["state.2"]
+    assert workspace.all(select(ActivityUse.entity).where(ActivityUse.activity_id == "state.3")) == ["a"]
+    assert set(workspace.all(select(Activity.activity_id))) == {"state.2", "state.3", "twin.1", "energy.1"}
 
 
 def test_a_run_is_dropped_alone(workspace: Workspace) -> None:
@@ -153,11 +150,10 @@ def test_what_was_derived_from_an_earlier_twin_goes_with_it(workspace: Workspace
     populate(workspace)
     assert workspace.read_series(WORK, "modelled").equals(rows.samples(9))
     rows.identify(workspace, OTHER, name="twin.2")
-    with workspace.reading() as session:
-        assert session.scalars(select(TwinRow.twin_id)).all() == [OTHER]
-        assert session.scalars(select(RunEnergy)).all() == []
-        assert set(session.scalars(select(Series.kind))) == {"measured"}
-        assert set(session.scalars(select(Activity.activity_id))) == {"state.1", "twin.2"}
+    assert workspace.all(select(TwinRow.twin_id)) == [OTHER]
+    assert workspace.all(select(RunEnergy)) == []
+    assert set(workspace.all(select(Series.kind))) == {"measured"}
+    assert set(workspace.all(select(Activity.activity_id))) == {"state.1", "twin.2"}
     assert [file.name for file in (workspace.folder / "twins").iterdir()] == [f"{OTHER}.json"]
     assert len(list((workspace.folder / "series").iterdir())) == 2
 
@@ -184,8 +180,7 @@ def test_times_come_back_in_utc(workspace: Workspace) -> None:
     eastern = timezone(timedelta(hours=-5))
     run = rows.run("work", start_time=datetime(2026, 1, 2, 23, 30, tzinfo=eastern))
     assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "new"
-    with workspace.reading() as session:
-        found = session.get_one(RunRow, WORK).start_time
+    found = workspace.row(RunRow, WORK).start_time
     assert found.isoformat() == "2026-01-03T04:30:00+00:00"
     assert workspace.ingest(rows.robot(), [], [run], {WORK: rows.samples(1)}) == "unchanged"
 
