@@ -203,6 +203,13 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def _series(kind: str, run_id: str, seconds: float, columns: str, made: str | None = None) -> Base:
+    return schema.Series(
+        series_id=digest(f"{kind} {run_id}"), run_id=run_id, kind=kind, columns=columns, activity_id=made,
+        path=f"series/{run_id}{'.model' if made else ''}.parquet", row_count=int(100 * seconds),
+    )  # fmt: skip
+
+
 def _plans() -> Iterator[Base]:
     for robot, name, _, seconds, payload, *_ in PLANS:
         run_id = f"{robot}.{name}"
@@ -213,10 +220,7 @@ def _plans() -> Iterator[Base]:
             payload_com_y_m=0.0, payload_com_z_m=0.0, run_time_s=seconds, sample_count=int(100 * seconds),
             sample_rate_hz=100.0, file=f"series/{run_id}.parquet", sha256=digest(f"plan of {run_id}"),
         )  # fmt: skip
-        yield schema.Series(
-            series_id=digest(f"planned {run_id}"), run_id=run_id, kind="planned", path=f"series/{run_id}.parquet",
-            row_count=int(100 * seconds), columns="time,q_j1",
-        )  # fmt: skip
+        yield _series("planned", run_id, seconds, "time,q_j1")
 
 
 def _prices() -> Iterator[Base]:
@@ -233,11 +237,7 @@ def _prices() -> Iterator[Base]:
             mean_power_upper_w=(joules + half) / seconds, peak_power_w=280.0, peak_power_lower_w=270.0,
             peak_power_upper_w=290.0, activity_id=made,
         )  # fmt: skip
-        yield schema.Series(
-            series_id=digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
-            path=f"series/{run_id}.model.parquet",
-            row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
-        )  # fmt: skip
+        yield _series("modelled", run_id, seconds, "time,power_model", made)
 
 
 def _runs() -> Iterator[Base]:
@@ -254,10 +254,7 @@ def _runs() -> Iterator[Base]:
             sample_count=int(100 * seconds), sample_rate_hz=100.0, file=f"runs/{name}.csv",
             sha256=digest(f"log of {run_id}"),
         )  # fmt: skip
-        yield schema.Series(
-            series_id=digest(f"measured {run_id}"), run_id=run_id, kind="measured", path=f"series/{run_id}.parquet",
-            row_count=int(100 * seconds), columns="time,q_j1,power",
-        )  # fmt: skip
+        yield _series("measured", run_id, seconds, "time,q_j1,power")
         if idle is None:
             continue
         made = f"run_state.{run_id}"
@@ -344,11 +341,7 @@ def _energies() -> Iterator[Base]:
             energy_error_percent=100 * abs(modelled - measured) / measured, power_rmse_w=rmse, standby_energy_j=standby,
             standby_share=standby / modelled, returned_energy_j=returned, activity_id=made,
         )  # fmt: skip
-        yield schema.Series(
-            series_id=digest(f"modelled {run_id}"), run_id=run_id, kind="modelled",
-            path=f"series/{run_id}.model.parquet",
-            row_count=int(100 * seconds), columns="time,power_model", activity_id=made,
-        )  # fmt: skip
+        yield _series("modelled", run_id, seconds, "time,power_model", made)
         entries = [entry.split() for entry in f"standby_power - {standby}, {LEDGER[run_id]}".split(", ")]
         for effect, joint, joules in entries:
             yield energy_schema.EnergyShare(
