@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
 import pyarrow as pa
-from sqlalchemy import URL, Engine, Select, Table, delete, exists, insert, select, update
+from sqlalchemy import URL, Engine, Select, Table, delete, exists, insert, select
 from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
@@ -207,13 +207,11 @@ class Workspace:
                 return "unchanged"
             if known:
                 robot_rows.drop_data_set(session, robot.robot_id)
-                session.execute(
-                    update(RobotRow).where(RobotRow.robot_id == robot.robot_id).values(robot_rows.values(robot))
-                )
+            robot_rows.put_robot(session, robot_rows.values(robot))
             for path, content in (documents or {}).items():
                 files.write(self.file(path), content)
             stored = [self._store(run.run_id, series[run.run_id], _told(run)) for run in runs]
-            robot_rows.insert_rows(session, [*rows[1 if known else 0 :], *stored])
+            robot_rows.insert_rows(session, [*parts, *runs, *stored])
             robot_rows.release_plans(session, robot.robot_id)
         self.remove_orphans()
         return "replaced" if known else "new"

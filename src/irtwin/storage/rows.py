@@ -88,6 +88,12 @@ def part_tables() -> list[Table]:
     ]
 
 
+def put_robot(session: Session, robot: Values) -> None:
+    """Put a robot's row in place of the one that is there, if any: what refers to that stays."""
+    session.merge(RobotRow(**robot))
+    session.flush()
+
+
 def insert_rows(session: Session, rows: Iterable[Base]) -> None:
     """Insert rows, those first that others refer to."""
     insert_values(session, tables_of(rows))

@@ -6,14 +6,11 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from sqlalchemy import update
-
 from irtwin.errors import InputError
 from irtwin.storage import engine, files
 from irtwin.storage import rows as robot_rows
 from irtwin.storage.database import Workspace
 from irtwin.storage.rows import Tables
-from irtwin.storage.schema import RobotRow
 from irtwin.storage.series import is_whole
 
 _PREFIX = ".staged-"
@@ -60,11 +57,9 @@ def _put(source: Workspace, rows: Tables, target: Workspace, robot_id: str) -> s
             _link(source, target, path)
         of_live = robot_rows.modelled_of_live_runs(session, robot_id)
         robot_rows.drop_recorded(session, robot_id)
-        if session.get(RobotRow, robot_id) is None:
-            robot_rows.insert_values(session, rows)
-        else:
-            session.execute(update(RobotRow).where(RobotRow.robot_id == robot_id).values(**rows["robot"][0]))
-            robot_rows.insert_values(session, {**rows, "robot": []})
+        for robot in rows["robot"]:
+            robot_rows.put_robot(session, robot)
+        robot_rows.insert_values(session, {**rows, "robot": []})
         if {row["twin_id"] for row in of_live["run_energy"]} <= {row["twin_id"] for row in rows["twin"]}:
             robot_rows.insert_values(session, of_live)  # it is the same twin: what it says of live runs holds
         robot_rows.release_plans(session, robot_id)
