@@ -190,7 +190,7 @@ def _found(place: Path, origin: str) -> list[Resource]:
     """Return the files of an extension's folders."""
     files = []
     for kind in KINDS:
-        for path, name in _files(place / kind, kind):
+        for path, name in _files(place / kind, in_folders=kind == "reports"):
             real = real_path(path)
             if real is None or not real.is_relative_to(place.resolve()):
                 raise InputError(f"{path}: leads outside {place}; put the file itself there")
@@ -207,18 +207,14 @@ def _found(place: Path, origin: str) -> list[Resource]:
     return files
 
 
-def _files(place: Path, kind: str) -> Iterator[tuple[Path, str]]:
-    """Yield the files of a folder with their names; the pages beside the folders of `reports/` are made, not read."""
+def _files(place: Path, in_folders: bool) -> Iterator[tuple[Path, str]]:
+    """Yield the files of a folder with their names, or those of its folders: what lies in `reports/` itself is made."""
     if not place.is_dir():
         return
     for path in sorted(place.iterdir()):
         if _NO_EXTENSION.fullmatch(path.name):
             continue
-        if kind != "reports":
+        if in_folders:
+            yield from ((file, f"{path.name}/{name}") for file, name in _files(path, in_folders=False))
+        else:
             yield path, path.name
-        elif path.is_dir():
-            yield from (
-                (file, f"{path.name}/{file.name}")
-                for file in sorted(path.iterdir())
-                if not _NO_EXTENSION.fullmatch(file.name)
-            )

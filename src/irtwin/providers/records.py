@@ -247,6 +247,7 @@ def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log
     row = workspace.row(RunRow, run_id)
     planned = row.kind == PLANNED_RUN
     samples = workspace.read_series(run_id, PLANNED if planned else MEASURED)
+    columns = {name: np.array(samples.column(name)) for name in samples.column_names}
     return log.Run(
         name=row.name,
         file=Path(row.file),
@@ -257,7 +258,7 @@ def load_run(workspace: Workspace, robot: description.Robot, run_id: str) -> log
         repeat_of=None if row.repeat_of is None else row.repeat_of.removeprefix(f"{row.robot_id}."),
         started=row.start_time,
         notes={},
-        signals=from_columns(_columns(samples), robot.joint_names),
+        signals=from_columns(columns, robot.joint_names),
         performs=None if row.performs is None else row.performs.removeprefix(f"{row.robot_id}."),
     )
 
@@ -287,10 +288,6 @@ def known_twin(workspace: Workspace, robot_id: str) -> tuple[str, Twin] | None:
         return None
     document = workspace.read_document(row.file, row.sha256)
     return row.twin_id, from_json(document, inside(workspace.folder, row.file))
-
-
-def _columns(table: pa.Table) -> dict[str, np.ndarray]:
-    return {name: np.array(table.column(name)) for name in table.column_names}
 
 
 def _source_files(robot_id: str, data_set: log.DataSet) -> list[SourceFile]:
