@@ -108,18 +108,18 @@ def writing(engine: Engine, restructuring: bool = False) -> Iterator[Session]:
     """
     if is_read_only(engine):
         raise WorkspaceFault(f"{engine.url.database}: cannot be written, as this user may only read it: {TO_WRITE}")
-    with (
-        engine.connect().execution_options(writes=True) as connection,
-        _free_keys(connection, restructuring),
-        _turn(connection),
-    ):
-        with Session(connection) as session:
+    with engine.connect().execution_options(writes=True) as connection, ExitStack() as after:
+        driver = connection.connection.driver_connection
+        if restructuring and isinstance(driver, sqlite3.Connection):  # it can be told so outside a transaction alone
+            driver.execute("PRAGMA foreign_keys = OFF")
+            after.callback(driver.execute, "PRAGMA foreign_keys = ON")
+        with _turn(connection), Session(connection) as session:
             yield session
             session.flush()
-        if restructuring and engine.dialect.name == "sqlite":
-            broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
-            if broken is not None:
-                raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
+            if restructuring and engine.dialect.name == "sqlite":
+                broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+                if broken is not None:
+                    raise RuntimeError(f"rows of table {broken[0]} refer to rows of {broken[2]} that are gone")
 
 
 @contextmanager
@@ -155,20 +155,6 @@ def _turn(connection: Connection) -> Iterator[None]:
                 "try again later"
             ) from None
         yield
-
-
-@contextmanager
-def _free_keys(connection: Connection, restructuring: bool) -> Iterator[None]:
-    """Let SQLite drop a table that others refer to; outside a transaction alone it can be told so."""
-    driver = connection.connection.driver_connection
-    if not (restructuring and isinstance(driver, sqlite3.Connection)):
-        yield
-        return
-    driver.execute("PRAGMA foreign_keys = OFF")
-    try:
-        yield
-    finally:
-        driver.execute("PRAGMA foreign_keys = ON")
 
 
 def use_write_ahead_log(engine: Engine) -> None:
