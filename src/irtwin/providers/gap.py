@@ -46,11 +46,10 @@ def record(
     Raises InputError where the workspace lacks the robot, or a run or joint that the diagnosis names.
     """
     started = datetime.now(UTC)
-    with workspace.reading() as session:
-        if session.get(RobotRow, robot_id) is None:
-            raise InputError(f"{workspace.folder}: no robot {robot_id} here; run `irtwin run` on its data set first")
-        runs = session.scalars(select(RunRow).where(RunRow.robot_id == robot_id)).all()
-        joints = session.scalars(select(JointRow).where(JointRow.robot_id == robot_id)).all()
+    if workspace.first(select(RobotRow).where(RobotRow.robot_id == robot_id)) is None:
+        raise InputError(f"{workspace.folder}: no robot {robot_id} here; run `irtwin run` on its data set first")
+    runs = workspace.all(select(RunRow).where(RunRow.robot_id == robot_id))
+    joints = workspace.all(select(JointRow).where(JointRow.robot_id == robot_id))
     row, parts, documents = _rows(robot_id, joints, runs, diagnosis, curves, twin, motion)
     used = inputs(workspace, robot_id, [run.run_id for run in runs])
     keep(workspace, "diagnosis", Made(robot_id, used, [row, *parts], documents=documents), started)

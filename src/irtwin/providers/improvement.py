@@ -114,9 +114,8 @@ class _Loop:
         self.announce(
             f"  worst energy error on what neither was fitted to: {before:.3g} %, then {after:.3g} %: {outcome}"
         )
-        of_robot = ImprovementRound.robot_id == self.robot_id
-        with self.workspace.reading() as session:
-            number = 1 + (session.scalar(select(func.max(ImprovementRound.number)).where(of_robot)) or 0)
+        rounds = select(func.max(ImprovementRound.number)).where(ImprovementRound.robot_id == self.robot_id)
+        number = 1 + (self.workspace.first(rounds) or 0)
         row = ImprovementRound(
             round_id=f"{self.robot_id}.{number}",
             robot_id=self.robot_id,

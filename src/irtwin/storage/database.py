@@ -295,10 +295,7 @@ class Workspace:
 
     def read_series(self, run_id: str, kind: str = MEASURED, columns: Sequence[str] | None = None) -> pa.Table:
         """Read a run's samples, or some columns of them. Raises InputError where there are none."""
-        with self.reading() as session:
-            row = session.execute(
-                select(Series.path, Series.series_id).where(Series.run_id == run_id, Series.kind == kind)
-            ).first()
+        row = self.first(select(Series).where(Series.run_id == run_id, Series.kind == kind))
         if row is None:
             raise InputError(f"{self.folder}: run {run_id} has no {kind} series; ingest its data set first")
         return read_series(self.folder, row.path, row.series_id, columns)

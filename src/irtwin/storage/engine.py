@@ -61,7 +61,8 @@ def open_engine(url: str | URL, must_exist: bool = False) -> Engine:
             if engine.dialect.name == "sqlite":
                 connection.exec_driver_sql("PRAGMA schema_version")  # SQLite reads the file only now
     except DBAPIError as error:
-        raise WorkspaceFault(f"{shown(address)}: cannot open the database: {_reason(error)}") from None
+        reason = " ".join(str(error.orig).split())
+        raise WorkspaceFault(f"{shown(address)}: cannot open the database: {reason}") from None
     return engine
 
 
@@ -282,7 +283,3 @@ def _writes(connection: Connection) -> bool:
 def _locked(error: OperationalError) -> bool:
     in_sqlite = isinstance(error.orig, sqlite3.OperationalError) and "locked" in str(error.orig)
     return in_sqlite or getattr(error.orig, "sqlstate", None) == _NO_LOCK
-
-
-def _reason(error: DBAPIError) -> str:
-    return " ".join(str(error.orig).split())
