@@ -21,7 +21,7 @@ from irtwin.report.wording import percent
 from irtwin.resources import folder
 from irtwin.signals.log import read_data_set
 from irtwin.signals.motion import Motion
-from tests.data_sets import Said, irtwin
+from tests.data_sets import Said, irtwin, refused
 from tests.screens import complaints_of, faults, narrow_and_dark
 
 pytestmark = [
@@ -90,9 +90,8 @@ def test_individuals_are_named_below_the_workspaces_base() -> None:
 
 @pytest.mark.nightly
 def test_a_folder_that_is_not_empty_is_left_alone(done: Done) -> None:
-    again = irtwin("demo", "--case-study", "--workspace", done[1])
-    assert again.status == 2
-    assert "is not empty; remove it, or name a new folder by --workspace" in again.err
+    again = refused("demo", "--case-study", "--workspace", done[1])
+    assert "is not empty; remove it, or name a new folder by --workspace" in again
 
 
 def test_a_task_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,8 +114,7 @@ def test_the_task_may_be_given_and_must_be_one() -> None:
     assert list(task.goal) == [1, -1, 1.2, 0, 0.5, 0] and task.seconds == 2.0
     with pytest.raises(InputError, match="--from"):
         case_study.task_of(start="1,2")
-    said = irtwin("demo", "--seconds", "2")
-    assert said.status == 2 and "give --case-study, too" in said.err
+    assert "give --case-study, too" in refused("demo", "--seconds", "2")
 
 
 def test_what_the_plant_cannot_follow_is_said(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ from irtwin.signals.motion import Motion
 from irtwin.signals.samples import read_signals
 from irtwin.storage.database import Workspace
 from tests import data_sets
-from tests.data_sets import Said, irtwin
+from tests.data_sets import Said, irtwin, refused, refused_in_a_line
 from tests.providers.test_gap_provider import NOTHING, diagnosis
 from tests.synthetic import arm, as_run, measure, swing, with_constants
 from tests.test_next_experiment import experiment
@@ -181,9 +181,8 @@ def test_the_log_stays_beside_the_data_set_and_is_judged(improved: tuple[Path, S
     page = (workspace / "reports" / "arm_2.html").read_text(encoding="utf-8")
     assert ">Rounds of improvement</h3>" in page
     assert "logged since and cut in time: again" in page
-    dropped = irtwin("workspace", "drop", "arm_2", "--run", "again", "--workspace", workspace)
-    assert dropped.status == 2
-    assert 'the twin was bettered or judged by "again"; it goes with its robot' in dropped.err
+    dropped = refused("workspace", "drop", "arm_2", "--run", "again", "--workspace", workspace)
+    assert 'the twin was bettered or judged by "again"; it goes with its robot' in dropped
 
 
 def test_the_same_data_set_again_leaves_the_better_twin(improved: tuple[Path, Said], tmp_path: Path) -> None:
@@ -209,26 +208,21 @@ def test_a_twin_that_is_no_better_is_not_kept(improved: tuple[Path, Said], tmp_p
     assert rows["noisy"] == "held_out"
 
 
-def refused(*arguments: object) -> str:
-    said = irtwin("improve", *arguments)
-    assert (said.status, said.out) == (2, "")
-    (line,) = [line for line in said.err.splitlines() if line.startswith("irtwin: ")]
-    return line
-
-
 def test_bad_logs_are_told_and_change_nothing(improved: tuple[Path, Said], tmp_path: Path) -> None:
     workspace, _ = improved
-    here = ("--workspace", workspace)
+    here = ("--workspace", workspace, "--quiet")
     before = list(asking.ask("energy_per_run", workspace))
     file = new_log(tmp_path, log(5, 1.0, "fresh"))
-    assert 'no robot "arm_9" here' in refused("arm_9", file, *here)
+    assert 'no robot "arm_9" here' in refused_in_a_line("improve", "arm_9", file, *here)
     taken = new_log(tmp_path, log(5, 1.0, "again"))
-    assert refused("arm_2", taken, *here).endswith('the robot has a run "again" already; choose another name')
-    assert 'the robot has no planned run "reach"; it has none' in refused("arm_2", file, "--performs", "reach", *here)
+    said = refused_in_a_line("improve", "arm_2", taken, *here)
+    assert said.endswith('the robot has a run "again" already; choose another name')
+    performed = refused_in_a_line("improve", "arm_2", file, "--performs", "reach", *here)
+    assert 'the robot has no planned run "reach"; it has none' in performed
     motion = replace(log(5, 1.0, "bare"), signals=log(5, 1.0).signals.motion)
-    assert "has neither torque nor power" in refused("arm_2", new_log(tmp_path, motion), *here)
+    assert "has neither torque nor power" in refused_in_a_line("improve", "arm_2", new_log(tmp_path, motion), *here)
     other = new_log(tmp_path, as_run(measure(arm(3), swing(arm(3), 1))), arm(3))
-    assert 'no moving joint "joint_3"' in refused("arm_2", other, *here)
+    assert 'no moving joint "joint_3"' in refused_in_a_line("improve", "arm_2", other, *here)
     assert list(asking.ask("energy_per_run", workspace)) == before
 
 

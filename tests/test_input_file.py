@@ -23,7 +23,7 @@ from irtwin.signals.log import read_data_set
 from irtwin.storage import base_iri
 from irtwin.storage.tariff import read_tariff
 from irtwin.twin.files import load
-from tests.data_sets import irtwin
+from tests.data_sets import refused
 from tests.synthetic import arm
 from tests.trusting import trust_all
 
@@ -76,9 +76,7 @@ def test_a_module_of_the_ontology_is_said_by_its_parser(tmp_path: Path) -> None:
 
 def test_a_command_ends_in_one_line(tmp_path: Path) -> None:
     file = put(tmp_path / "listed.txt", LATIN)
-    done = irtwin("run", file, "--out", file.parent / "out")
-    assert done.status == 2
-    assert f"{file}, line 2: not UTF-8 text" in done.err
+    assert f"{file}, line 2: not UTF-8 text" in refused("run", file, "--out", file.parent / "out")
 
 
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:

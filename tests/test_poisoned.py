@@ -14,7 +14,7 @@ from irtwin.providers.provider import Made, load_provider
 from irtwin.providers.records import ingest
 from irtwin.signals.log import read_data_set
 from irtwin.storage.database import Workspace
-from tests.data_sets import irtwin
+from tests.data_sets import irtwin, refused
 from tests.small_robots import data_set, with_signals
 
 pytestmark = pytest.mark.slow
@@ -70,9 +70,7 @@ def test_what_cannot_be_worked_out_changes_nothing(folder: Path, robot: str, kin
 
 def test_the_line_names_the_data_set(folder: Path) -> None:
     poison = data_set(folder / "poison", "Bad", change=with_signals(q=0.0))
-    said = irtwin("run", poison, "--workspace", folder / "workspace")
-    assert said.status == 2
-    line = said.err.splitlines()[-1]
+    line = refused("run", poison, "--workspace", folder / "workspace").splitlines()[-1]
     assert line.startswith(f"irtwin: {poison}: ")
     assert line.endswith("nothing of this data set was stored")
 

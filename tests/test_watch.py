@@ -20,7 +20,7 @@ from irtwin.providers.records import ingest
 from irtwin.signals.log import DataSet
 from irtwin.storage.database import Workspace
 from tests import rows
-from tests.data_sets import irtwin, refused_in_a_line
+from tests.data_sets import irtwin, refused, refused_in_a_line
 from tests.forks import Command
 from tests.live.opcua_robot import ServedRobot
 from tests.synthetic import arm
@@ -97,9 +97,7 @@ def test_a_fault_in_a_report_of_the_workspace_is_told_before_a_sample_is_read(wo
 def test_a_file_in_place_of_a_workspaces_folder_is_told(workspace: Path) -> None:
     shutil.rmtree(workspace / "live", ignore_errors=True)
     (workspace / "live").touch()
-    done = irtwin("live", "--workspace", workspace)
-    assert done.status == 2
-    assert done.err.splitlines()[-1] == (
+    assert refused("live", "--workspace", workspace).splitlines()[-1] == (
         f"irtwin: {workspace}/live: File exists; a file is where a folder has to be, or a folder in place of a file; "
         "move it away"
     )
@@ -156,9 +154,7 @@ def test_a_full_disk_ends_what_follows_a_server_and_is_no_lost_connection() -> N
     ],
 )
 def test_options_that_do_not_go_together(tmp_path: Path, options: list[str], said: str) -> None:
-    found = irtwin("live", "--workspace", tmp_path / "w", *options)
-    assert found.status == 2
-    assert said in found.err
+    assert said in refused("live", "--workspace", tmp_path / "w", *options)
     assert not list(tmp_path.iterdir())
 
 

@@ -192,19 +192,20 @@ def test_a_workspace_of_0_2_loses_what_is_told_no_more(tmp_path: Path) -> None:
             assert migration.revision(connection) == migration.newest()
 
 
+NEWER = "UPDATE alembic_version SET version_num = '9999'"
 OLDER = f"UPDATE alembic_version SET version_num = '{int(first.revision) - 1:04}'"
 
 
-@pytest.mark.parametrize("said", [OLDER, "DROP TABLE alembic_version"])
-def test_a_workspace_before_0_2_is_refused(tmp_path: Path, said: str) -> None:
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (OLDER, r"before 0\.2; run its data sets into a new workspace"),
+        ("DROP TABLE alembic_version", r"before 0\.2; run its data sets into a new workspace"),
+        (NEWER, "its tables are of revision 9999, this irtwin knows none after"),
+    ],
+)
+def test_a_workspace_before_0_2_or_of_a_newer_irtwin_is_refused(tmp_path: Path, said: str, why: str) -> None:
     with Workspace(tmp_path) as place, place.engine.begin() as connection:
         connection.execute(text(said))
-    with pytest.raises(InputError, match=r"before 0\.2; run its data sets into a new workspace"):
-        Workspace(tmp_path)
-
-
-def test_a_workspace_of_a_newer_irtwin_is_refused(tmp_path: Path) -> None:
-    with Workspace(tmp_path) as place, place.engine.begin() as connection:
-        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
-    with pytest.raises(InputError, match="its tables are of revision 9999, this irtwin knows none after"):
+    with pytest.raises(InputError, match=why):
         Workspace(tmp_path)
