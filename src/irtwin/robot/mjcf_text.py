@@ -33,7 +33,7 @@ def mjcf_text(robot: Robot, armature: Mapping[str, float]) -> str:
         body = bodies[link.name] = SubElement(parent, "body", {"name": link.name} | placed)
         if connection is not None and connection.axis is not None:
             _joint(body, connection, joints[connection.name], armature.get(connection.name))
-            _inertial(body, robot.model.inertias[1 + robot.index(connection.name)])
+            SubElement(body, "inertial", inertial(robot.model.inertias[1 + robot.index(connection.name)]))
         for solid in structure.solids:
             if solid.link == link.name and solid.kind != "mesh":
                 _geom(body, solid)
@@ -55,9 +55,12 @@ def _joint(body: Element, connection: Connection, limits: Joint, armature: float
     SubElement(body, "joint", attributes | {name: repr(value) for name, value in numbers.items() if value})
 
 
-def _inertial(body: Element, inertia: pin.Inertia) -> None:
-    moments = words(*six_numbers(inertia.inertia))
-    SubElement(body, "inertial", pos=words(*inertia.lever), mass=repr(float(inertia.mass)), fullinertia=moments)
+def inertial(body: pin.Inertia) -> dict[str, str]:
+    """Return the attributes of a body's <inertial>."""
+    if not body.mass:  # MuJoCo takes no six zeros
+        return {"pos": "0 0 0", "mass": "0", "diaginertia": "0 0 0"}
+    moments = words(*six_numbers(body.inertia))
+    return {"pos": words(*body.lever), "mass": repr(float(body.mass)), "fullinertia": moments}
 
 
 def _geom(body: Element, solid: Solid) -> None:

@@ -34,7 +34,7 @@ def sdf_text(robot: Robot) -> str:
             continue
         link = links[connection.child] = SubElement(model, "link", name=connection.child)
         _pose(link, connection.origin, connection.parent)
-        _inertial(link, robot.model.inertias[1 + robot.index(connection.name)])
+        link.append(inertial(robot.model.inertias[1 + robot.index(connection.name)]))
         _joint(model, connection, joints[connection.name])
     for number, solid in enumerate(structure.solids):
         _shape(links[solid.link], solid, number)
@@ -53,10 +53,12 @@ def _joint(model: Element, connection: Connection, limits: Joint) -> None:
     _say(SubElement(axis, "dynamics"), damping=repr(connection.damping), friction=repr(connection.friction))
 
 
-def _inertial(link: Element, body: pin.Inertia) -> None:
-    inertial = SubElement(link, "inertial")
-    _say(inertial, pose=words(*body.lever, 0, 0, 0), mass=repr(float(body.mass)))
-    _say(SubElement(inertial, "inertia"), **dict(zip(MOMENTS, map(repr, six_numbers(body.inertia)), strict=True)))
+def inertial(body: pin.Inertia) -> Element:
+    """Return a body's element, in its link's frame."""
+    element = Element("inertial")
+    _say(element, pose=words(*body.lever, 0, 0, 0), mass=repr(float(body.mass)))
+    _say(SubElement(element, "inertia"), **dict(zip(MOMENTS, map(repr, six_numbers(body.inertia)), strict=True)))
+    return element
 
 
 def _shape(link: Element, solid: Solid, number: int) -> None:

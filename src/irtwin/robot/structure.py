@@ -38,6 +38,13 @@ def inertia_of(six: Sequence[float]) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+def principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments (3,) of an inertia (3, 3), and a right-handed frame of its axes (3, 3)."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.linalg.det(axes)
+    return moments, axes
+
+
 @dataclass(frozen=True)
 class Origin:
     """Where a frame lies in another: xyz in m, rpy in rad (turned about fixed x, then y, then z)."""

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from irtwin.robot.description import Joint, Robot
-from irtwin.robot.structure import Connection, Solid, structure_of
+from irtwin.robot.structure import Connection, Solid, principal, structure_of
 
 _HEAD = """#usda 1.0
 (
@@ -89,8 +89,7 @@ def _place(transform: np.ndarray) -> list[str]:
 def _mass(body: pin.Inertia) -> list[str]:
     if not body.mass:
         return []
-    moments, axes = np.linalg.eigh(body.inertia)
-    axes[:, 2] *= np.linalg.det(axes)
+    moments, axes = principal(body.inertia)
     return [
         f"float physics:mass = {float(body.mass)!r}",
         f"point3f physics:centerOfMass = {_tuple(body.lever)}",

@@ -171,13 +171,8 @@ class Alone:
         compiled, dof = self.servos.model.compiled, self.servos.model.speeds
         joints = compiled.dof_jntid[dof]
         q = np.concatenate([stretch.q for stretch in self.stretches])
-        stops = np.array(
-            [
-                np.minimum(compiled.jnt_range[joints, 0], q.min(axis=0)),
-                np.maximum(compiled.jnt_range[joints, 1], q.max(axis=0)),
-            ]
-        )
-        return np.where(compiled.jnt_limited[joints] == 1, stops, np.array([[-np.inf], [np.inf]]))
+        lower, upper = np.where(compiled.jnt_limited[joints] == 1, compiled.jnt_range[joints].T, [[-np.inf], [np.inf]])
+        return np.array([np.minimum(lower, q.min(axis=0)), np.maximum(upper, q.max(axis=0))])
 
 
 def _dry(servos: Servos, numbers: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -210,14 +205,8 @@ def alone(servos: Servos, stretches: Sequence[PlayedStretch], step: float) -> Al
         between = scipy.interpolate.make_interp_spline(stretch.time, np.moveaxis(bodies, 2, 0), k=1)
         times = np.minimum(np.arange(steps) * step, stretch.time[-1])
         load[:, :, place], inertia[:, :, place] = np.moveaxis(between(times), 2, 0).swapaxes(1, 2)
-    return Alone(
-        servos,
-        tuple(stretches),
-        step,
-        load,
-        inertia,
-        np.array([stretch.state() for stretch in stretches]).swapaxes(0, 1),
-    )
+    begun = np.array([stretch.state() for stretch in stretches]).swapaxes(0, 1)
+    return Alone(servos, tuple(stretches), step, load, inertia, begun)
 
 
 def _bodies(

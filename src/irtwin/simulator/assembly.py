@@ -62,14 +62,8 @@ def assembled(links: Iterable[ModelLink], connections: Sequence[ModelJoint], gra
     spec.option.gravity = gravity
     above: dict[str, ModelJoint] = {}
     for joint in connections:
-        _check_finite(
-            f'joint "{joint.name}"',
-            joint.origin,
-            joint.anchor,
-            joint.axis,
-            *joint.numbers.values(),
-            *(joint.servo or ()),
-        )
+        own = (*joint.numbers.values(), *(joint.servo or ()))
+        _check_finite(f'joint "{joint.name}"', joint.origin, joint.anchor, joint.axis, *own)
         if joint.child in above:
             raise ValueError(
                 f'link "{joint.child}" is the child of two joints, {above[joint.child].name} and {joint.name}'

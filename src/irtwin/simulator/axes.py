@@ -42,7 +42,7 @@ class Axes:
         turn, shift = other.base_in(self)
         apart = np.linalg.norm(other.direction @ turn.T - self.direction, axis=2)
         gap = self.point - other.point @ turn.T - shift
-        off = np.linalg.norm((gap - self._along(gap))[:, self.turns], axis=2)
+        off = np.linalg.norm(np.cross(gap, self.direction)[:, self.turns], axis=2)
         reach = np.linalg.norm(self.point - self.point[:, :1], axis=2).max()
         return bool(apart.max() <= _ALIKE and off.max(initial=0.0) <= max(_ALIKE * reach, 1e-6))
 
@@ -57,10 +57,6 @@ class Axes:
         normal = across[:, other.turns].sum(axis=(0, 1))
         right = np.einsum("pnij,pnj->i", across[:, other.turns], gap[:, other.turns])
         return turn, np.linalg.lstsq(normal, right, rcond=None)[0]
-
-    def _along(self, vectors: np.ndarray) -> np.ndarray:
-        """Return the part of vectors (P, n, 3) along the axes."""
-        return np.asarray(np.sum(vectors * self.direction, axis=2, keepdims=True) * self.direction)
 
     def _turn_to(self, other: Axes) -> np.ndarray:
         """Return the turn (3, 3) of its vectors to another's, by least squares (Kabsch)."""
@@ -85,13 +81,14 @@ def robot_axes(robot: Robot, poses: np.ndarray) -> Axes:
 
 def model_axes(compiled: mujoco.MjModel, joints: Sequence[int], turns: np.ndarray, poses: np.ndarray) -> Axes:
     """Return those of a model's joints, by their places, in poses (P, n); its others stay where they begin."""
-    data, directions, points = mujoco.MjData(compiled), [], []
+    data, at = mujoco.MjData(compiled), list(joints)
+    lines = []
     for pose in poses:
-        data.qpos[compiled.jnt_qposadr[list(joints)]] = pose
+        data.qpos[compiled.jnt_qposadr[at]] = pose
         mujoco.mj_kinematics(compiled, data)
-        directions.append(data.xaxis[list(joints)].copy())
-        points.append(data.xanchor[list(joints)].copy())
-    return Axes(np.array(directions), np.array(points), turns)
+        lines.append((data.xaxis[at], data.xanchor[at]))
+    directions, points = np.array(lines).swapaxes(0, 1)
+    return Axes(directions, points, turns)
 
 
 def first_unlike(compiled: mujoco.MjModel, joints: Sequence[int], robot: Robot) -> int | None:

@@ -83,7 +83,7 @@ class BodiesBeside:
 
         Intervals are of the change, by data and prior: one that holds zero is of what the data do not carry.
         """
-        links = zip(self._joints, self._moved or (), strict=False)
+        links = zip(self.twin.robot.joint_names, self._moved or (), strict=False)
         of_links = [number for joint, moved in links for number in self._of_link(joint, moved)]
         rotors = (self._rotor(joint) for joint in self.rotors)
         return (*of_links, *(rotor for rotor in rotors if abs(rotor.value) > _OFF * (rotor.simulator or 0.0)))
@@ -91,7 +91,7 @@ class BodiesBeside:
     @cached_property
     def rotors(self) -> Mapping[str, float]:
         """The inertias of rotors that the model's file is to have, by joint: zero where the twin has it in the link."""
-        places = {joint: self._places(joint, of_rotor=True) for joint in self._joints}
+        places = {joint: self._places(joint, of_rotor=True) for joint in self.twin.robot.joint_names}
         held = self.model.file.holds(_ROTOR)
         return {joint: float(self._values(own)[0]) if own else 0.0 for joint, own in places.items() if held}
 
@@ -99,16 +99,12 @@ class BodiesBeside:
     def written(self) -> Bodies:
         """The bodies that the model's file is to have, by name; none where it cannot hold those of each joint."""
         bodies: dict[str, pin.Inertia] = {}
-        for joint, moved in zip(self._joints, self._moved or (), strict=False):
+        for joint, moved in zip(self.twin.robot.joint_names, self._moved or (), strict=False):
             own = moved.bodies(pin.Inertia.FromDynamicParameters(self._values(self._places(joint))))
             if own is None or not all(map(self.model.file.holds_body, own)):
                 return {}
             bodies |= own
         return bodies
-
-    @property
-    def _joints(self) -> tuple[str, ...]:
-        return self.twin.robot.joint_names
 
     def _places(self, joint: str, of_rotor: bool = False) -> list[int]:
         """Return where the twin's parameters of a joint's body stand, or of its rotor."""
@@ -130,7 +126,7 @@ class BodiesBeside:
         known, given = np.zeros((count, count)), self.twin.covariance
         if given is None:
             return known
-        for places in map(self._places, self._joints):
+        for places in map(self._places, self.twin.robot.joint_names):
             known[np.ix_(places, places)] = known_near(pseudo_inertias(self._values(places)[None]))[0]
         return np.asarray(given @ np.linalg.inv(np.eye(count) + known @ given))
 
@@ -176,14 +172,14 @@ def _moved(compiled: mujoco.MjModel, data: mujoco.MjData, link: int, links: list
     """Return what is moved by the joint of a link, of those of the robot's joints; frame: the joint's in the world."""
     place = _placed(data, link)
     others: dict[str, pin.Inertia] = {}
-    whole, loose = _body(compiled, link), pin.Inertia.Zero()
+    whole, loose = body_of(compiled, link), pin.Inertia.Zero()
     for body in range(link + 1, compiled.nbody):
         above = body
         while above not in (0, *links):
             above = int(compiled.body_parentid[above])
         if above != link or body in links:
             continue
-        inertia = (place.inverse() * _placed(data, body)).act(_body(compiled, body))
+        inertia = (place.inverse() * _placed(data, body)).act(body_of(compiled, body))
         whole += inertia
         if compiled.body_weldid[body] == compiled.body_weldid[link]:
             others[compiled.body(body).name] = inertia
@@ -197,8 +193,8 @@ def _placed(data: mujoco.MjData, body: int) -> pin.SE3:
     return pin.SE3(data.xmat[body].reshape(3, 3), data.xpos[body])
 
 
-def _body(compiled: mujoco.MjModel, body: int) -> pin.Inertia:
-    """Return a body's inertia in its frame."""
+def body_of(compiled: mujoco.MjModel, body: int) -> pin.Inertia:
+    """Return the inertia of a compiled model's body in its frame."""
     axes = np.empty(9)
     mujoco.mju_quat2Mat(axes, compiled.body_iquat[body])
     turn = axes.reshape(3, 3)

@@ -12,9 +12,8 @@ import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.input_file import as_text, read_input, real_path
-from irtwin.robot.structure import six_numbers
-from irtwin.robot.urdf_text import inertial
-from irtwin.robot.xml_elements import Element, outermost, with_child, words
+from irtwin.robot import mjcf_text, urdf_text
+from irtwin.robot.xml_elements import Element, outermost, with_child
 from irtwin.simulator.engine import mujoco
 
 _MOST = 20_000_000  # bytes
@@ -65,11 +64,9 @@ class ModelFile:
 
     def _inertial(self, body: pin.Inertia) -> str:
         if self.is_urdf:
-            return inertial(body)
-        if not body.mass:  # MuJoCo takes no six zeros
-            return '<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>'
-        centre, moments = words(*body.lever), words(*six_numbers(body.inertia))
-        return f'<inertial pos="{centre}" mass="{float(body.mass)!r}" fullinertia="{moments}"/>'
+            return urdf_text.inertial(body)
+        attributes = (f'{name}="{value}"' for name, value in mjcf_text.inertial(body).items())
+        return f"<inertial {' '.join(attributes)}/>"
 
     def holds_body(self, name: str) -> bool:
         """Return whether a body is the file's own, and has the inertia that the file says."""

@@ -7,8 +7,10 @@ import copy
 import numpy as np
 import pinocchio as pin
 
-from irtwin.robot.structure import six_numbers
+from irtwin.robot.mjcf_text import inertial
+from irtwin.robot.structure import principal
 from irtwin.robot.xml_elements import Element
+from irtwin.simulator.bodies import body_of
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model import Flange, Model
 
@@ -18,10 +20,9 @@ _OTHER_FORMS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "diaginertia") 
 def load(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> None:
     """Put a mass, kg, `off` (3,) m from the flange, to its body; the model's constants are to be set after that."""
     body = flange.body
-    whole, centre, inertia = together(compiled, flange, mass, off)
-    moments, axes = np.linalg.eigh(inertia)
-    axes[:, 2] *= np.linalg.det(axes)
-    compiled.body_mass[body], compiled.body_ipos[body], compiled.body_inertia[body] = whole, centre, moments
+    whole = together(compiled, flange, mass, off)
+    moments, axes = principal(whole.inertia)
+    compiled.body_mass[body], compiled.body_ipos[body], compiled.body_inertia[body] = whole.mass, whole.lever, moments
     mujoco.mju_mat2Quat(compiled.body_iquat[body], axes.ravel())
 
 
@@ -35,22 +36,12 @@ def loaded(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarra
 
 def loaded_tag(model: Model, mass: float, off: np.ndarray) -> dict[Element, dict[str, float | str | None]]:
     """Return what changes of the file: the inertial of the flange's body; nothing where the file says none."""
-    inertial = model.file.inertial(model.compiled.body(model.flange.body).name)
-    if inertial is None:
+    element = model.file.inertial(model.compiled.body(model.flange.body).name)
+    if element is None:
         return {}
-    whole, centre, inertia = together(model.compiled, model.flange, mass, off)
-    told: dict[str, float | str | None] = dict.fromkeys(_OTHER_FORMS)
-    told |= {"mass": float(whole), "pos": " ".join(map(repr, centre.tolist()))}
-    return {inertial: told | {"fullinertia": " ".join(map(repr, six_numbers(inertia)))}}
+    return {element: dict.fromkeys(_OTHER_FORMS) | inertial(together(model.compiled, model.flange, mass, off))}
 
 
-def together(
-    compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return mass, centre (3,) and the inertia (3, 3) about it, in the body's frame, of body and mass."""
-    body, axes = flange.body, np.empty(9)
-    mujoco.mju_quat2Mat(axes, compiled.body_iquat[body])
-    inertia = axes.reshape(3, 3) * compiled.body_inertia[body] @ axes.reshape(3, 3).T
-    own = pin.Inertia(float(compiled.body_mass[body]), compiled.body_ipos[body], inertia)
-    whole = own + pin.Inertia(mass, flange.place + off, np.zeros((3, 3)))
-    return whole.mass, whole.lever, whole.inertia
+def together(compiled: mujoco.MjModel, flange: Flange, mass: float, off: np.ndarray) -> pin.Inertia:
+    """Return the flange's body and a mass as one, in the body's frame."""
+    return body_of(compiled, flange.body) + pin.Inertia(mass, flange.place + off, np.zeros((3, 3)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 import pinocchio as pin
@@ -18,9 +18,10 @@ from defusedxml import ElementTree as SafeXml
 
 from irtwin.errors import InputError
 from irtwin.identification.progress import tell
-from irtwin.robot.structure import MOMENTS, inertia_of, six_numbers
+from irtwin.robot import sdf_text
+from irtwin.robot.structure import MOMENTS, inertia_of
 from irtwin.robot.xml_elements import Element as XmlElement
-from irtwin.robot.xml_elements import numbers, outermost, with_child, words
+from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.model_file import Changes, ModelFile
@@ -35,9 +36,8 @@ _KNOWN = {  # where a word that SDF does not know would take a number away
     "dynamics": {*_READ.values()},
     "limit": {"lower", "upper", "effort", "velocity", "stiffness", "dissipation"},
     "inertial": {"mass", "pose", "inertia", "density", "auto_inertia_params", "fluid_added_mass"},
-    "inertia": {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"},
+    "inertia": {*MOMENTS},
 }
-_SIX = ("xx", "yy", "zz", "xy", "xz", "yz")  # of an inertia
 _NO_LIMIT = 1e16  # as SDF has it by itself
 _MODEL = "__model__"
 _BEFORE = (1, 4)  # the last version whose axes are said in the frame of the model
@@ -63,10 +63,7 @@ class SdfFile(ModelFile):
         return self.element(["joint"], "name", joint), _IN_SDF[number]
 
     def _inertial(self, body: pin.Inertia) -> str:
-        moments = zip(MOMENTS, six_numbers(body.inertia), strict=True)
-        inertia = "".join(f"<{name}>{value!r}</{name}>" for name, value in moments)
-        pose, mass = words(*body.lever, 0, 0, 0), float(body.mass)
-        return f"<inertial><pose>{pose}</pose><mass>{mass!r}</mass><inertia>{inertia}</inertia></inertial>"
+        return tostring(sdf_text.inertial(body), encoding="unicode")
 
     def _with_numbers(self, changes: Changes) -> bytes:
         """Return the file with numbers of joints and controllers changed; all else stays, byte for byte."""
@@ -225,7 +222,7 @@ def _link(link: Element, frames: _Frames, source: str) -> ModelLink:
     body = Element("inertial") if inertial is None else inertial
     within = _pose(body, where)
     turn = within[:3, :3]
-    six = [_number(body, f"inertia/i{axes}", float(axes[0] == axes[1]), where) for axes in _SIX]
+    six = [_number(body, f"inertia/{name}", float(name in MOMENTS[:3]), where) for name in MOMENTS]
     own = np.linalg.inv(place)
     return ModelLink(
         name,

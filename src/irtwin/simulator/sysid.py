@@ -80,7 +80,7 @@ def free(chosen: DifferingNumbers) -> Iterator[Free]:
     if chosen.differs[NAMES.index("payload")].any():
         bare, laden = (together(model.compiled, model.flange, carried, np.array(off[:3])) for carried in (0.0, mass))
         body = model.compiled.body(model.flange.body).name
-        yield _bounded(body, "mass", *(np.array([inertial[0], *inertial[1]]) for inertial in (bare, laden)))
+        yield _bounded(body, "mass", *(np.array([whole.mass, *whole.lever]) for whole in (bare, laden)))
     if chosen.differs[NAMES.index("tilt_x")].any():
         yield _bounded("world", "gravity", *(tilted(model.compiled, some)[:2] for some in ([0.0, 0.0], off[3:])))
 

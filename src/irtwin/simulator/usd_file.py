@@ -19,6 +19,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from irtwin.errors import InputError
 from irtwin.input_file import read_input, real_path
+from irtwin.robot.structure import principal
 from irtwin.robot.xml_elements import Element
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.engine import mujoco
@@ -170,8 +171,7 @@ class UsdFile(ModelFile):
         over = Sdf.CreatePrimInLayer(layer, path)
         if not self.stage.GetPrimAtPath(path).HasAPI(UsdPhysics.MassAPI):
             over.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=["PhysicsMassAPI"]))
-        moments, axes = np.linalg.eigh(body.inertia)
-        axes[:, 2] *= np.linalg.det(axes)
+        moments, axes = principal(body.inertia)
         turn = scipy.spatial.transform.Rotation.from_matrix(axes).as_quat(scalar_first=True)
         for name, kind, value in (
             ("mass", Sdf.ValueTypeNames.Float, body.mass / mass),
