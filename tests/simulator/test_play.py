@@ -5,7 +5,7 @@ import pytest
 from tests import servo_arm
 
 from irtwin.simulator.alone import alone
-from irtwin.simulator.play import each, play, whole
+from irtwin.simulator.play import commanded, each, play, whole
 
 
 def test_commands_are_held_until_the_next_and_come_late(tmp_path):
@@ -14,7 +14,7 @@ def test_commands_are_held_until_the_next_and_come_late(tmp_path):
     data_set, _, own = servo_arm.read(*servo_arm.write(tmp_path, {"a": told}))
     stretch, begin = whole(data_set.runs[0]), np.arange(0.0, 1.0, 0.01)
     numbers = servo_arm.changed(own, delay=(0.0, 0.1), offset=(0.2, 0.0))
-    found = stretch.commands(begin, 0.01, numbers)
+    (found,) = commanded(own, [(numbers, stretch)], begin, 0.01)
     np.testing.assert_allclose(found[:, 0], 0.2 + (begin > 0.495), atol=1e-9)
     np.testing.assert_allclose(found[:, 1], begin > 0.595, atol=1e-9)
 

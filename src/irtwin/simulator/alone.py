@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import scipy
@@ -19,7 +20,7 @@ from irtwin.signals.filter import smoothed
 from irtwin.signals.sampling import interval
 from irtwin.simulator.engine import mujoco
 from irtwin.simulator.payload import loaded
-from irtwin.simulator.play import PlayedStretch
+from irtwin.simulator.play import PlayedStretch, commanded
 from irtwin.simulator.servos import NAMES, OF_JOINTS, OF_ROBOT, Servos, tilted
 
 _SMOOTH = 0.25  # s, over which measured positions are smoothed for their speed and acceleration
@@ -58,19 +59,11 @@ class Alone:
     def _some(self, numbers: np.ndarray) -> list[list[np.ndarray]]:
         steps = self.load.shape[1]
         begin = np.arange(steps) * self.step
-        offset = NAMES.index("offset")
-        known: dict[bytes, np.ndarray] = {}  # many sets have their commands as late, and led as far
-        commanded = np.empty((steps, len(numbers), len(self.stretches), numbers.shape[2]))
-        for place, own in enumerate(numbers):
-            without = np.where(np.arange(len(NAMES))[:, None] == offset, 0.0, own)
-            lead = self.servos.lead(own)
-            asked = np.append(own[NAMES.index("delay")], lead).tobytes()
-            if asked not in known:
-                damps_error = self.servos.model.file.damps_error
-                every = [stretch.commands(begin, self.step, without, lead, damps_error) for stretch in self.stretches]
-                known[asked] = np.stack(every, axis=1)
-            commanded[:, place] = known[asked] + own[offset]
-        moved = self._moved(numbers, commanded, self._fed(numbers, begin))
+        told = np.empty((steps, len(numbers) * len(self.stretches), numbers.shape[2]))
+        for place, commands in enumerate(commanded(self.servos, product(numbers, self.stretches), begin, self.step)):
+            told[:, place] = commands
+        by_set = told.reshape(steps, len(numbers), len(self.stretches), -1)
+        moved = self._moved(numbers, by_set, self._fed(numbers, begin))
         at = [stretch.time / self.step for stretch in self.stretches]
         return [
             [_between(moved[:, :, set_index, place], at[place]) for place in range(len(self.stretches))]
@@ -89,7 +82,7 @@ class Alone:
         every = [[stretch.fed(feedforward, begin, own) for stretch in self.stretches] for own in some]
         return np.moveaxis(np.array(every), 2, 0)
 
-    def _moved(self, numbers: np.ndarray, commanded: np.ndarray, fed: np.ndarray) -> np.ndarray:
+    def _moved(self, numbers: np.ndarray, told: np.ndarray, fed: np.ndarray) -> np.ndarray:
         """Return what joints do (steps + 1, c, v, p, n), as `measured`, under the commands told (steps, v, p, n).
 
         `fed`: the torque that their controller adds.
@@ -108,15 +101,15 @@ class Alone:
         lower, upper = self._stops()
         banded, lags, sprung = bool(band.any()), bool((share < 1).any()), bool(spring.any())
         stopped, below = bool(np.isfinite([lower, upper]).any()), -band
-        moved = np.empty((len(commanded) + 1, self.stretches[0].measured.shape[1], *commanded.shape[1:]))
-        q, v = (np.broadcast_to(state, commanded.shape[1:]).copy() for state in self.begun)
+        moved = np.empty((len(told) + 1, self.stretches[0].measured.shape[1], *told.shape[1:]))
+        q, v = (np.broadcast_to(state, told.shape[1:]).copy() for state in self.begun)
         followed, off, force, held = q.copy(), *np.empty((3, *q.shape))
         # of one shape and in place: at each step these take most of the time of a fit
         stiffness, servo, joint, least, most, negative, friction = (
             np.broadcast_to(of, q.shape).copy() for of in (stiffness, servo, joint, least, most, -friction, friction)
         )
         moved[0, 0] = q
-        for row, asked in enumerate(commanded):
+        for row, asked in enumerate(told):
             if (within := row % _STEPS) == 0:
                 inertia = bodies[row : row + _STEPS] + armature
                 firm = 1 / (1 + soft * inertia)

@@ -269,12 +269,10 @@ class Fit:
         """Return numbers with the limits of torque that are better, if any: one that is never reached has no slope."""
         numbers, row = self.servos.of_chart(best.at), NAMES.index("torque_limit")
         _, servo = self.servos.dampings(numbers[NAMES.index("damping")])
-        asked = [
-            np.abs(
-                numbers[0] * (stretch.commands(stretch.time, 1e-3, numbers) - stretch.q) - servo * stretch.speed
-            ).max(axis=0)
-            for stretch in self.stretches
-        ]
+        asked = []
+        for stretch in self.stretches:
+            off = stretch.commands(stretch.time, 1e-3, numbers) + numbers[NAMES.index("offset")] - stretch.q
+            asked.append(np.abs(numbers[0] * off - servo * stretch.speed).max(axis=0))
         better, most = best, np.minimum(numbers[row], np.max(asked, axis=0))
         for shares, about in ((_LIMITS, most), (_NEARER, None)):
             middle = self.servos.of_chart(better.at)[row] if about is None else about

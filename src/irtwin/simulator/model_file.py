@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 from xml.parsers import expat
 
 import pinocchio as pin
@@ -17,7 +18,7 @@ from irtwin.robot.xml_elements import Element, outermost, with_child
 from irtwin.simulator.engine import mujoco
 
 _MOST = 20_000_000  # bytes
-_IN_URDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
+IN_DYNAMICS = {"damping": "damping", "frictionloss": "friction"}  # of URDF and SDF, by what MJCF calls them
 _FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
 
 
@@ -33,6 +34,7 @@ class ModelFile:
     path: Path
     content: bytes
     elements: tuple[Element, ...]
+    damps_error: ClassVar[bool] = False  # whether its servos damp how fast the error changes, not how the joint moves
 
     def changed(self, changes: Changes, bodies: Bodies | None = None) -> bytes:
         """Return the file with attributes of elements, and bodies, changed; all else stays, byte for byte.
@@ -85,18 +87,13 @@ class ModelFile:
         raise InputError(f'{self.path}: has no <{tags[0]} {key}="{value}"> of its own; give the file that defines it')
 
     @property
-    def damps_error(self) -> bool:
-        """Whether its servos damp how fast the error changes, not how fast the joint moves."""
-        return False
-
-    @property
     def is_urdf(self) -> bool:
         """Whether it is a URDF."""
         return any(element.tag == "robot" for element in self.elements[:1])
 
     def holds(self, number: str) -> bool:
         """Return whether it has a place for a number, by what MJCF calls it."""
-        return not self.is_urdf or number in _IN_URDF
+        return not self.is_urdf or number in IN_DYNAMICS
 
     def check_written(self, out: Path) -> None:
         """Raise InputError where it cannot be written to another file."""
@@ -114,7 +111,7 @@ class ModelFile:
         if dynamics is None:
             dynamics = Element("dynamics", {}, own.inside, own.inside)  # yet to come
             own.children.append(dynamics)
-        return dynamics, _IN_URDF[number]
+        return dynamics, IN_DYNAMICS[number]
 
     def inertial(self, body: str) -> Element | None:
         """Return a body's own inertial, None where the file has none: included, or taken from geoms."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ from irtwin.simulator.servos import NAMES, Servos
 from irtwin.simulator.variant import PlayedModel
 
 _AROUND = 0.1  # s about a beginning, of which position and speed there are taken
-_IN_COMMANDS = [NAMES.index("delay"), NAMES.index("offset")]
+_DELAY, _OFFSET = NAMES.index("delay"), NAMES.index("offset")
 _MOST = 20_000_000  # values of states that are held at a time: 160 MB
 
 
@@ -96,7 +96,7 @@ class PlayedStretch:
 
     def fed(self, feedforward: Feedforward, begin: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """Return the torque (N, n) that a controller adds over steps that begin at times (N,), s, by numbers (k, n)."""
-        return feedforward.torque(self.run, self.begin + begin, numbers[NAMES.index("delay")])
+        return feedforward.torque(self.run, self.begin + begin, numbers[_DELAY])
 
     def commands(
         self, begin: np.ndarray, step: float, numbers: np.ndarray, lead: np.ndarray | float = 0.0,
@@ -104,8 +104,8 @@ class PlayedStretch:
     ) -> np.ndarray:  # fmt: skip
         """Return the commands (N, n) in force, on average, over steps that begin at times (N,), s since its beginning.
 
-        Each command is in force until the next comes; delay and offset of `numbers` (k, n) are in them, and so is a
-        commanded speed over `lead` (n,) s, where one was logged, or by `damps_error` that of the commands.
+        Each command is in force until the next comes; the delay of `numbers` (k, n) is in them, and so is a commanded
+        speed over `lead` (n,) s, where one was logged, or by `damps_error` that of the commands.
         """
         time, told, speed = self.run.signals.time, self.run.signals.command, self.run.signals.command_speed
         assert told is not None
@@ -117,9 +117,9 @@ class PlayedStretch:
         summed = np.vstack([np.zeros(told.shape[1]), np.cumsum(held * np.diff(ends)[:, None], axis=0)])
         commands = np.empty((len(begin), told.shape[1]))
         for k in range(told.shape[1]):
-            at = self.begin + begin - numbers[NAMES.index("delay"), k]
+            at = self.begin + begin - numbers[_DELAY, k]
             commands[:, k] = (np.interp(at + step, ends, summed[:, k]) - np.interp(at, ends, summed[:, k])) / step
-        return np.asarray(commands + numbers[NAMES.index("offset")])
+        return commands
 
 
 def speeds(time: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -143,6 +143,19 @@ def each(run: Run, seconds: float, most: int, pushes: tuple[Push, ...] = ()) -> 
     begins = time[0] + np.maximum((np.arange(count) + 0.5) * lasts / count - seconds / 2, 0.0)
     ends = [np.searchsorted(time, [begin - 1e-9, begin + seconds - 1e-9]) for begin in begins]
     return [PlayedStretch(run, slice(*rows), float(begin), pushes) for rows, begin in zip(ends, begins, strict=True)]
+
+
+def commanded(
+    servos: Servos, played: Iterable[tuple[np.ndarray, PlayedStretch]], begin: np.ndarray, step: float
+) -> Iterator[np.ndarray]:
+    """Yield the commands (N, n), offset and all, of numbers (k, n) and a stretch each, over steps as `commands` has."""
+    known: dict[tuple[bytes, int], np.ndarray] = {}  # many numbers have them as late, and led as far
+    for numbers, stretch in played:
+        lead = servos.lead(numbers)
+        asked = np.vstack([numbers[_DELAY], lead]).tobytes(), id(stretch)
+        if asked not in known:
+            known[asked] = stretch.commands(begin, step, numbers, lead, servos.model.file.damps_error)
+        yield known[asked] + numbers[_OFFSET]
 
 
 def play(
@@ -192,15 +205,11 @@ def _played(
     at_once = max(1, _MOST // (steps * size))
     begin, after = np.arange(steps) * step, np.arange(1, steps + 1) * step
     for first in range(0, len(pairs), at_once):
-        known: dict[tuple[bytes, int], np.ndarray] = {}  # many sets have their commands as late, and led as far
         some = pairs[first : first + at_once]
         told = np.zeros((len(some), steps, compiled.nu + compiled.nv))
-        for row, (set_index, place) in enumerate(some):
-            lead, damps_error = servos.lead(numbers[set_index]), servos.model.file.damps_error
-            asked = np.vstack([numbers[set_index][_IN_COMMANDS], lead]).tobytes(), place
-            if asked not in known:
-                known[asked] = stretches[place].commands(begin, step, numbers[set_index], lead, damps_error)
-            commands = known[asked]
+        played = ((numbers[set_index], stretches[place]) for set_index, place in some)
+        every = zip(some, commanded(servos, played, begin, step), strict=True)
+        for row, ((set_index, place), commands) in enumerate(every):
             for drives in (servos.actuators, *([variant.second] if len(variant.second) else [])):
                 told[row][:, drives] = commands
             torque = stretches[place].pushed(servos.model, begin, step)
@@ -220,10 +229,10 @@ def _played(
         for row, (set_index, place) in enumerate(some):
             time = stretches[place].time
             q = variant.measured(np.vstack([begun[row], reached[row]])[:, 1 : 1 + compiled.nq], on_links[set_index])
-            played = [_at(time, np.concatenate([[0.0], after]), q)]
+            moved = [_at(time, np.concatenate([[0.0], after]), q)]
             if stretches[place].run.signals.torque is not None:
-                played.append(_at(time, begin, sensed[row][:, efforts]))
-            yield np.stack(played, axis=1)
+                moved.append(_at(time, begin, sensed[row][:, efforts]))
+            yield np.stack(moved, axis=1)
 
 
 @contextmanager

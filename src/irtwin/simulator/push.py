@@ -6,7 +6,7 @@ a force at the flange explains the torques of all joints together, it is fitted 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,7 +144,8 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
     """Return a push of a stretch, its force and its ends fitted by rollouts, and what the model does with it."""
     here = _played(fit, best, place, [push])[0]
     for _ in range(_PASSES):
-        sums = fit.sums(here, range(len(_STEPS)), _played(fit, best, place, list(_moved(push))), _STEPS)
+        moved = _played(fit, best, place, [_changed(push, change) for change in np.diag(_STEPS)])
+        sums = fit.sums(here, range(len(_STEPS)), moved, _STEPS)
         off = np.append(push.force, np.zeros(3)) / _LIKELY
         equations = sums.together().together().likely(off, _DEVIATIONS).damped(1e-9)
         step = equations.step()
@@ -165,22 +166,17 @@ def _fitted(fit: Fit, best: Played, place: int, push: Push) -> tuple[FoundPush, 
     return FoundPush(push, odds, np.sqrt(variance)), here
 
 
-def _moved(push: Push) -> Iterator[Push]:
-    """Yield the push with each of its numbers changed."""
-    for axis, step in zip(np.eye(3), _STEPS, strict=False):
-        yield replace(push, force=push.force + step * axis)
-    for name, step in zip(("start", "stop", "rise"), _STEPS[3:], strict=True):
-        yield replace(push, **{name: getattr(push, name) + float(step)})
+def _changed(push: Push, change: np.ndarray) -> Push:
+    """Return a push with its numbers, force, ends and rise, changed by so much (6,)."""
+    start, stop, rise = (np.array([push.start, push.stop, push.rise]) + change[3:]).tolist()
+    return replace(push, force=push.force + change[:3], start=start, stop=stop, rise=rise)
 
 
 def _stepped(push: Push, step: np.ndarray) -> Push:
-    start, stop, rise = (
-        value + change for value, change in zip((push.start, push.stop, push.rise), step[3:].tolist(), strict=True)
-    )
-    stop = max(stop, start + 2 * _BIN)
-    return replace(
-        push, force=push.force + step[:3], start=start, stop=stop, rise=min(max(rise, _SHARP), (stop - start) / 2)
-    )
+    """Return a push after a step (6,), no shorter and no sharper than one can be."""
+    ahead = _changed(push, step)
+    stop = max(ahead.stop, ahead.start + 2 * _BIN)
+    return replace(ahead, stop=stop, rise=min(max(ahead.rise, _SHARP), (stop - ahead.start) / 2))
 
 
 def _played(fit: Fit, best: Played, place: int, pushes: Sequence[Push]) -> list[Played]:

@@ -24,13 +24,12 @@ from irtwin.robot.xml_elements import Element as XmlElement
 from irtwin.robot.xml_elements import numbers, outermost, with_child
 from irtwin.simulator.assembly import WORLD, ModelJoint, ModelLink, assembled
 from irtwin.simulator.engine import mujoco
-from irtwin.simulator.model_file import Changes, ModelFile
+from irtwin.simulator.model_file import IN_DYNAMICS, Changes, ModelFile
 
-_IN_SDF = {"damping": "damping", "frictionloss": "friction"}  # of <dynamics>, by what MJCF calls them
 _CONTROLLER = "JointPositionController"
 _OF_CONTROLLER = {"kp": ("p_gain",), "kv": ("d_gain",), "forcerange": ("cmd_min", "cmd_max")}  # by what MJCF says
 _BY_ITSELF = {"p_gain": 1.0, "d_gain": 0.01, "cmd_max": 1000.0}  # what Gazebo takes where none is said
-_READ = {**_IN_SDF, "stiffness": "spring_stiffness", "springref": "spring_reference"}
+_READ = {**IN_DYNAMICS, "stiffness": "spring_stiffness", "springref": "spring_reference"}
 _KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 _KNOWN = {  # where a word that SDF does not know would take a number away
     "dynamics": {*_READ.values()},
@@ -49,18 +48,15 @@ class SdfFile(ModelFile):
     Its controllers are among its elements as servos, <position joint="...">, too.
     """
 
-    @property
-    def damps_error(self) -> bool:
-        """As Gazebo's controllers do."""
-        return True
+    damps_error = True  # as Gazebo's controllers do
 
     def holds(self, number: str) -> bool:
         """Return whether it has a place for a number, by what MJCF calls it."""
-        return number in _IN_SDF or number in _OF_CONTROLLER
+        return number in IN_DYNAMICS or number in _OF_CONTROLLER
 
     def number(self, joint: str, number: str) -> tuple[XmlElement, str]:
         """Return the joint, and the element of its <dynamics> that holds a number."""
-        return self.element(["joint"], "name", joint), _IN_SDF[number]
+        return self.element(["joint"], "name", joint), IN_DYNAMICS[number]
 
     def _inertial(self, body: pin.Inertia) -> str:
         return tostring(sdf_text.inertial(body), encoding="unicode")

@@ -269,11 +269,8 @@ class Servos:
             changed |= {"gainprm": told["stiffness"], "biasprm": bias}
             compiled, at = self.model.compiled, self.actuators[place]
             if compiled.actuator_actnum[at]:
-                changed |= {
-                    "timeconst": None,
-                    "dyntype": "filterexact",
-                    "dynprm": float(compiled.actuator_dynprm[at, 0]),
-                }
+                constant = float(compiled.actuator_dynprm[at, 0])
+                changed |= {"timeconst": None, "dyntype": "filterexact", "dynprm": constant}
             if compiled.actuator_ctrllimited[at] and "ctrlrange" not in servo.attributes:
                 ends = np.sort(compiled.actuator_ctrlrange[at] * self.gears[place])
                 changed["ctrlrange"] = " ".join(map(repr, ends.tolist()))
@@ -361,15 +358,9 @@ def drive_of(compiled: mujoco.MjModel, joint: str, source: str) -> int:
 
 def _servo(compiled: mujoco.MjModel, joint: str) -> int | None:
     """Return the actuator that alone drives a joint, if it is a position servo."""
-    drives = _drives(compiled, joint)
-    return drives[0] if len(drives) == 1 and _follows_position(compiled, drives[0]) else None
-
-
-def _drives(compiled: mujoco.MjModel, joint: str) -> list[int]:
-    """Return the actuators of a joint."""
     at_joint = compiled.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
-    own: list[int] = np.flatnonzero(at_joint & (compiled.actuator_trnid[:, 0] == compiled.joint(joint).id)).tolist()
-    return own
+    drives = np.flatnonzero(at_joint & (compiled.actuator_trnid[:, 0] == compiled.joint(joint).id)).tolist()
+    return drives[0] if len(drives) == 1 and _follows_position(compiled, drives[0]) else None
 
 
 def _follows_position(compiled: mujoco.MjModel, actuator: int) -> bool:

@@ -167,23 +167,20 @@ def parts(
         for count in range(len(families))
         for some in combinations(families, count)
     }
-    wanted, rows = sorted(sets, key=sorted), []
+    squares = {subset: np.empty((len(stretches), *stretches[0].measured.shape[1:])) for subset in sets}
     for same in track(_alike(stretches, numbers), "what each number closes in runs"):
-        some = [stretches[place] for place in same]
-        by_subset = []
-        for subset in wanted:
+        robots = numbers[stretches[same[0]].run.name]
+        for subset, left in squares.items():
             those = tuple(push for name, push in pushes.items() if name in subset)
-            pushed = [replace(stretch, pushes=those) for stretch in some]
-            each_set = np.where(_rows(subset), numbers[some[0].run.name], own.numbers)
-            by_subset.append(_squares(own, each_set, pushed))
-        rows += list(zip(same, np.moveaxis(np.array(by_subset), 1, 0), strict=True))
-    squares = np.array([row for _, row in sorted(rows, key=lambda row: row[0])])  # (stretches, sets, c, n)
-    runs = [stretch.run.name for stretch in stretches]
-    group = [runs.index(name) for name in runs] if len(set(runs)) > 1 else list(range(len(runs)))
-    means = np.array(
-        [squares[[at for at, of in enumerate(group) if of == index]].mean(axis=0) for index in sorted(set(group))]
-    )
-    return Parts(names, {subset: means[:, place] for place, subset in enumerate(wanted)})
+            pushed = [replace(stretches[place], pushes=those) for place in same]
+            differs = np.array([part_of(name) in subset for name in NAMES])[:, None]
+            played = play(own, [np.where(differs, robots, own.numbers)], pushed)[0]
+            for place, stretch, moved in zip(same, pushed, played, strict=True):
+                left[place] = ((stretch.measured - moved) ** 2).mean(axis=0)
+    runs = np.array([stretch.run.name for stretch in stretches])
+    groups = [runs == name for name in dict.fromkeys(runs)] if len(set(runs)) > 1 else np.eye(len(runs), dtype=bool)
+    means = {subset: np.array([left[group].mean(axis=0) for group in groups]) for subset, left in squares.items()}
+    return Parts(names, means)
 
 
 def _alike(stretches: Sequence[PlayedStretch], numbers: OfRun) -> list[list[int]]:
@@ -192,14 +189,3 @@ def _alike(stretches: Sequence[PlayedStretch], numbers: OfRun) -> list[list[int]
     for place, stretch in enumerate(stretches):
         by_numbers.setdefault(numbers[stretch.run.name].tobytes(), []).append(place)
     return list(by_numbers.values())
-
-
-def _rows(names: frozenset[str]) -> np.ndarray:
-    return np.array([part_of(name) in names for name in NAMES])[:, None]
-
-
-def _squares(own: Servos, numbers: np.ndarray, stretches: Sequence[PlayedStretch]) -> np.ndarray:
-    played = play(own, [numbers], stretches)[0]
-    return np.array(
-        [((stretch.measured - moved) ** 2).mean(axis=0) for stretch, moved in zip(stretches, played, strict=True)]
-    )
