@@ -76,7 +76,7 @@ def keeps(motion: Movement | Timed, limits: MotionLimits, torque: Torque, collis
     """Return whether a motion keeps all limits and touches nothing."""
     time = np.linspace(0, motion.seconds, _DENSE)
     states = motion.motion(time)
-    if any(share.max() > 1 for share in shares(states, limits, torque).values()):
+    if any(np.abs(share).max() > 1 for share in shares(states, limits, torque).values()):
         return False
     return collisions.first_meeting(time, states[0])[0] is None
 
@@ -151,7 +151,8 @@ class _OnPath:
         s, ds, dds, ddds = self.spline.states(points)
         states = along(self._path, s, ds, dds, ddds)
         taken = float(np.trapezoid(self._power(self._time, *states[:3]), self._time))
-        passed = [np.maximum(share - _SHARE, 0) for share in shares(states, self._limits, self._torque).values()]
+        used = shares(states, self._limits, self._torque).values()
+        passed = [np.maximum(np.abs(share) - _SHARE, 0) for share in used]
         backward = np.minimum(ds, 0) * self._time[-1]
         return taken + stiffness * float(sum((over**2).sum() for over in (*passed, backward))) / len(self._time)
 
@@ -216,22 +217,16 @@ class _Search:
     def _walls(self, states: list[np.ndarray]) -> tuple[float, list[np.ndarray]]:
         """Return the mean square by which limits are passed, and its slope over each sample's q, dq, ddq, jerk."""
         limits = self._limits
-        half = (limits.upper - limits.lower) / 2
-        ranges = (half, limits.speed, limits.acceleration, limits.jerk)
-        centres = ((limits.upper + limits.lower) / 2, 0.0, 0.0, 0.0)
         value, slopes = 0.0, []
-        for state, centre, greatest in zip(states, centres, ranges, strict=True):
-            share = (state - centre) / greatest
+        taken = shares((states[0], states[1], states[2], states[3]), limits, self._torque).values()
+        for share, greatest in zip(taken, (*limits.ranges, limits.jerk, limits.torque), strict=True):
             beyond = np.sign(share) * np.maximum(np.abs(share) - _SHARE, 0)
-            value += float((beyond**2).sum()) / len(state)
-            slopes.append(2 * beyond / greatest / len(state))
-        if np.isfinite(limits.torque).any():
-            share = self._torque(*states[:3]) / limits.torque
-            beyond = np.sign(share) * np.maximum(np.abs(share) - _SHARE, 0)
-            if beyond.any():
-                value += float((beyond**2).sum()) / len(beyond)
-                for order, joint, change in self._changes(self._torque, states[:3]):
-                    slopes[order][:, joint] += 2 * (beyond * change / limits.torque).sum(axis=1) / len(share)
+            value += float((beyond**2).sum()) / len(share)
+            slopes.append(2 * beyond / greatest / len(share))
+        *slopes, by_torque = slopes
+        if by_torque.any():
+            for order, joint, change in self._changes(self._torque, states[:3]):
+                slopes[order][:, joint] += (by_torque * change).sum(axis=1)
         return value, slopes
 
     def _distances(self, q: np.ndarray) -> tuple[float, list[np.ndarray]]:

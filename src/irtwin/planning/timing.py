@@ -131,15 +131,14 @@ def fastest(path: BSpline, limits: MotionLimits, torque: Torque) -> Timed:
 
 
 def shares(motion: States, limits: MotionLimits, torque: Torque) -> dict[str, np.ndarray]:
-    """Return how much of each limit a motion (q, dq, ddq, jerk) takes, (N, n) each; above one where it passes it."""
+    """Return how much of each limit a motion (q, dq, ddq, jerk) takes, (N, n) each; beyond -1 or 1 where it passes."""
     q, dq, ddq, jerk = motion
-    half = (limits.upper - limits.lower) / 2
     return {
-        "position": np.abs(q - (limits.upper + limits.lower) / 2) / half,
-        "speed": np.abs(dq) / limits.speed,
-        "acceleration": np.abs(ddq) / limits.acceleration,
-        "jerk": np.abs(jerk) / limits.jerk,
-        "torque": np.abs(torque(q, dq, ddq)) / limits.torque,
+        "position": (q - limits.centre) / limits.ranges[0],
+        "speed": dq / limits.speed,
+        "acceleration": ddq / limits.acceleration,
+        "jerk": jerk / limits.jerk,
+        "torque": torque(q, dq, ddq) / limits.torque,
     }
 
 
@@ -233,11 +232,11 @@ def _smoothed(path: BSpline, time: np.ndarray, place: np.ndarray, speed: np.ndar
 def _within(timed: Timed, limits: MotionLimits, torque: Torque) -> Timed | None:
     """Return the motion as much slower as a limit asks; None where torque is short at any speed."""
     used = shares(timed.motion(np.linspace(0, timed.seconds, _DENSE)), limits, torque)
-    most = [float(used[name].max()) / _RESERVE for name in ("speed", "acceleration", "jerk")]
+    most = [float(np.abs(used[name]).max()) / _RESERVE for name in ("speed", "acceleration", "jerk")]
     timed = timed.slower(timed.seconds * max(most[0], most[1] ** 0.5, most[2] ** (1 / 3)))
     while timed.stretch < _SLOWEST:
         motion = timed.motion(np.linspace(0, timed.seconds, _DENSE))
-        if shares(motion, limits, torque)["torque"].max() <= _RESERVE:
+        if np.abs(shares(motion, limits, torque)["torque"]).max() <= _RESERVE:
             return timed
         timed = timed.slower(timed.seconds * _SLOWER)
     return None

@@ -77,7 +77,9 @@ def body_regressor(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
     regressor = np.zeros((count, 10 * count, len(q)))
     for cut in _pieces(len(q)):
         states = (np.ascontiguousarray(signal[cut].T) for signal in (q, dq, ddq))
-        _fill(regressor[:, :, cut], joints, model.gravity.vector, *states)
+        for index, (own, chain) in enumerate(_motions(joints, model.gravity.vector, *states)):
+            for carrier, torque in zip(chain, _torques(own), strict=True):
+                regressor[carrier, 10 * index : 10 * index + 10, cut] = torque
     return regressor.transpose(2, 0, 1)
 
 
@@ -91,7 +93,7 @@ def carried_bodies(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndar
     for cut in _pieces(len(q)):
         states = (np.ascontiguousarray(signal[cut].T) for signal in (q, dq, ddq, along))
         for index, (own, _) in enumerate(_motions(joints, model.gravity.vector, *states)):
-            carried[10 * index : 10 * index + 10, cut] = _torques(own[2:], own[0], own[1])[0]
+            carried[10 * index : 10 * index + 10, cut] = _torques(own)[0]
     return carried.T
 
 
@@ -149,15 +151,6 @@ def _pieces(samples: int) -> Iterator[slice]:
     """Yield the samples in pieces alike: a short one takes as many calls as a long one."""
     edges = np.linspace(0, samples, -(-samples // _PIECE) + 1).astype(int).tolist()
     return map(slice, edges[:-1], edges[1:])
-
-
-def _fill(
-    regressor: np.ndarray, joints: Sequence[_Joint], gravity: np.ndarray, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
-) -> None:
-    """Write the regressor (n, 10 n, N) of a few samples (n, N)."""
-    for index, (own, chain) in enumerate(_motions(joints, gravity, q, dq, ddq)):
-        for carrier, torque in zip(chain, _torques(own[2:], own[0], own[1]), strict=True):
-            regressor[carrier, 10 * index : 10 * index + 10] = torque
 
 
 def _motions(
@@ -237,12 +230,12 @@ def _axial(rows: np.ndarray) -> np.ndarray:
     return np.array([rows[1, 2] - rows[2, 1], rows[2, 0] - rows[0, 2], rows[0, 1] - rows[1, 0]])
 
 
-def _torques(carried: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Return (m, 10, N): what a body's parameters make of the torque of m axes.
+def _torques(own: np.ndarray) -> np.ndarray:
+    """Return (m, 10, N): what a body's parameters make of the torque of m axes, by its motions (2 + m, 6, N).
 
-    carried: (m, 6, N), what a unit of each axis' speed makes of the body's motion; speed, acceleration: (6, N) of the
-    body, the latter less gravity. Mass acts along the line alone, inertia about the turn alone.
+    Mass acts along the line alone, inertia about the turn alone.
     """
+    (speed, acceleration), carried = own[:2], own[2:]
     a = acceleration[:3] + _cross(speed[3:], speed[:3])
     torques = np.empty((len(carried), 10, speed.shape[1]))
     np.einsum("mkn,kn->mn", carried[:, :3], a, out=torques[:, 0])

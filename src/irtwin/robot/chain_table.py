@@ -16,7 +16,7 @@ import pinocchio as pin
 from irtwin.errors import InputError
 from irtwin.robot.denavit_hartenberg import CONVENTIONS, ChainTable, Row, row_transform, screw_x, screw_z
 from irtwin.robot.description import Robot
-from irtwin.robot.kinematics import flange, joint_axes, link_frame, ranges
+from irtwin.robot.kinematics import flange, joint_axes, link_frame, placements, ranges
 from irtwin.robot.structure import six_numbers
 
 PARALLEL = 1e-5  # rad: axes nearer to parallel than this are taken as such, because files round their angles
@@ -54,15 +54,10 @@ def deviation(robot: Robot, table: ChainTable, tip: str | None = None) -> tuple[
     """Return by how much table and robot differ at most over poses drawn within the limits: m, and rad."""
     name = tip or flange(robot)
     chain, _ = _chain(robot, name)
-    draw = np.random.default_rng(0)
-    model, data, frame = robot.model, robot.model.createData(), link_frame(robot, name)
-    far, turned = 0.0, 0.0
-    for q in draw.uniform(*ranges(robot), (_POSES, len(robot.joints))):
-        pin.framesForwardKinematics(model, data, q)
-        place, by_table = data.oMf[frame], table.flange(q[[joint - 1 for joint in chain]])
-        far = max(far, float(np.abs(by_table[:3, 3] - place.translation).max()))
-        turned = max(turned, float(np.abs(by_table[:3, :3] - place.rotation).max()))
-    return far, turned
+    poses = np.random.default_rng(0).uniform(*ranges(robot), (_POSES, len(robot.joints)))
+    by_table = np.array([table.flange(q[[joint - 1 for joint in chain]]) for q in poses])
+    off = np.abs(by_table - placements(robot, poses, name)).max(axis=0)
+    return float(off[:3, 3].max()), float(off[:3, :3].max())
 
 
 def _chain(robot: Robot, tip: str) -> tuple[list[int], np.ndarray]:
@@ -78,17 +73,13 @@ def _chain(robot: Robot, tip: str) -> tuple[list[int], np.ndarray]:
 
 def _first_frame(axis: _Line) -> np.ndarray:
     """Return the frame on axis 1 that is nearest to the base's: its x as the base's, its origin beside the base's."""
-    x = np.eye(3)[1 if abs(axis.direction[0]) > 0.9 else 0]  # the base's y, where axis 1 lies along its x
-    return _frame(axis.direction, x, axis.point - axis.direction * float(axis.point @ axis.direction))
-
-
-def _frame(z: np.ndarray, x: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    frame = np.eye(4)
+    frame, z = np.eye(4), axis.direction
+    x = np.eye(3)[1 if abs(z[0]) > 0.9 else 0]  # the base's y, where axis 1 lies along its x
     x = x - z * float(z @ x)
     frame[:3, 0] = x / np.linalg.norm(x)
     frame[:3, 1] = np.cross(z, frame[:3, 0])
     frame[:3, 2] = z
-    frame[:3, 3] = origin
+    frame[:3, 3] = axis.point - z * float(axis.point @ z)
     return frame
 
 

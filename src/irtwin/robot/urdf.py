@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -39,10 +40,9 @@ def parse_urdf(text: str, source: str = "URDF") -> Robot:
     text = _declared(text)
     root = _parse(text, source)
     links = _links(root, source)
-    held = _held(root, source)
-    joints = _joints(root, links, source)
+    joints, held = _joints(root, links, source)
     _check_tree(root, links, source)
-    robot = Robot(name=root.get("name") or "robot", joints=(), links=tuple(links.values()), urdf=text, held=held)
+    robot = Robot(name=root.get("name") or "robot", joints=(), links=tuple(links.values()), urdf=text, held=tuple(held))
     try:
         order = list(robot.model.names)[1:]
     except (ValueError, RuntimeError) as error:
@@ -82,7 +82,7 @@ def _links(root: Element, source: str) -> dict[str, Link]:
         if name in links:
             raise InputError(f'{source}: two links are named "{name}"; give each its own name')
         mass = element.find("inertial/mass")
-        value = 0.0 if mass is None else _number(mass.get("value"), f'{source}: mass of link "{name}"')
+        (value,) = (0.0,) if mass is None else numbers(mass.get("value"), 1, f'{source}: mass of link "{name}"')
         if value < 0:
             raise InputError(f'{source}: link "{name}" has the negative mass {value} kg')
         _check_inertia(element, f'{source}: inertia of link "{name}"')
@@ -103,55 +103,48 @@ def _check_inertia(link: Element, where: str) -> None:
     inertia = link.find("inertial/inertia")
     if inertia is None:
         return
-    values = {key: _number(inertia.get(key, "0"), where) for key in MOMENTS}
+    values = {key: numbers(inertia.get(key, "0"), 1, where)[0] for key in MOMENTS}
     negative = [key for key in MOMENTS[:3] if values[key] < 0]
     if negative:
         raise InputError(f"{where}: {negative[0]} is negative, {values[negative[0]]} kg m^2")
 
 
-def _joints(root: Element, links: dict[str, Link], source: str) -> dict[str, Joint]:
+def _joints(root: Element, links: dict[str, Link], source: str) -> tuple[dict[str, Joint], list[str]]:
+    """Return the joints that move by name, and the names of those that mimic others, which stand still in the model."""
     joints: dict[str, Joint] = {}
-    seen: set[str] = set()
+    held: list[str] = []
+    named = Counter(joint.get("name") for joint in root.findall("joint"))
     for element in root.findall("joint"):
         name = _attribute(element, "name", source, "a joint")
         where = f'{source}: joint "{name}"'
-        if name in seen:
+        if named[name] > 1:
             raise InputError(f"{where} is defined twice; give each joint its own name")
-        seen.add(name)
-        for end in ("parent", "child"):
-            child = element.find(end)
-            link = None if child is None else child.get("link")
-            if link not in links:
-                raise InputError(f'{where}: its {end} link "{link}" is not defined')
-        origin_of(element, where)
-        kind = element.get("type")
+        _check_ends(element, links, where)
+        kind, mimic = element.get("type"), element.find("mimic")
         if kind == "fixed":
             continue
         if kind not in _MOVING:
             raise InputError(f'{where}: type "{kind}" cannot be modelled; use revolute, continuous, prismatic or fixed')
-        if element.find("mimic") is not None:
-            continue
-        joints[name] = _joint(element, name, kind, where)
+        if mimic is None:
+            joints[name] = _joint(element, name, kind, where)
+        elif mimic.get("joint") in named and mimic.get("joint") != name:
+            held.append(name)
+        else:
+            raise InputError(f'{where}: mimics "{mimic.get("joint")}", which is no other joint of this robot')
     if not joints:
         raise InputError(f"{source}: no joint moves; a robot needs at least one revolute or prismatic joint")
     if len(joints) > _MOST_JOINTS:
         raise InputError(f"{source}: {len(joints)} joints move; a robot of more than {_MOST_JOINTS} cannot be modelled")
-    return joints
+    return joints, held
 
 
-def _held(root: Element, source: str) -> tuple[str, ...]:
-    """Return the names of the joints that mimic others, which stand still in the model."""
-    names = [joint.get("name") for joint in root.findall("joint")]
-    held = []
-    for joint in root.findall("joint"):
-        mimic = joint.find("mimic")
-        if mimic is None or joint.get("type") == "fixed":
-            continue
-        name, other = str(joint.get("name")), mimic.get("joint")
-        if other not in names or other == name:
-            raise InputError(f'{source}: joint "{name}": mimics "{other}", which is no other joint of this robot')
-        held.append(name)
-    return tuple(held)
+def _check_ends(joint: Element, links: dict[str, Link], where: str) -> None:
+    for end in ("parent", "child"):
+        element = joint.find(end)
+        link = None if element is None else element.get("link")
+        if link not in links:
+            raise InputError(f'{where}: its {end} link "{link}" is not defined')
+    origin_of(joint, where)
 
 
 def _joint(element: Element, name: str, kind: str, where: str) -> Joint:
@@ -162,7 +155,7 @@ def _joint(element: Element, name: str, kind: str, where: str) -> Joint:
 
     def value(key: str, otherwise: float) -> float:
         text = None if limit is None else limit.get(key)
-        return otherwise if text is None else _number(text, f"{where}: limit {key}")
+        return otherwise if text is None else numbers(text, 1, f"{where}: limit {key}")[0]
 
     bounded = kind != "continuous" and limit is not None
     lower, upper = (value("lower", 0.0), value("upper", 0.0)) if bounded else (-math.inf, math.inf)
@@ -201,7 +194,3 @@ def _attribute(element: Element, key: str, source: str, owner: str) -> str:
     if not value:
         raise InputError(f'{source}: {owner} has no "{key}"')
     return value
-
-
-def _number(text: str | None, where: str) -> float:
-    return numbers(text, 1, where)[0]
