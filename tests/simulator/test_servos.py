@@ -19,6 +19,23 @@ def arm(folder, text=servo_arm.MODEL):
     return servo_arm.read(*servo_arm.write(folder, SWING, text))
 
 
+def rewritten(own, numbers, folder):
+    """Return the file that has numbers of a robot, and what is read of it."""
+    file = folder / "new.xml"
+    file.write_bytes(own.written(numbers, numbers != own.numbers))
+    return file, servo_arm.read(folder / "data", file)[2]
+
+
+def stepped(file, run, gears=1.0):
+    """Return positions as MuJoCo itself steps a file under the commands of a run, times gears."""
+    compiled = mujoco.MjModel.from_xml_path(str(file))
+    moving, found = mujoco.MjData(compiled), np.empty_like(run.signals.q)
+    for row, told in enumerate(run.signals.command):
+        found[row], moving.ctrl[:] = moving.qpos, gears * told
+        mujoco.mj_step(compiled, moving, round(0.02 / compiled.opt.timestep))
+    return found
+
+
 def test_a_models_servos_are_told_by_their_numbers(tmp_path):
     own = arm(tmp_path)[2]
     expected = [[20, 15], [0.9, 0.7], [0.05, 0.05], [0.9, 0.9], [0.02, 0.02], [0, 0], [0, 0], [5, 30 * np.pi]]
@@ -32,9 +49,7 @@ def test_what_differs_is_written_and_read_back(tmp_path):
         own, stiffness=(12.5, 15), damping=(0.05, 0.3), friction=(0.05, 0.2), holding=(0.9999, 0.9),
         armature=(0.02, 0.1), offset=(0, 0.02), delay=(0.033, 0), torque_limit=(5, 2), spring=(1.5, 0),
     )  # fmt: skip
-    file = tmp_path / "new.xml"
-    file.write_bytes(own.written(numbers, numbers != own.numbers))
-    again = servo_arm.read(tmp_path / "data", file)[2]
+    file, again = rewritten(own, numbers, tmp_path)
     np.testing.assert_allclose(again.numbers, numbers, rtol=1e-12, atol=1e-15)
     text = file.read_text()
     assert '<joint name="lift" axis="0 1 0" damping="0.05" stiffness="1.5" solimpfriction="0.9999 0.9999"/>' in text
@@ -47,24 +62,16 @@ def test_what_differs_is_written_and_read_back(tmp_path):
 def test_mujoco_has_a_delay_that_is_written_as_it_is_played(tmp_path, late):
     data, model = servo_arm.write(tmp_path, {"a": servo_arm.swings(2, 1)})
     data_set, _, own = servo_arm.read(data, model)
-    numbers, stretch = servo_arm.changed(own, delay=(late, 0.0)), whole(data_set.runs[0])
-    file = tmp_path / "new.xml"
-    file.write_bytes(own.written(numbers, numbers != own.numbers))
-    compiled = mujoco.MjModel.from_xml_path(str(file))
-    moving, found = mujoco.MjData(compiled), np.empty_like(stretch.q)
-    for row, told in enumerate(data_set.runs[0].signals.command):
-        found[row], moving.ctrl[:] = moving.qpos, told
-        mujoco.mj_step(compiled, moving, round(0.02 / compiled.opt.timestep))
-    np.testing.assert_allclose(found, play(own, [numbers], [stretch])[0][0][:, 0], atol=1e-9)
+    numbers, (run,) = servo_arm.changed(own, delay=(late, 0.0)), data_set.runs
+    found = stepped(rewritten(own, numbers, tmp_path)[0], run)
+    np.testing.assert_allclose(found, play(own, [numbers], [whole(run)])[0][0][:, 0], atol=1e-9)
 
 
 def test_a_tilt_is_written_as_gravity_where_the_file_has_options(tmp_path):
     text = servo_arm.MODEL.replace("<worldbody>", '<option gravity="0 0 -9.81"/><worldbody>')
     own = arm(tmp_path, text)[2]
     numbers = servo_arm.changed(own, tilt_x=(0.1, 0.1))
-    file = tmp_path / "new.xml"
-    file.write_bytes(own.written(numbers, numbers != own.numbers))
-    gravity = servo_arm.read(tmp_path / "data", file)[1].compiled.opt.gravity
+    gravity = rewritten(own, numbers, tmp_path)[1].model.compiled.opt.gravity
     np.testing.assert_allclose(gravity, 9.81 * np.array([0.0, np.sin(0.1), -np.cos(0.1)]), atol=1e-12)
     without = arm(tmp_path / "without")[2]
     assert without.written(numbers, numbers != own.numbers).decode() == servo_arm.MODEL
@@ -94,14 +101,10 @@ def test_a_servo_behind_a_gear_is_told_at_its_joint_and_played_as_mujoco_steps_i
     np.testing.assert_allclose(own.numbers[: len(expected)], expected, atol=1e-15)
     np.testing.assert_allclose(model.compiled.actuator_ctrlrange, [[-1.5, 1.5], [-1.5, 1.5]])
     assert own.clipped(np.array([[0.0, 1.0], [1.6, 0.0]])) == {"lift": 0.5}
-    compiled = mujoco.MjModel.from_xml_path(str(model.file.path))
-    moving, stretch = mujoco.MjData(compiled), whole(data_set.runs[0])
-    found = np.empty_like(stretch.q)
-    for row, told in enumerate(data_set.runs[0].signals.command):
-        found[row], moving.ctrl[:] = moving.qpos, np.array([2, -0.5]) * told
-        mujoco.mj_step(compiled, moving, round(0.02 / compiled.opt.timestep))
+    (run,) = data_set.runs
+    found = stepped(model.file.path, run, np.array([2, -0.5]))
     assert np.abs(found).max() > 0.3
-    np.testing.assert_allclose(play(own, [own.numbers], [stretch])[0][0][:, 0], found, atol=1e-9)
+    np.testing.assert_allclose(play(own, [own.numbers], [whole(run)])[0][0][:, 0], found, atol=1e-9)
 
 
 def test_a_damping_ratio_and_a_range_are_those_behind_the_gear(tmp_path):
@@ -119,9 +122,7 @@ def test_numbers_of_a_servo_behind_a_gear_are_written_as_its_file_has_them(tmp_p
     numbers = servo_arm.changed(
         own, stiffness=(12.0, 30.0), damping=(1.3, 0.5), offset=(0.02, -0.04), torque_limit=(3.0, 2.0)
     )
-    file = tmp_path / "new.xml"
-    file.write_bytes(own.written(numbers, numbers != own.numbers))
-    again = servo_arm.read(tmp_path / "data", file)[2]
+    file, again = rewritten(own, numbers, tmp_path)
     np.testing.assert_allclose(again.numbers, numbers, rtol=1e-12, atol=1e-15)
     text = file.read_text()
     assert 'gear="2"' in text and 'forcerange="-1.5 1.5"' in text and 'gainprm="3.0"' in text
