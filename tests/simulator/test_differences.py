@@ -99,11 +99,17 @@ def test_a_file_for_the_model_needs_a_model(tmp_path):
     assert (said.status, "--draws writes models beside that of --save-simulator" in said.err) == (2, True)
 
 
-@pytest.mark.parametrize("name", ["better.xml", "better-2.xml"])
-def test_a_model_that_is_there_is_not_written_over(tmp_path, name):
+@pytest.fixture
+def model(tmp_path):
+    """A model beside a data set of one run."""
     run = synthetic.as_run(synthetic.measure(ROBOT, synthetic.swing(ROBOT, 0, seconds=1.0)))
-    data_sets.write(tmp_path / "data", ROBOT, [run])
-    model, mine = mujoco_models.write(tmp_path / "arm.xml", ROBOT), tmp_path / name
+    data_sets.write(tmp_path / "data", ROBOT, [replace(run, name="run_0")])
+    return mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+
+
+@pytest.mark.parametrize("name", ["better.xml", "better-2.xml"])
+def test_a_model_that_is_there_is_not_written_over(tmp_path, model, name):
+    mine = tmp_path / name
     mine.write_text("mine")
     said = irtwin_refuses(
         "diagnose", tmp_path / "data", "--simulator", model, "--save-simulator", tmp_path / "better.xml", "--draws", 2
@@ -121,10 +127,7 @@ def test_a_model_that_is_there_is_not_written_over(tmp_path, name):
         ("--save-simulator", "data/runs/run_0.parquet"),
     ],
 )
-def test_what_a_diagnosis_is_made_of_is_not_written_over(tmp_path, option, name):
-    run = synthetic.as_run(synthetic.measure(ROBOT, synthetic.swing(ROBOT, 0, seconds=1.0)))
-    data_sets.write(tmp_path / "data", ROBOT, [replace(run, name="run_0")])
-    model = mujoco_models.write(tmp_path / "arm.xml", ROBOT)
+def test_what_a_diagnosis_is_made_of_is_not_written_over(tmp_path, model, option, name):
     file = tmp_path / name
     before, other_name = file.read_bytes(), tmp_path / "data" / ".." / name
     said = irtwin("diagnose", tmp_path / "data", "--simulator", model, option, other_name)
