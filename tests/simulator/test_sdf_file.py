@@ -17,7 +17,6 @@ from irtwin.simulator.model import read_model
 from irtwin.simulator.servos import NAMES, has_servos, servos
 from irtwin.twin.described import text_of
 
-mujoco = pytest.importorskip("mujoco")
 ONE = parse_urdf(
     '<robot name="one"><link name="base"/><link name="rod"/><joint name="pan" type="continuous">'
     '<parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>'

@@ -21,7 +21,6 @@ from irtwin.simulator.model import read_model
 from irtwin.simulator.servos import NAMES, servos
 from irtwin.twin.described import text_of
 
-mujoco = pytest.importorskip("mujoco")
 Sdf = pytest.importorskip("pxr.Sdf")
 PENDULUM = """#usda 1.0
 (

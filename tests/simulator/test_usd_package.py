@@ -16,7 +16,6 @@ from irtwin.simulator.model import read_model
 from irtwin.simulator.servos import NAMES, servos
 from irtwin.simulator.usd_package import check_package, new_name
 
-mujoco = pytest.importorskip("mujoco")
 Sdf = pytest.importorskip("pxr.Sdf")
 ROOT = '#usda 1.0\n(\n    metersPerUnit = 0.01\n    upAxis = "Y"\n    subLayers = [@{}@]\n)\n'
 

@@ -74,11 +74,9 @@ def cheapest(
 
 def keeps(motion: Movement | Timed, limits: MotionLimits, torque: Torque, collisions: CollisionModel) -> bool:
     """Return whether a motion keeps all limits and touches nothing."""
-    time = np.linspace(0, motion.seconds, _DENSE)
-    states = motion.motion(time)
-    if any(np.abs(share).max() > 1 for share in shares(states, limits, torque).values()):
-        return False
-    return collisions.first_meeting(time, states[0])[0] is None
+    states = motion.motion(np.linspace(0, motion.seconds, _DENSE))
+    within = all(np.abs(share).max() <= 1 for share in shares(states, limits, torque).values())
+    return within and collisions.is_clear(states[0])
 
 
 def energy(motion: Movement | Timed, power: Power) -> float:

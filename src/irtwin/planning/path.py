@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from time import monotonic
 from typing import Any
 
@@ -32,9 +31,8 @@ def joint_path(
     Straight to the goal where that is clear; else RRT-Connect (Kuffner and LaValle, 2000), shortened as a rope that is
     pulled. Raises InputError where none is found in `seconds`.
     """
-    if clear_between(collisions, start, goal):
-        return np.array([start, goal])
-    return _search(robot, collisions, start, goal, seconds)
+    straight = np.array([start, goal])
+    return straight if collisions.is_clear(straight) else _search(robot, collisions, start, goal, seconds)
 
 
 def line_path(robot: Robot, collisions: CollisionModel, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
@@ -61,11 +59,6 @@ def line_path(robot: Robot, collisions: CollisionModel, start: np.ndarray, goal:
             raise InputError(f"the straight line is blocked: {pair[0]} touches {pair[1]} {where}")
         poses.append(q)
     return np.array(poses)
-
-
-def clear_between(collisions: CollisionModel, start: np.ndarray, goal: np.ndarray) -> bool:
-    """Return whether nothing touches on the straight way in joint space, checked every STEP of the fastest point."""
-    return collisions.first_meeting(np.array([0.0, 1.0]), np.array([start, goal]))[0] is None
 
 
 def way_along(corners: np.ndarray) -> np.ndarray:
@@ -110,7 +103,7 @@ def _search(
         solution = setup.getSolutionPath()
         setup.getPathSimplifier().ropeShortcutPath(solution, _ROPE)
         corners = np.array([[state[joint] for joint in range(n)] for state in solution.getStates()])
-        if all(clear_between(collisions, a, b) for a, b in pairwise(corners)):
+        if collisions.is_clear(corners):
             return corners
         setup.clear()  # something thin was missed
     raise InputError(

@@ -229,11 +229,7 @@ def _fastest(twin: Twin, task: Task, limits: MotionLimits, collisions: Collision
     if task.line:
         return fastest(through(line_path(robot, collisions, start, goal)), limits, _torque(twin, task))
     corners = joint_path(robot, collisions, start, goal, task.search)
-
-    def is_clear(q: np.ndarray) -> bool:
-        return collisions.first_meeting(np.arange(float(len(q))), q)[0] is None
-
-    return fastest(rounded(corners, is_clear), limits, _torque(twin, task))
+    return fastest(rounded(corners, collisions.is_clear), limits, _torque(twin, task))
 
 
 def _torque(twin: Twin, task: Task) -> Torque:

@@ -124,7 +124,7 @@ class CollisionModel:
 
     def meeting(self, q: np.ndarray) -> tuple[str, str] | None:
         """Return the first pair that touches at the joint positions `q`: (n,); None where none does."""
-        if not pin.computeCollisions(self._model, self._data, self._geometry, self._results, q, True):
+        if not self.touches(q):
             return None
         return next(
             self._pairs[pair] for pair, result in enumerate(self._results.collisionResults) if result.isCollision()
@@ -180,6 +180,10 @@ class CollisionModel:
             if at >= way[-1]:
                 return None, least
             at = min(at + max(STEP, (clearance - self._margin) / 2), way[-1])  # both of a pair may move
+
+    def is_clear(self, q: np.ndarray) -> bool:
+        """Return whether nothing touches along joint positions, (N, n), and straight in between; as `first_meeting`."""
+        return self.first_meeting(np.arange(float(len(q))), q)[0] is None
 
     def travel(self, steps: np.ndarray) -> np.ndarray:
         """Return how far any point of the robot moves at most in steps of the joints, (N, n): (N,) m."""
