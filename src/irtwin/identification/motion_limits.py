@@ -10,7 +10,7 @@ import pinocchio as pin
 from irtwin.errors import InputError
 from irtwin.identification.fourier_series import FourierSeries, between_samples
 from irtwin.robot.description import Joint, Robot
-from irtwin.robot.kinematics import flange
+from irtwin.robot.kinematics import flange, levers
 
 FULL_SPEED_AFTER = 0.3  # s: the acceleration limit of a joint whose maker gives none is speed / 0.3 s
 _SMALLEST, _LARGEST = 1e-6, 1e4  # rad, rad/s, m, m/s: of limits that a machine has
@@ -202,22 +202,8 @@ def _guarded(robot: Robot) -> list[int]:
 
 
 def _levers(robot: Robot, limits: JointLimits) -> list[np.ndarray]:
-    """Return for each link how far, (n,) m, its origin can be from each joint; 0 where that joint does not move it.
-
-    A prismatic joint moves everything behind it by its own speed: its lever is 1.
-    """
-    model, levers = robot.model, []
-    for frame in (frame for frame in model.frames if frame.type == pin.FrameType.BODY):
-        lever = np.zeros(len(robot.joints))
-        distance, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
-        while joint > 0:
-            column = joint - 1  # the universe is Pinocchio's joint 0
-            if robot.joints[column].kind == "prismatic":
-                lever[column] = 1.0
-                distance += max(abs(limits.lower[column]), abs(limits.upper[column]))
-            else:
-                lever[column] = distance
-            distance += float(np.linalg.norm(model.jointPlacements[joint].translation))
-            joint = model.parents[joint]
-        levers.append(lever)
-    return levers
+    """Return for each link how far, (n,) m, its origin can be from each joint, as `levers` has it."""
+    frames = [frame for frame in robot.model.frames if frame.type == pin.FrameType.BODY]
+    distances = [float(np.linalg.norm(frame.placement.translation)) for frame in frames]
+    places = zip((frame.parentJoint for frame in frames), distances, strict=True)
+    return [levers(robot, joint, distance, limits.lower, limits.upper) for joint, distance in places]

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from irtwin.errors import InputError
 from irtwin.robot.description import Robot
+from irtwin.robot.kinematics import levers
 from irtwin.robot.structure import PRIMITIVES, Solid, structure_of
 
 STEP = 1e-3  # m: how far the fastest point moves between two checks, at most
@@ -194,21 +195,11 @@ class CollisionModel:
     @cached_property
     def _levers(self) -> np.ndarray:
         """How far, (shapes, n) m, any point of a shape can be from each joint; 1 for joints that slide."""
-        levers = []
+        every = []
         for shape in list(self._geometry.geometryObjects)[: len(self._names)]:
-            lever = np.zeros(self._model.nv)
             distance = float(np.linalg.norm(shape.placement.translation)) + _radius(shape.geometry)
-            joint = shape.parentJoint
-            while joint > 0:
-                known = self._robot.joints[joint - 1]
-                slides = known.kind == "prismatic"
-                lever[joint - 1] = 1.0 if slides else distance
-                if slides:
-                    distance += max(abs(known.lower), abs(known.upper))
-                distance += float(np.linalg.norm(self._model.jointPlacements[joint].translation))
-                joint = self._model.parents[joint]
-            levers.append(lever)
-        return np.array(levers)
+            every.append(levers(self._robot, shape.parentJoint, distance, *self._robot.limits))
+        return np.array(every)
 
     def _add_links(self, solids: Sequence[Solid]) -> None:
         for number, solid in enumerate(solids):

@@ -73,5 +73,23 @@ def ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(lower, middle - np.pi), np.minimum(upper, middle + np.pi)
 
 
+def levers(robot: Robot, joint: int, distance: float, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return how far, (n,) m, a point can be from each joint that moves it, within limits (n,); 0 of the others.
+
+    It is fixed to a joint, by Pinocchio's number, at a distance, m. A joint that slides moves all behind it by its own
+    speed: its lever is 1.
+    """
+    lever = np.zeros(len(robot.joints))
+    while joint > 0:
+        column = joint - 1  # the universe is Pinocchio's joint 0
+        slides = robot.joints[column].kind == "prismatic"
+        lever[column] = 1.0 if slides else distance
+        if slides:
+            distance += max(abs(lower[column]), abs(upper[column]))
+        distance += float(np.linalg.norm(robot.model.jointPlacements[joint].translation))
+        joint = robot.model.parents[joint]
+    return lever
+
+
 def _frames(robot: Robot) -> list[tuple[Link, int]]:
     return [(link, robot.model.getFrameId(link.name, pin.FrameType.BODY)) for link in robot.links]
