@@ -24,14 +24,6 @@ SHARED = tuple(NAMES.index(name) for name in OF_ROBOT)
 _LEAST, _LEAST_OF_TORQUE = 2e-4, 1e-3  # rad (m); share of a joint's torque
 _BEGUN, _LOOKS = 50.0, 3.0  # times that, and independent samples, before either is known
 _SETTLED = 0.3  # s after which where a stretch began is forgotten
-_SOFT = tuple(NAMES[row] for row in SOFT)
-_STEP = {"offset": 0.002, "delay": 0.004, "dead_band": 0.001, "spring": 0.02}  # of a difference quotient
-_STEP |= dict.fromkeys(OF_ROBOT[1:], 0.01)  # 0.05 of the others, in the chart
-_FARTHEST = {"offset": 0.05, "delay": 0.02, "dead_band": 0.01, "spring": 0.3}  # that one step goes
-_FARTHEST |= dict.fromkeys(_SOFT, 0.5) | dict.fromkeys(OF_ROBOT[1:], 0.05)  # 1 of the others
-# standard deviation from the simulator's; 3 of the others
-_LIKELY = {"offset": 0.1, "delay": 0.05, "armature": 0.5, "dead_band": 0.02, "payload": 9.0, "spring": 0.5}
-_LIKELY |= dict.fromkeys(_SOFT, 1.0) | dict.fromkeys(OF_ROBOT[1:], 0.2)
 _TIMES = (1.0, 0.3, 0.1, 0.03, 0.01)  # the simulator's stiffness, where it is begun
 _SETTLES = 0.06  # s, damping over stiffness there
 _STICKS = (0.005, 0.02)  # rad, friction over stiffness there
@@ -40,13 +32,19 @@ _PASSES, _WORTH = 12, 0.05
 _LIMITS = (0.95, 0.85, 0.7, 0.5, 0.35, 0.25, 0.15)  # of the limit, or of the most that the servo is asked for, tried
 _LATE = (0, 1, 2, 3, 4, 6, 8)  # samples by which commands are tried later
 _NEARER = (0.8, 0.9, 1.1, 1.25)  # times the best of them
-
-
-def _rows(values: dict[str, float], default: float) -> np.ndarray:
-    return np.array([values.get(name, default) for name in NAMES])[:, None]
-
-
-STEP, FARTHEST, LIKELY = _rows(_STEP, 0.05), _rows(_FARTHEST, 1.0), _rows(_LIKELY, 3.0)
+_CHART = {  # step of a difference quotient, farthest that one step goes, and standard deviation from the simulator's
+    "armature": (0.05, 1.0, 0.5),
+    "offset": (0.002, 0.05, 0.1),
+    "delay": (0.004, 0.02, 0.05),
+    "dead_band": (0.001, 0.01, 0.02),
+    "spring": (0.02, 0.3, 0.5),
+    "compliance": (0.05, 0.5, 1.0),
+    "link_compliance": (0.05, 0.5, 1.0),
+    "payload": (0.05, 1.0, 9.0),
+    **dict.fromkeys(OF_ROBOT[1:], (0.01, 0.05, 0.2)),
+}
+_OTHERS = (0.05, 1.0, 3.0)
+STEP, FARTHEST, LIKELY = np.array([_CHART.get(name, _OTHERS) for name in NAMES]).T[:, :, None]
 
 
 @dataclass(frozen=True)
