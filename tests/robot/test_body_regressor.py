@@ -25,14 +25,6 @@ def tree(parents: list[int], slides: list[bool], rng: np.random.Generator) -> pi
     return model
 
 
-@st.composite
-def trees(draw: st.DrawFn) -> tuple[pin.Model, np.random.Generator]:
-    """Draw a tree of up to seven joints, and what draws its states."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    parents = [draw(st.integers(0, number)) for number in range(draw(st.integers(1, 7)))]
-    return tree(parents, [draw(st.booleans()) for _ in parents], rng), rng
-
-
 def one_by_one(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
     data = model.createData()
     states = zip(q, dq, ddq, strict=True)
@@ -41,21 +33,25 @@ def one_by_one(model: pin.Model, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray)
 
 
 @settings(max_examples=30)
-@given(trees())
-def test_it_is_what_pinocchio_says_of_each_sample(drawn):
-    model, rng = drawn
-    states, along = rng.uniform(-3, 3, (3, 4, model.nv)), rng.uniform(-3, 3, (4, model.nv))
-    found = body_regressor(model, *states)
+@given(st.data(), st.integers(1, 7), st.integers(0, 2**32 - 1))
+def test_it_is_what_pinocchio_says_of_each_sample(data, joints, seed):
+    parents = [data.draw(st.integers(0, number), "parent") for number in range(joints)]
+    slides = data.draw(st.lists(st.booleans(), min_size=joints, max_size=joints), "slides")
+    rng = np.random.default_rng(seed)
+    model, states = tree(parents, slides, rng), rng.uniform(-3, 3, (3, 4, joints))
+    found, along = body_regressor(model, *states), rng.uniform(-3, 3, (4, joints))
     np.testing.assert_allclose(found, one_by_one(model, *states), rtol=1e-11, atol=1e-10)
     expected = np.einsum("njk,nj->nk", found, along)
     np.testing.assert_allclose(carried_bodies(model, *states, along), expected, rtol=1e-9, atol=1e-9)
 
 
 @settings(max_examples=30)
-@given(trees())
-def test_its_slope_is_that_of_differences(drawn):
-    model, rng = drawn
-    joints, states = model.nv, rng.uniform(-2, 2, (3, 4, model.nv))
+@given(st.data(), st.integers(1, 7), st.integers(0, 2**32 - 1))
+def test_its_slope_is_that_of_differences(data, joints, seed):
+    parents = [data.draw(st.integers(0, number), "parent") for number in range(joints)]
+    slides = data.draw(st.lists(st.booleans(), min_size=joints, max_size=joints), "slides")
+    rng = np.random.default_rng(seed)
+    model, states = tree(parents, slides, rng), rng.uniform(-2, 2, (3, 4, joints))
     weights, along = rng.standard_normal((4, joints, 10 * joints)), rng.standard_normal((3, 4, joints))
     up, down = (body_regressor(model, *(states + step * along)) for step in (1e-5, -1e-5))
     differences = ((up - down) * weights).sum(axis=(1, 2)) / 2e-5
