@@ -14,12 +14,14 @@ from datetime import date, datetime, time
 from decimal import Decimal
 from typing import Any
 
+import numpy as np
 from pyoxigraph import NamedNode
 
-_XSD = "http://www.w3.org/2001/XMLSchema#"
-STRING, INTEGER, DECIMAL, DOUBLE = (NamedNode(_XSD + name) for name in ("string", "integer", "decimal", "double"))
-BOOLEAN, HEX_BINARY = NamedNode(_XSD + "boolean"), NamedNode(_XSD + "hexBinary")
-DATE, TIME, DATE_TIME = (NamedNode(_XSD + name) for name in ("date", "time", "dateTime"))
+from irtwin.knowledge.vocabulary import XSD
+
+STRING, INTEGER, DECIMAL, DOUBLE = (NamedNode(XSD + name) for name in ("string", "integer", "decimal", "double"))
+BOOLEAN, HEX_BINARY = NamedNode(XSD + "boolean"), NamedNode(XSD + "hexBinary")
+DATE, TIME, DATE_TIME = (NamedNode(XSD + name) for name in ("date", "time", "dateTime"))
 
 Lexical = tuple[str, NamedNode]
 Natural = Callable[[Any], Lexical]
@@ -75,14 +77,7 @@ def _double(value: Any) -> Lexical:
     number = float(value)
     if not math.isfinite(number):
         return ("NaN" if math.isnan(number) else "INF" if number > 0 else "-INF"), DOUBLE
-    mantissa, _, power = repr(number).partition("e")
-    sign = "-" if mantissa[0] == "-" else ""
-    whole, _, fraction = mantissa.lstrip("-").partition(".")
-    digits = (whole + fraction).lstrip("0")
-    if not digits:
-        return f"{sign}0.0E0", DOUBLE
-    exponent = len(digits) - len(fraction) - 1 + int(power or 0)
-    return f"{sign}{digits[0]}.{digits[1:].rstrip('0') or '0'}E{exponent}", DOUBLE
+    return np.format_float_scientific(number, trim="0", exp_digits=1).replace("e+", "E").replace("e", "E"), DOUBLE
 
 
 def _decimal(value: Any) -> Lexical:

@@ -7,7 +7,6 @@ the same instant told in two time zones (W3C OWL 2 Structural Specification, sec
 from __future__ import annotations
 
 import base64
-import binascii
 import re
 import struct
 from collections.abc import Callable, Hashable, Iterator
@@ -18,6 +17,7 @@ from xml.etree.ElementTree import ParseError, canonicalize
 from irtwin.knowledge.vocabulary import RDF, RDFS, XSD
 
 Value = tuple[str, Hashable]  # the value space, and the value in it
+Reader = Callable[[str], Value]  # ValueError, OverflowError or ParseError for a text that is not of the datatype
 
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 _DECIMAL = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)")
@@ -26,8 +26,11 @@ _TIME = re.compile(
     r"(-?[0-9]{4,})-([0-9]{2})-([0-9]{2})T([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)(Z|[+-][0-9]{2}:[0-9]{2})?"
 )
 _URI = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*:|(?![^/?#]*:))[^\s<>\"{}|\\^`]*")
-_LANGUAGE = re.compile(r"[a-zA-Z]{1,8}(-[a-zA-Z0-9]{1,8})*")
+_LANGUAGE = re.compile(r"[a-zA-Z]{1,8}(?:-[a-zA-Z0-9]{1,8})*")
 _TOKEN = re.compile(r"([^\t\n\r ]+( [^\t\n\r ]+)*)?")
+_PLAIN = re.compile(rf"(.*)@((?:{_LANGUAGE.pattern})?)", re.DOTALL)
+_BOOLEAN = re.compile(r"true|false|1|0")
+_HEXADECIMAL = re.compile(r"([0-9a-fA-F]{2})*")
 
 _WHOLE: dict[str, tuple[int | None, int | None]] = {
     "integer": (None, None),
@@ -67,7 +70,10 @@ def value(text: str, datatype: str, language: str | None = None) -> Value | None
     if language is not None:
         return ("text", (text, language.lower()))
     read = _READERS.get(datatype)
-    return None if read is None else read(text)
+    try:
+        return None if read is None else read(text)
+    except (ValueError, OverflowError, ParseError) as error:
+        raise IllTyped(f"{text} is no {datatype}: {error}") from error
 
 
 def datatypes_of(known: Value) -> frozenset[str]:
@@ -108,140 +114,90 @@ def _within(number: Decimal, lowest: int | None, highest: int | None) -> bool:
     return (lowest is None or lowest <= number) and (highest is None or number <= highest)
 
 
-def _read_whole(lowest: int | None, highest: int | None) -> Callable[[str], Value]:
+def _read_whole(lowest: int | None, highest: int | None) -> Reader:
     def read(text: str) -> Value:
-        _demand(_INTEGER, text)
-        number = Decimal(text)
+        number = Decimal(_demand(_INTEGER, text)[0])
         if not _within(number, lowest, highest):
-            raise IllTyped(f"{text} is out of range")
+            raise ValueError("out of range")
         return _decimal(number)
 
     return read
-
-
-def _read_decimal(text: str) -> Value:
-    _demand(_DECIMAL, text)
-    return _decimal(Decimal(text))
 
 
 def _decimal(number: Decimal) -> Value:
     return ("decimal", number + 0 if number == 0 else number)
 
 
-def _read_binary_fraction(space: str, form: str) -> Callable[[str], Value]:
+def _read_binary_fraction(space: str, form: str) -> Reader:
     def read(text: str) -> Value:
-        _demand(_FLOAT, text)
-        number = float(text)
-        try:
-            bits = struct.pack(form, number)
-        except OverflowError as error:
-            raise IllTyped(f"{text} is out of range") from error
+        number = float(_demand(_FLOAT, text)[0])
+        bits = struct.pack(form, number)
         held = struct.unpack(form, bits)[0]
-        lost = (held == 0 and re.match(r"[^eE]*[1-9]", text)) or (abs(held) == float("inf") and "INF" not in text)
-        if lost:
-            raise IllTyped(f"{text} is out of range")
+        if (held == 0 and re.match(r"[^eE]*[1-9]", text)) or (abs(held) == float("inf") and "INF" not in text):
+            raise ValueError("out of range")
         return (space, bits)
 
     return read
 
 
-def _read_boolean(text: str) -> Value:
-    if text not in ("true", "false", "1", "0"):
-        raise IllTyped(f"{text} is neither true nor false")
-    return (XSD + "boolean", text in ("true", "1"))
-
-
-def _read_text(form: re.Pattern[str]) -> Callable[[str], Value]:
-    def read(text: str) -> Value:
-        _demand(form, text)
-        return ("text", (text, None))
-
-    return read
+def _read_as(form: re.Pattern[str], space: str, content: Callable[[str], Hashable] = str) -> Reader:
+    """Return a reader of texts of a form; `content` makes the value within its space."""
+    return lambda text: (space, content(_demand(form, text)[0]))
 
 
 def _read_plain(text: str) -> Value:
-    content, at, language = text.rpartition("@")
-    if not at or (language and not _LANGUAGE.fullmatch(language)):
-        raise IllTyped(f"{text} does not end in @ and a language")
+    content, language = _demand(_PLAIN, text).groups()
     return ("text", (content, language.lower() or None))
 
 
-def _read_uri(text: str) -> Value:
-    _demand(_URI, text)
-    return (XSD + "anyURI", text)
-
-
-def _read_hexadecimal(text: str) -> Value:
-    _demand(re.compile(r"([0-9a-fA-F]{2})*"), text)
-    return (XSD + "hexBinary", bytes.fromhex(text))
-
-
-def _read_base64(text: str) -> Value:
-    try:
-        return (XSD + "base64Binary", base64.b64decode(text.replace(" ", ""), validate=True))
-    except (binascii.Error, ValueError) as error:
-        raise IllTyped(f"{text} is not in base 64") from error
-
-
-def _read_time(*, zoned: bool) -> Callable[[str], Value]:
+def _read_time(*, zoned: bool) -> Reader:
     def read(text: str) -> Value:
-        match = _demand(_TIME, text)
-        year, month, day, hour, minute, second, zone = match.groups()
+        year, month, day, hour, minute, second, zone = _demand(_TIME, text).groups()
         if zoned and zone is None:
-            raise IllTyped(f"{text} has no time zone")
-        return ("time", (_instant(text, year, month, day, hour, minute, second), _offset(text, zone)))
+            raise ValueError("no time zone")
+        return ("time", (_instant(year, month, day, hour, minute, second), _offset(zone)))
 
     return read
 
 
-def _instant(text: str, year: str, month: str, day: str, hour: str, minute: str, second: str) -> Hashable:
+def _instant(year: str, month: str, day: str, hour: str, minute: str, second: str) -> Hashable:
     """Return a time on the calendar; years that Python's calendar lacks are moved by whole cycles of 400."""
     midnight = hour == "24" and minute == "00" and not second.strip("0.")
-    try:
-        cycles, in_cycle = divmod(int(year), 400)
-        moment = datetime(in_cycle + 400, int(month), int(day), 0 if midnight else int(hour), int(minute))
-    except ValueError as error:
-        raise IllTyped(f"{text}: {error}") from error
+    cycles, in_cycle = divmod(int(year), 400)
+    moment = datetime(in_cycle + 400, int(month), int(day), 0 if midnight else int(hour), int(minute))
     if Decimal(second) >= 60:
-        raise IllTyped(f"{text}: a minute has 60 seconds")
+        raise ValueError("a minute has 60 seconds")
     return (cycles, moment + timedelta(days=midnight), Decimal(second))
 
 
-def _offset(text: str, zone: str | None) -> int | None:
+def _offset(zone: str | None) -> int | None:
     if zone is None or zone == "Z":
         return None if zone is None else 0
     minutes = int(zone[1:3]) * 60 + int(zone[4:6])
     if minutes > 14 * 60 or int(zone[4:6]) > 59:
-        raise IllTyped(f"{text}: no time zone is {zone} from Greenwich")
+        raise ValueError("no such time zone")
     return -minutes if zone[0] == "-" else minutes
-
-
-def _read_xml(text: str) -> Value:
-    try:
-        return (RDF + "XMLLiteral", canonicalize(f"<x>{text}</x>"))
-    except ParseError as error:
-        raise IllTyped(f"{text} is not well-formed XML") from error
 
 
 def _demand(form: re.Pattern[str], text: str) -> re.Match[str]:
     match = form.fullmatch(text)
     if match is None:
-        raise IllTyped(f"{text} is not in the form of its datatype")
+        raise ValueError("not in the form of its datatype")
     return match
 
 
-_READERS: dict[str, Callable[[str], Value]] = {
+_READERS: dict[str, Reader] = {
     **{XSD + name: _read_whole(*bounds) for name, bounds in _WHOLE.items()},
-    **{XSD + name: _read_text(form) for name, form in _TEXTS.items()},
-    XSD + "decimal": _read_decimal,
+    **{XSD + name: _read_as(form, "text", lambda text: (text, None)) for name, form in _TEXTS.items()},
+    XSD + "decimal": lambda text: _decimal(Decimal(_demand(_DECIMAL, text)[0])),
     XSD + "double": _read_binary_fraction(XSD + "double", "<d"),
     XSD + "float": _read_binary_fraction(XSD + "float", "<f"),
-    XSD + "boolean": _read_boolean,
-    XSD + "anyURI": _read_uri,
-    XSD + "hexBinary": _read_hexadecimal,
-    XSD + "base64Binary": _read_base64,
+    XSD + "boolean": _read_as(_BOOLEAN, XSD + "boolean", lambda text: text in ("true", "1")),
+    XSD + "anyURI": _read_as(_URI, XSD + "anyURI"),
+    XSD + "hexBinary": _read_as(_HEXADECIMAL, XSD + "hexBinary", bytes.fromhex),
+    XSD + "base64Binary": lambda text: (XSD + "base64Binary", base64.b64decode(text.replace(" ", ""), validate=True)),
     XSD + "dateTime": _read_time(zoned=False),
     XSD + "dateTimeStamp": _read_time(zoned=True),
     RDF + "PlainLiteral": _read_plain,
-    RDF + "XMLLiteral": _read_xml,
+    RDF + "XMLLiteral": lambda text: (RDF + "XMLLiteral", canonicalize(f"<x>{text}</x>")),
 }
