@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 
 from irtwin.errors import InputError
 from irtwin.knowledge.asserted import terms
+from irtwin.knowledge.asserted.terms import refusal
 from irtwin.knowledge.explain.mapping import maps_of, says
 from irtwin.knowledge.mapping import RowMapper
 from irtwin.knowledge.mapping.document import TermMap
@@ -39,9 +40,12 @@ from irtwin.storage.rows import values
 from irtwin.storage.schema import Base, RobotRow
 from irtwin.storage.tariff import FILE
 
+Property = tuple[NamedNode, NamedNode]  # a subject, and what is said of it
+
 _ONTOLOGY = NamedNode(GRAPH_ONTOLOGY)
 _NUMBER: Column[Any] = Column("number", Float)
 _NUMBERS = frozenset(f"{XSD}{name}" for name in ("double", "float", "decimal", "integer", "int", "long"))
+_NEEDS_VALUE = "needs a value; say another one in the same update"
 _MADE_BY = {
     GRAPH_ACTIVITY: "a provider worked it out; change what it worked on",
     GRAPH_INFERRED: "it is concluded; change what it is concluded from",
@@ -77,29 +81,11 @@ def read(
 
     Raises InputError, which says why, where a statement is nobody's to assert or to take back.
     """
-    assertion = Assertion()
+    reading = _Reading(graph, session, author)
     taken, given = _by_property(removed), _by_property(added)
-    now = datetime.now(UTC)
-    for subject, predicate in sorted(taken.keys() | given.keys(), key=str):
-        gone, new = taken.get((subject, predicate), set()), given.get((subject, predicate), set())
-        common = {"subject": subject.value, "predicate": predicate.value, "author": author, "time": now}
-        fact = partial(AssertedFact, about_robot=_robot(graph, session, subject), **common)
-        cell = _cell(graph, subject, predicate)
-        if cell is not None:
-            _fill(assertion, graph, session, cell, (subject, predicate), new, fact)
-            continue
-        if predicate == ontology.LIMIT_VALUE and (subject, predicate) in ontology.limits(graph.resources):
-            _set_limit(assertion, graph, session, (subject, predicate), new, fact)
-            continue
-        if subject == ontology.ELECTRICITY:
-            _check_tariff(graph, predicate)
-        for quad in gone:
-            _withdraw(assertion, graph, session, quad)
-        for quad in new:
-            _check_free(graph, quad)
-            assertion.facts.append(fact(fact_id=secrets.token_hex(12), **_free(quad)))
-            assertion.added.add(quad)
-    return assertion
+    for about in sorted(taken.keys() | given.keys(), key=str):
+        reading.take(about, taken.get(about, set()), given.get(about, set()))
+    return reading.assertion
 
 
 def quad_of(fact: AssertedFact) -> Quad:
@@ -142,7 +128,7 @@ def map_facts(graph: KnowledgeGraph, session: Session) -> None:
     graph.change(there - set(kept), set(kept) - there)
 
 
-def _limits(graph: KnowledgeGraph, facts: Iterable[AssertedFact]) -> dict[tuple[NamedNode, NamedNode], Quad]:
+def _limits(graph: KnowledgeGraph, facts: Iterable[AssertedFact]) -> dict[Property, Quad]:
     """Return value and source of each limit: by the last fact about it, else by its module."""
     limits = ontology.limits(graph.resources)
     for fact in facts:
@@ -159,8 +145,8 @@ def _source_of(fact: AssertedFact) -> Quad:
     return Quad(NamedNode(fact.subject), ontology.SOURCE, said_by, _ONTOLOGY)
 
 
-def _by_property(quads: Iterable[Quad]) -> dict[tuple[NamedNode, NamedNode], set[Quad]]:
-    by_property: dict[tuple[NamedNode, NamedNode], set[Quad]] = {}
+def _by_property(quads: Iterable[Quad]) -> dict[Property, set[Quad]]:
+    by_property: dict[Property, set[Quad]] = {}
     for quad in quads:
         if any(isinstance(term, BlankNode | Triple) for term in (quad.subject, quad.object)):
             raise InputError("statements with blank nodes cannot be asserted or taken out: give each an IRI")
@@ -183,83 +169,126 @@ def _cell(graph: KnowledgeGraph, subject: NamedNode, predicate: NamedNode) -> _C
     return None
 
 
-def _fill(
-    assertion: Assertion,
-    graph: KnowledgeGraph,
-    session: Session,
-    cell: _Cell,
-    about: tuple[NamedNode, NamedNode],
-    new: set[Quad],
-    make_fact: Callable[..., AssertedFact],
-) -> None:
-    """Read what a row is to say in place of what it says."""
-    statement = say(about, graph.base)
-    fact = make_fact(
-        fact_id=secrets.token_hex(12),
-        value=_text(cell.column, new, statement),
-        kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
-        graph=cell.graph.value,
-        place=f"{cell.column.table.name}.{cell.column.name}",
-        row_key=key_text(cell.key),
-    )
-    row = row_of(session, fact)
-    if row is None:
-        raise InputError(f"{statement}: the database has no such {cell.column.table.name}; nothing changed")
-    if fact.value is None and not cell.column.nullable:
-        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
-    try:
-        check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
-    except ValueError as error:
-        raise InputError(f"{statement}: {error}; nothing changed") from None
-    fact.replaced = written(getattr(row, cell.column.name))
-    if fact.value == fact.replaced:
-        return
-    assertion.facts.append(fact)
-    assertion.removed |= {quad for quad in graph.store.said(*about) if quad.graph_name == cell.graph}
-    if fact.value is not None:
-        assertion.added.add(quad_of(fact))
+class _Reading:
+    """A change on its way to an assertion: the graph and the rows that it is of, and who makes it."""
 
+    def __init__(self, graph: KnowledgeGraph, session: Session, author: str) -> None:
+        self.assertion = Assertion()
+        self._graph, self._session = graph, session
+        self._made = {"author": author, "time": datetime.now(UTC)}
 
-def _set_limit(
-    assertion: Assertion,
-    graph: KnowledgeGraph,
-    session: Session,
-    about: tuple[NamedNode, NamedNode],
-    new: set[Quad],
-    make_fact: Callable[..., AssertedFact],
-) -> None:
-    """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said.
+    def take(self, about: Property, gone: set[Quad], new: set[Quad]) -> None:
+        """Read what goes and comes of one property of a subject."""
+        subject, predicate = about
+        common = {"subject": subject.value, "predicate": predicate.value, **self._made}
+        fact = partial(AssertedFact, about_robot=self._robot(subject), **common)
+        if cell := _cell(self._graph, subject, predicate):
+            self._fill(cell, about, new, fact)
+        elif predicate == ontology.LIMIT_VALUE and about in ontology.limits(self._graph.resources):
+            self._set_limit(about, new, fact)
+        else:
+            if subject == ontology.ELECTRICITY:
+                self._check_tariff(about)
+            for quad in gone:
+                self._withdraw(quad)
+            for quad in new:
+                self._check_free(quad)
+                self.assertion.facts.append(fact(fact_id=secrets.token_hex(12), **_free(quad)))
+                self.assertion.added.add(quad)
 
-    Its source goes along, so that what is tried is the ontology that will hold.
-    """
-    limits = ontology.limits(graph.resources)
-    statement, shipped = say(about, graph.base), limits[about]
-    value = _text(_NUMBER, new, statement)
-    if value is not None and not math.isfinite(float(value)):
-        raise InputError(f"{statement}: cannot be {value}; nothing changed")
-    of_limit = select(AssertedFact.fact_id).where(AssertedFact.subject == about[0].value)
-    known = session.scalars(of_limit.where(AssertedFact.graph == GRAPH_ONTOLOGY)).all()
-    if value is None and not known:
-        raise InputError(f"{statement}: needs a value; say another one in the same update; nothing changed")
-    now = next((quad for quad in graph.store.said(*about) if quad.graph_name == _ONTOLOGY), shipped)
-    before = _float(now)
-    sources = {quad for quad in graph.store.said(about[0], ontology.SOURCE) if quad.graph_name == _ONTOLOGY}
-    if value is None or float(value) == _float(shipped):
-        assertion.withdrawn += known
-        _exchange(
-            assertion, {now, *sources}, {limits[key] for key in (about, (about[0], ontology.SOURCE)) if key in limits}
+    def _robot(self, subject: NamedNode) -> str | None:
+        """Return the robot that an individual's IRI is about, if any."""
+        base = self._graph.base
+        parts = subject.value.removeprefix(base).split("/")
+        robot_id = parts[1].partition(".")[0] if len(parts) > 1 and subject.value.startswith(base) else ""
+        return robot_id if robot_id and self._session.get(RobotRow, robot_id) is not None else None
+
+    def _fill(self, cell: _Cell, about: Property, new: set[Quad], make_fact: Callable[..., AssertedFact]) -> None:
+        """Read what a row is to say in place of what it says."""
+        statement = say(about, self._graph.base)
+        fact = make_fact(
+            fact_id=secrets.token_hex(12),
+            value=_text(cell.column, new, statement),
+            kind=f"{XSD}string" if cell.datatype is None else cell.datatype.value,
+            graph=cell.graph.value,
+            place=f"{cell.column.table.name}.{cell.column.name}",
+            row_key=key_text(cell.key),
         )
-        return
-    more = {"value": value, "kind": f"{XSD}double", "graph": GRAPH_ONTOLOGY, "replaced": written(before)}
-    fact = make_fact(fact_id=secrets.token_hex(12), **more)
-    if float(value) != before:
-        assertion.facts.append(fact)
-        _exchange(assertion, {now, *sources}, {quad_of(fact), _source_of(fact)})
+        row = row_of(self._session, fact)
+        if row is None:
+            raise refusal(statement, f"the database has no such {cell.column.table.name}")
+        if fact.value is None and not cell.column.nullable:
+            raise refusal(statement, _NEEDS_VALUE)
+        try:
+            check_row(fact.table, values(row) | {cell.column.name: value_of(cell.column, fact.value)})
+        except ValueError as error:
+            raise refusal(statement, error) from None
+        fact.replaced = written(getattr(row, cell.column.name))
+        if fact.value != fact.replaced:
+            self.assertion.facts.append(fact)
+            self.assertion.removed |= self._said(about, cell.graph)
+            self.assertion.added |= set() if fact.value is None else {quad_of(fact)}
 
+    def _set_limit(self, about: Property, new: set[Quad], make_fact: Callable[..., AssertedFact]) -> None:
+        """Read what a limit is to be: in place of what its module says, or that again, which takes back what was said.
 
-def _exchange(assertion: Assertion, old: set[Quad], new: set[Quad]) -> None:
-    assertion.removed |= old - new
-    assertion.added |= new - old
+        Its source goes along, so that what is tried is the ontology that will hold.
+        """
+        limits, source = ontology.limits(self._graph.resources), (about[0], ontology.SOURCE)
+        statement, shipped = say(about, self._graph.base), limits[about]
+        value = _text(_NUMBER, new, statement)
+        if value is not None and not math.isfinite(float(value)):
+            raise refusal(statement, f"cannot be {value}")
+        of_limit = select(AssertedFact.fact_id).where(AssertedFact.subject == about[0].value)
+        known = self._session.scalars(of_limit.where(AssertedFact.graph == GRAPH_ONTOLOGY)).all()
+        if value is None and not known:
+            raise refusal(statement, _NEEDS_VALUE)
+        now = next(iter(self._said(about, _ONTOLOGY)), shipped)
+        before, old = _float(now), {now, *self._said(source, _ONTOLOGY)}
+        if value is None or float(value) == _float(shipped):
+            self.assertion.withdrawn += known
+            self._exchange(old, {limits[key] for key in (about, source) if key in limits})
+        elif float(value) != before:
+            more = {"value": value, "kind": f"{XSD}double", "graph": GRAPH_ONTOLOGY, "replaced": written(before)}
+            fact = make_fact(fact_id=secrets.token_hex(12), **more)
+            self.assertion.facts.append(fact)
+            self._exchange(old, {quad_of(fact), _source_of(fact)})
+
+    def _exchange(self, old: set[Quad], new: set[Quad]) -> None:
+        self.assertion.removed |= old - new
+        self.assertion.added |= new - old
+
+    def _said(self, about: Property, graph: NamedNode) -> set[Quad]:
+        """Return what one named graph says of a property."""
+        return {quad for quad in self._graph.store.said(*about) if quad.graph_name == graph}
+
+    def _check_tariff(self, about: Property) -> None:
+        """Raise InputError where `plant.toml` says a property of the tariff: the ontology's graph does, no module."""
+        modules = ontology.of_modules(self._graph.resources)
+        if self._said(about, _ONTOLOGY) and not any((quad.subject, quad.predicate) == about for quad in modules):
+            raise refusal(say(about, self._graph.base), f"stands in the workspace's {FILE}; change it there")
+
+    def _withdraw(self, quad: Quad) -> None:
+        about = select(AssertedFact).where(AssertedFact.subject == getattr(quad.subject, "value", ""))
+        free = self._session.scalars(about.where(AssertedFact.place.is_(None)))
+        ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
+        name = getattr(quad.graph_name, "value", "")
+        if not ids and name.startswith(GRAPH):
+            reasons = (reason for below, reason in _MADE_BY.items() if name.startswith(below))
+            why = next(reasons, "irtwin says it of itself")
+            raise refusal(say(quad.triple, self._graph.base), f"cannot be taken out: {why}")
+        self.assertion.withdrawn += ids
+        self.assertion.removed.add(quad)
+
+    def _check_free(self, quad: Quad) -> None:
+        """Raise InputError where a statement is one that irtwin makes itself."""
+        resources, base = self._graph.resources, self._graph.base
+        statement, name = say(quad.triple, base), getattr(quad.graph_name, "value", "")
+        if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
+            raise refusal(statement, f"graph <{name}> is irtwin's own; leave GRAPH out")
+        terms.check(resources, quad, statement)
+        if quad.predicate != TYPE and says(quad.triple, resources.of("mappings"), base) is not None:
+            raise refusal(statement, "cannot be asserted: irtwin takes it from logs and files, or works it out")
 
 
 def _float(quad: Quad) -> float:
@@ -273,58 +302,18 @@ def _text(column: Column[Any], new: set[Quad], statement: str) -> str | None:
     """
     values = {quad.object for quad in new}
     if len(values) > 1:
-        raise InputError(f"{statement}: has one value, not {len(values)}; nothing changed")
+        raise refusal(statement, f"has one value, not {len(values)}")
     if not values:
         return None
     (value,) = values
     is_number = column.type.python_type is not str
     datatype = value.datatype.value if isinstance(value, Literal) else ""
     if not isinstance(value, Literal) or (datatype not in _NUMBERS if is_number else datatype != f"{XSD}string"):
-        raise InputError(f"{statement}: is a {'number' if is_number else 'text'}, not {value}; nothing changed")
+        raise refusal(statement, f"is a {'number' if is_number else 'text'}, not {value}")
     try:
         return written(value_of(column, value.value))
     except ValueError:
-        raise InputError(f"{statement}: cannot be {value.value!r}; nothing changed") from None
-
-
-def _robot(graph: KnowledgeGraph, session: Session, subject: NamedNode) -> str | None:
-    """Return the robot that an individual's IRI is about, if any."""
-    parts = subject.value.removeprefix(graph.base).split("/")
-    robot_id = parts[1].partition(".")[0] if len(parts) > 1 and subject.value.startswith(graph.base) else ""
-    return robot_id if robot_id and session.get(RobotRow, robot_id) is not None else None
-
-
-def _check_tariff(graph: KnowledgeGraph, predicate: NamedNode) -> None:
-    """Raise InputError where `plant.toml` says a property of the tariff: the ontology's graph does, and no module."""
-    quads = {quad for quad in graph.store.said(ontology.ELECTRICITY, predicate) if quad.graph_name == _ONTOLOGY}
-    modules = ontology.of_modules(graph.resources)
-    if quads and not any(quad.subject == ontology.ELECTRICITY and quad.predicate == predicate for quad in modules):
-        statement = say((ontology.ELECTRICITY, predicate), graph.base)
-        raise InputError(f"{statement}: stands in the workspace's {FILE}; change it there; nothing changed")
-
-
-def _withdraw(assertion: Assertion, graph: KnowledgeGraph, session: Session, quad: Quad) -> None:
-    about = select(AssertedFact).where(AssertedFact.subject == getattr(quad.subject, "value", ""))
-    free = session.scalars(about.where(AssertedFact.place.is_(None)))
-    ids = [fact.fact_id for fact in free if quad_of(fact) == quad]
-    name = getattr(quad.graph_name, "value", "")
-    if not ids and name.startswith(GRAPH):
-        why = next((reason for below, reason in _MADE_BY.items() if name.startswith(below)), "irtwin says it of itself")
-        raise InputError(f"{say(quad.triple, graph.base)}: cannot be taken out: {why}; nothing changed")
-    assertion.withdrawn += ids
-    assertion.removed.add(quad)
-
-
-def _check_free(graph: KnowledgeGraph, quad: Quad) -> None:
-    """Raise InputError where a statement is one that irtwin makes itself."""
-    statement, name = say(quad.triple, graph.base), getattr(quad.graph_name, "value", "")
-    if name.startswith(GRAPH) and name != GRAPH_ASSERTED:
-        raise InputError(f"{statement}: graph <{name}> is irtwin's own; leave GRAPH out; nothing changed")
-    terms.check(graph.resources, quad, statement)
-    if quad.predicate != TYPE and says(quad.triple, graph.resources.of("mappings"), graph.base) is not None:
-        raise InputError(
-            f"{statement}: cannot be asserted: irtwin takes it from logs and files, or works it out; nothing changed"
-        )
+        raise refusal(statement, f"cannot be {value.value!r}") from None
 
 
 def _free(quad: Quad) -> dict[str, str]:

@@ -30,15 +30,16 @@ def check(resources: Resources, quad: Quad, statement: str) -> None:
         if name.startswith(_DECLARING) and name not in declared:
             near = get_close_matches(name, declared, 1)
             meant = f"did you mean {shorten(near[0])}? " if near else ""
-            raise InputError(
-                f"{statement}: the ontology has no {shorten(name)}: {meant}A term of your own has a namespace of your "
-                "own; nothing changed"
-            )
+            own = "A term of your own has a namespace of your own"
+            raise refusal(statement, f"the ontology has no {shorten(name)}: {meant}{own}")
     used = names[-1] if quad.predicate == TYPE else quad.predicate.value
     if used in concluded:
-        raise InputError(
-            f"{statement}: {shorten(used)} is concluded; change what it is concluded from; nothing changed"
-        )
+        raise refusal(statement, f"{shorten(used)} is concluded; change what it is concluded from")
+
+
+def refusal(statement: str, why: object) -> InputError:
+    """Return the error of a statement that is not taken."""
+    return InputError(f"{statement}: {why}; nothing changed")
 
 
 @lru_cache(maxsize=4)
