@@ -49,7 +49,7 @@ _AROUND = f"""
 CONSTRUCT {{ ?s ?p ?o }}
 WHERE {{
   {{ VALUES ?s {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }} UNION {{ VALUES ?o {{ ?nodes }} GRAPH ?g {{ ?s ?p ?o }} }}
-  FILTER(?g NOT IN (<{GRAPH_OWL_RL}>, <{GRAPH_REASONED}>, <{GRAPH_VALIDATION}>, <{GRAPH_CHANGED}>))
+  FILTER(?g NOT IN ({", ".join(f"<{name}>" for name in _NOT_CLOSED)}))
 }}"""
 
 
@@ -107,13 +107,17 @@ def reason(graph: KnowledgeGraph, engine: str = NATIVE) -> Inferences:
 
 def asserted(graph: KnowledgeGraph) -> set[Triple]:
     """Return what nobody inferred: ontology, mapped sources, activities, and what SPARQL updates wrote."""
-    names = [name for name in graph.graphs() if not name.startswith(NOT_ASSERTED)]
-    return graph.triples(*names) if names else set()
+    return _but_for(graph, NOT_ASSERTED)
 
 
 def not_closed(graph: KnowledgeGraph) -> set[Triple]:
     """Return what the closure was made of: what is asserted, and what rules concluded."""
-    names = [name for name in graph.graphs() if not name.startswith(_NOT_CLOSED)]
+    return _but_for(graph, _NOT_CLOSED)
+
+
+def _but_for(graph: KnowledgeGraph, apart: tuple[str, ...]) -> set[Triple]:
+    """Return what all named graphs say but for those whose IRIs begin so."""
+    names = [name for name in graph.graphs() if not name.startswith(apart)]
     return graph.triples(*names) if names else set()
 
 
@@ -192,26 +196,19 @@ def _infer_by(engine: str, ontology: Ontology, premises: set[Triple]) -> Conclus
 
 def made_of(graph: KnowledgeGraph) -> object:
     """Return the name of what the closure was made of, or None."""
-    statements = graph.triples(GRAPH_REASONED)
-    sources = (
-        statement.object
-        for statement in statements
-        if (statement.subject, statement.predicate) == (_OWL_RL, DERIVED_FROM)
-    )
-    return next(sources, None)
+    return next(iter(_of_closure(graph, DERIVED_FROM)), None)
 
 
 def engine_of(graph: KnowledgeGraph) -> str:
     """Return the engine that drew the conclusions in a graph; the native one where none are."""
-    statements = graph.triples(GRAPH_REASONED)
-    return next(
-        (
-            engine
-            for engine in engines.ENGINES
-            if Triple(_OWL_RL, _ATTRIBUTED_TO, engines.reasoner(engine)) in statements
-        ),
-        NATIVE,
-    )
+    made_by = _of_closure(graph, _ATTRIBUTED_TO)
+    return next((engine for engine in engines.ENGINES if engines.reasoner(engine) in made_by), NATIVE)
+
+
+def _of_closure(graph: KnowledgeGraph, predicate: NamedNode) -> set[object]:
+    """Return what was noted of the closure."""
+    noted = graph.triples(GRAPH_REASONED)
+    return {triple.object for triple in noted if (triple.subject, triple.predicate) == (_OWL_RL, predicate)}
 
 
 def _count(graph: KnowledgeGraph, new: Counter[str], joined_by: str | None = None) -> Inferences:

@@ -8,15 +8,18 @@ from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.store.table import Row
 from irtwin.knowledge.vocabulary import XSD, shorten
 
-_MAKERS = """
+_OF_ACTIVITY = """
 SELECT ?activity ?provider ?software ?finished
 WHERE {
-  ?thing prov:wasGeneratedBy ?activity .
-  ?activity prov:wasAssociatedWith ?provider .
+  GROUP
   OPTIONAL { ?activity irt:Software ?software }
   OPTIONAL { ?activity prov:endedAtTime ?finished }
 }
 ORDER BY ?finished ?activity"""
+_ACTIVITY = _OF_ACTIVITY.replace("GROUP", "OPTIONAL { ?activity prov:wasAssociatedWith ?provider }")
+_MAKERS = _OF_ACTIVITY.replace(
+    "GROUP", "?thing prov:wasGeneratedBy ?activity . ?activity prov:wasAssociatedWith ?provider ."
+)
 
 _INPUTS = "SELECT ?entity WHERE { ?activity prov:used|prov:wasInformedBy ?entity } ORDER BY ?entity"
 
@@ -107,15 +110,6 @@ WHERE {
   ?thing irt:series_of ?run
   FILTER NOT EXISTS { ?thing prov:wasGeneratedBy / prov:wasAssociatedWith ?provider }
 }"""
-
-_ACTIVITY = """
-SELECT ?activity ?provider ?software ?finished
-WHERE {
-  OPTIONAL { ?activity prov:wasAssociatedWith ?provider }
-  OPTIONAL { ?activity irt:Software ?software }
-  OPTIONAL { ?activity prov:endedAtTime ?finished }
-}"""
-
 
 _PLAN = "SELECT ?kind { ?thing a ?kind FILTER(?kind IN (irt:Planned_Run, irt:Planned_Series)) }"
 

@@ -89,7 +89,7 @@ class _Reader:
             table=self.logical_table(node, where),
             subject=subject,
             classes=tuple(self.iri(item, f"{where}, rr:class") for item in self.graph.values(subject_node, "class")),
-            graphs=self.graphs(subject_node, where),
+            graphs=self.iri_maps(subject_node, "graph", f"{where}, graph map"),
             properties=tuple(
                 self.predicate_object_map(item, where) for item in self.graph.values(node, "predicateObjectMap")
             ),
@@ -117,9 +117,6 @@ class _Reader:
         allowed = (TermType.IRI, TermType.BLANK_NODE)
         return maps[0], self.term_map(maps[0], f"{where}, subject map", allowed, extra="class graph graphMap")
 
-    def graphs(self, node: Node, where: str) -> tuple[TermMap, ...]:
-        return self.iri_maps(node, "graph", f"{where}, graph map")
-
     def predicate_object_map(self, node: Node, where: str) -> PredicateObjectMap:
         allowed = "predicate predicateMap object objectMap graph graphMap"
         self.only(node, f"{where}, predicate-object map", allowed)
@@ -130,7 +127,7 @@ class _Reader:
         return PredicateObjectMap(
             predicates=self.iri_maps(node, "predicate", f"{where}, predicate map of {name}"),
             objects=tuple(self.object_map(item, f"{where}, object map of {name}") for item in objects),
-            graphs=self.graphs(node, f"{where}, {name}"),
+            graphs=self.iri_maps(node, "graph", f"{where}, {name}, graph map"),
         )
 
     def object_map(self, node: Node, where: str) -> TermMap | Join:

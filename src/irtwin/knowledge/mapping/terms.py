@@ -114,8 +114,13 @@ def _of_text(term_map: TermMap, base_iri: str) -> Callable[[str, NamedNode], Ter
     def iri(text: str, _: NamedNode) -> NamedNode:
         try:
             return NamedNode(text)
-        except ValueError:  # not absolute: below the base, or no IRI at all
-            return _below(base_iri, text, term_map)
+        except ValueError:  # not absolute
+            pass
+        try:
+            return NamedNode(base_iri + text)
+        except ValueError:
+            message = f"{term_map.where}: the value {text!r} makes no valid IRI; use a template, which encodes it"
+            raise InputError(message) from None
 
     def typed(text: str, natural: NamedNode) -> Literal:
         assert datatype is not None
@@ -130,12 +135,3 @@ def _of_text(term_map: TermMap, base_iri: str) -> Callable[[str, NamedNode], Ter
     if language:
         return lambda text, _: Literal(text, language=language)
     return typed if datatype else lambda text, natural: Literal(text, datatype=natural)
-
-
-def _below(base_iri: str, value: str, term_map: TermMap) -> NamedNode:
-    try:
-        return NamedNode(base_iri + value)
-    except ValueError:
-        raise InputError(
-            f"{term_map.where}: the value {value!r} makes no valid IRI; use a template, which encodes it"
-        ) from None

@@ -72,10 +72,7 @@ class _Ontology:
                 continue  # values that are literals, or asked for in better words
             members = [member for kind in classes for member in self.catalogues.get(kind, ())]
             message = f"{shorten(name)} leads to {self._named(classes)}{' of the ontology' if members else ''}"
-            of_range, value = _name("range", name), _name("value", name)
-            yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
-            fits = _one_of(classes, members) if members else _of_classes(classes)
-            yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; {fits} ."
+            yield from _values(name, message, _one_of(classes, members) if members else _of_classes(classes))
 
     def codes(self) -> Iterator[str]:
         """Yield that a property whose range is a list of literals has one of these, and one alone if functional."""
@@ -85,11 +82,9 @@ class _Ontology:
                 continue
             *others, last = (f'"{getattr(code, "value", code)}"' for code in codes)
             message = f"{self._label(name)} is {' or '.join(filter(None, (', '.join(others), last)))}"
-            once = " ; sh:maxCount 1" if self._is_functional(name) else ""
-            of_range, value = _name("range", name), _name("value", name)
-            yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
-            listed = " ".join(map(str, codes))
-            yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; sh:in ( {listed} ){once} ."
+            is_functional = NamedNode(OWL + "FunctionalProperty") in self._said.values(NamedNode(name), TYPE.value)
+            once = " ; sh:maxCount 1" if is_functional else ""
+            yield from _values(name, message, f"sh:in ( {' '.join(map(str, codes))} ){once}")
 
     def members(self) -> Iterator[str]:
         """Yield that a catalogue has no individuals but those of the ontology."""
@@ -99,9 +94,6 @@ class _Ontology:
 
     def _properties(self, end: str) -> list[str]:
         return sorted(node.value for node in self._said.having(RDFS + end) if self._is_own(node))
-
-    def _is_functional(self, name: str) -> bool:
-        return NamedNode(OWL + "FunctionalProperty") in self._said.values(NamedNode(name), TYPE.value)
 
     def _is_own(self, term: Node) -> TypeGuard[NamedNode]:
         """Whether a term has a name, and is not of a vocabulary that the ontology has no module of."""
@@ -160,6 +152,13 @@ def _name(kind: str, *names: str) -> NamedNode:
 
 def _shape(kind: str, names: Classes, message: str, constraint: str) -> str:
     return f"{_name(kind, *names)} a sh:NodeShape ; sh:message {Literal(message)} ; {constraint} ."
+
+
+def _values(name: str, message: str, constraint: str) -> Iterator[str]:
+    """Yield that the values of a property keep a constraint."""
+    of_range, value = _name("range", name), _name("value", name)
+    yield f"{of_range} a sh:NodeShape ; sh:targetSubjectsOf <{name}> ; sh:property {value} ."
+    yield f"{value} sh:path <{name}> ; sh:message {Literal(message)} ; {constraint} ."
 
 
 def _of_classes(classes: Classes) -> str:

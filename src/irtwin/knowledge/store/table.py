@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any, overload
@@ -16,8 +16,14 @@ from irtwin.knowledge.vocabulary import XSD
 MOST_ROWS = 1_000_000
 Row = dict[str, Any]  # a variable's Python value, None where it is unbound
 
-_INTEGERS = {XSD + name for name in ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")}
-_FLOATS = {XSD + name for name in ("double", "float", "decimal")}
+_INTEGERS = ("integer", "int", "long", "short", "byte", "nonNegativeInteger", "unsignedInt")
+_VALUES: dict[str, Callable[[str], Any]] = {
+    **{XSD + name: float for name in ("double", "float", "decimal")},
+    **{XSD + name: int for name in _INTEGERS},
+    XSD + "boolean": lambda text: text in ("true", "1"),
+    XSD + "dateTime": datetime.fromisoformat,
+    XSD + "date": date.fromisoformat,
+}
 
 
 @dataclass(frozen=True)
@@ -73,21 +79,10 @@ def to_python(term: NamedNode | BlankNode | Literal | Triple | None) -> Any:
     """Turn an RDF term into a Python value: an IRI into its text, a literal into number, time, truth or text."""
     if not isinstance(term, Literal):
         return None if term is None else term.value if isinstance(term, NamedNode) else str(term)
-    kind = term.datatype.value
     try:
-        if kind in _FLOATS:
-            return float(term.value)
-        if kind in _INTEGERS:
-            return int(term.value)
-        if kind == XSD + "boolean":
-            return term.value in ("true", "1")
-        if kind == XSD + "dateTime":
-            return datetime.fromisoformat(term.value)
-        if kind == XSD + "date":
-            return date.fromisoformat(term.value)
+        return _VALUES.get(term.datatype.value, str)(term.value)
     except ValueError:  # an ill-typed literal is shown as it is written
         return term.value
-    return term.value
 
 
 def _row(columns: Sequence[str], terms: Iterable[Any]) -> Row:
