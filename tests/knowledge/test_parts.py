@@ -28,6 +28,7 @@ from irtwin.knowledge.vocabulary import (
     GRAPH_ONTOLOGY,
     GRAPH_OWL_RL,
     GRAPH_REASONED,
+    GRAPH_SHACL,
     GRAPH_SOURCE,
     OWL,
     RDF,
@@ -165,14 +166,20 @@ def test_a_part_is_no_less_apart_for_being_the_first(monkeypatch: pytest.MonkeyP
 @given(
     st.lists(st.lists(st.sampled_from(FACTS), unique=True), min_size=2, max_size=4),
     st.lists(st.sampled_from([None, *JOINING.values()]), min_size=4, max_size=4),
+    st.lists(st.booleans(), min_size=4, max_size=4),
 )
-def test_any_change_gives_what_the_whole_graph_gives(states: list[list[Quad]], joining: list[Quad | None]) -> None:
+def test_any_change_gives_what_the_whole_graph_gives(
+    states: list[list[Quad]], joining: list[Quad | None], written_anew: list[bool]
+) -> None:
     graph = holding([])
-    for drawn, join in zip(states, joining, strict=False):
+    for drawn, join, anew_graph in zip(states, joining, written_anew, strict=False):
         quads = {*drawn, *([join] if join else [])}
         before = conclusions(graph)
-        now = set(in_graph(graph.triples(DRAWN), DRAWN))
-        graph.change(now - quads, quads - now)
+        if anew_graph:
+            graph.replace(quads, DRAWN)
+        else:
+            now = set(in_graph(graph.triples(DRAWN), DRAWN))
+            graph.change(now - quads, quads - now)
         try:
             outcome = reason(graph)
         except Contradiction:
@@ -186,6 +193,7 @@ def test_any_change_gives_what_the_whole_graph_gives(states: list[list[Quad]], j
         after = conclusions(graph)
         new = {name: len(found - before.get(name, set())) for name, found in after.items()}
         assert outcome.owl_rl == new.get(GRAPH_OWL_RL, 0)
+        assert outcome.by_rules == sum(new.values()) - outcome.owl_rl
 
 
 @pytest.mark.parametrize("joining", JOINING.values(), ids=JOINING)
@@ -307,6 +315,29 @@ def test_another_ontology_has_all_done_anew() -> None:
     graph.replace(other, GRAPH_ONTOLOGY)
     reason(graph)
     assert conclusions(graph) == as_one_part(graph)
+
+
+@pytest.mark.parametrize("joining", [None, JOINING["a class of runs"]], ids=["in parts", "as one part"])
+def test_only_what_differs_is_written_and_nothing_where_no_premise_changed(
+    joining: Quad | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = anew([*FACTS, *([joining] if joining else [])])
+    before = conclusions(graph)
+    again = reason(graph)
+    assert again.owl_rl == again.by_rules == 0
+    shares = {one for one in FACTS if one.predicate.value == term("Idle_Share")}
+    graph.change(shares, ())
+    written: list[Quad] = []
+    change = graph.change
+    monkeypatch.setattr(graph, "change", lambda gone, come: (written.extend([*gone, *come]), change(gone, come)))
+    done, after = reason(graph), conclusions(graph)
+    assert (done.owl_rl, done.by_rules, done.joined_by is None) == (0, 0, joining is None)
+    differing = {name: before[name] - after.get(name, set()) for name in before}
+    assert not any(after[name] - before[name] for name in after)
+    assert {name for name, gone in differing.items() if gone} == {f"{GRAPH_SHACL}idle_share"}
+    assert f"{GRAPH_SHACL}dominant_joint" in after
+    told = [one for one in written if one.graph_name.value.startswith(GRAPH_INFERRED)]
+    assert len(told) == sum(map(len, differing.values()))
 
 
 def test_nothing_is_noted_of_a_graph_that_was_never_reasoned_over() -> None:
