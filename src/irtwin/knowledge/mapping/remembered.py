@@ -30,7 +30,6 @@ _TABLES = (
     "CREATE TABLE kept_row (id INTEGER PRIMARY KEY, content TEXT NOT NULL, crc INTEGER NOT NULL)",
 )
 _KEPT_ROW = "SELECT CAST(content AS BLOB), crc FROM kept_row WHERE id = ?"  # damaged, it may be no text
-_PLAIN = (type(None), bool, int, float, str)
 _RESTORED: dict[str, Callable[[str], Any]] = {
     "bytes": bytes.fromhex,
     "Decimal": Decimal,
@@ -95,7 +94,7 @@ class RememberedRows:
         """Keep rows; return their numbers."""
         ids = range(self._next, self._next + len(rows))
         self._next += len(rows)
-        contents = map(_written, rows)
+        contents = (json.dumps(list(row), default=_tagged) for row in rows)
         self._connection.executemany(
             "INSERT INTO kept_row VALUES (?, ?, ?)",
             ((number, content, crc32(content.encode())) for number, content in zip(ids, contents, strict=True)),
@@ -108,8 +107,7 @@ class RememberedRows:
             row = self._connection.execute(_KEPT_ROW, (number,)).fetchone()
             if row is None:
                 raise DamagedRows
-            content = json.loads(_checked(*row))
-            yield [_restored(value) if isinstance(value, dict) else value for value in content]
+            yield json.loads(_checked(*row), object_hook=_restored)
 
     def drop(self, entries: Entries) -> None:
         """Drop the kept rows of these entries."""
@@ -149,10 +147,6 @@ def _checked(content: bytes, crc: int) -> bytes:
     if crc32(content) != crc:
         raise DamagedRows
     return content
-
-
-def _written(row: Row) -> str:
-    return json.dumps([value if type(value) in _PLAIN else _tagged(value) for value in row])
 
 
 def _tagged(value: Any) -> Any:

@@ -23,7 +23,7 @@ _BESIDE = {"lessThan": "<", "lessThanOrEquals": "<="}
 _SAYS_NOTHING = {SH + name for name in ("message", "severity", "name", "description", "order", "group", "rule")}
 _SAYS_NOTHING |= {RDF + "type", RDFS + "label", RDFS + "comment", SH + "path"}
 _SAYS_NOTHING |= {SH + name for name in TARGETS}
-_TEXTS = (XSD + "string",)
+_TEXT = XSD + "string"
 
 
 class _Unknown(Exception):
@@ -108,7 +108,9 @@ class _Writer:
             kind = self._name()
             return f"EXISTS {{ {node} a {kind} {self._of_kind(kind, value)} }}"
         if name == "datatype":
-            return f"(datatype({node}) = {value} && {self._well_formed(value, node)})"
+            is_text = isinstance(value, NamedNode) and value.value == _TEXT
+            well_formed = "true" if is_text else f"{value}(STR({node})) = {node}"
+            return f"(datatype({node}) = {value} && {well_formed})"
         if name == "in":
             return self._is_in(node, self._shapes.items(value))
         if name in _COMPARED and isinstance(value, Literal):
@@ -159,12 +161,6 @@ class _Writer:
             return f"({'|'.join(map(self._path, ways))})"
         raise _Unknown("path")
 
-    def _well_formed(self, datatype: Node, node: str) -> str:
-        """Return what is true of a literal whose text is one of its datatype."""
-        if isinstance(datatype, NamedNode) and datatype.value in _TEXTS:
-            return "true"
-        return f"{datatype}(STR({node})) = {node}"
-
     def _is_in(self, node: str, items: list[Node]) -> str:
         if not all(isinstance(item, NamedNode) or _is_plain(item) for item in items):
             raise _Unknown("in")  # numbers are equal to others that are written otherwise
@@ -175,7 +171,7 @@ class _Writer:
 
 
 def _is_plain(term: Node) -> bool:
-    return isinstance(term, Literal) and term.datatype.value in _TEXTS and term.language is None
+    return isinstance(term, Literal) and term.datatype.value == _TEXT
 
 
 def _integer(number: int) -> Literal:
