@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse
+import pyshacl
+import rdflib
+from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
 from tests.mapped import ontology_graph
 
 from irtwin.knowledge.reasoning import reason
@@ -37,6 +39,14 @@ def inferred(graph: KnowledgeGraph) -> dict[str, set[Triple]]:
     """Return what each graph of what is inferred holds, but for those that are empty."""
     graphs = {name: graph.triples(name) for name in graph.graphs(GRAPH_INFERRED, GRAPH_REASONED)}
     return {name: triples for name, triples in graphs.items() if triples}
+
+
+def by_pyshacl(data: Iterable[Triple], shapes: rdflib.Graph) -> set[Triple]:
+    """Return triples and what pySHACL's rules conclude of them, but for what is said of nodes without a name."""
+    graph = rdflib.Graph().parse(data=serialize(data, format=RdfFormat.N_TRIPLES), format="nt")
+    pyshacl.validate(graph, shacl_graph=shapes, advanced=True, inplace=True, iterate_rules=True)
+    text = "\n".join(line for line in graph.serialize(format="nt").splitlines() if "_:" not in line)
+    return {quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)}
 
 
 def graph_of(quads: Iterable[Quad]) -> KnowledgeGraph:

@@ -11,38 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyoxigraph import Literal, NamedNode, Quad, Triple
 from tests.data_sets import irtwin
+from tests.knowledge.graphs import turtle
 from tests.small_robots import data_set
 
 from irtwin.knowledge.conclusions import contain
 from irtwin.knowledge.owl_rl.closure import Closure, Contradiction
 from irtwin.knowledge.reasoning import reason
 from irtwin.knowledge.store.graph import KnowledgeGraph
-from irtwin.knowledge.vocabulary import GRAPH_INFERRED, OWL, RDFS, TYPE, term
+from irtwin.knowledge.vocabulary import GRAPH_INFERRED, term
 from irtwin.rewriting import rewriting
 from irtwin.storage.database import Workspace
 
-
-def node(name: str) -> NamedNode:
-    return NamedNode(f"https://example.org/{name}")
-
-
-def said(subject: str, predicate: str | NamedNode, object: object) -> Triple:
-    return Triple(node(subject), node(predicate) if isinstance(predicate, str) else predicate, object)  # type: ignore[arg-type]
-
-
-ONTOLOGY = {
-    said("mass", TYPE, NamedNode(OWL + "FunctionalProperty")),
-    said("Press", NamedNode(OWL + "disjointWith"), node("Robot")),
-    said("moves", NamedNode(RDFS + "domain"), node("Robot")),
-}
-INDIVIDUALS = ("a", "b", "c")
-STATEMENTS = [
-    *(said(it, "mass", Literal(value)) for it in INDIVIDUALS for value in (1, 2, 3)),
-    *(said(it, TYPE, node(kind)) for it in INDIVIDUALS for kind in ("Press", "Robot")),
-    *(said(it, "moves", node("x")) for it in INDIVIDUALS),
-    said("a", NamedNode(OWL + "sameAs"), node("b")),
-    said("a", NamedNode(OWL + "differentFrom"), node("b")),
-]
+ONTOLOGY = turtle(
+    "ex:mass a owl:FunctionalProperty . ex:Press owl:disjointWith ex:Robot . ex:moves rdfs:domain ex:Robot ."
+)
+SAME = turtle("ex:a owl:sameAs ex:b .")
+OF_EACH = " ".join(f"ex:{it} ex:mass 1, 2, 3 ; a ex:Press, ex:Robot ; ex:moves ex:x ." for it in "abc")
+STATEMENTS = sorted(turtle(f"{OF_EACH} ex:a owl:differentFrom ex:b .") | SAME, key=str)
 
 
 def is_sound(statements: set[Triple]) -> bool:
@@ -62,21 +47,22 @@ def test_what_is_left_is_sound_and_only_what_clashes_is_set_aside(premises: set[
     aside, _ = contain(ONTOLOGY, premises, lambda out: Closure(ONTOLOGY | (premises - out)))
     assert aside.statements
     assert is_sound(premises - aside.statements)
-    joined = said("a", NamedNode(OWL + "sameAs"), node("b")) in premises
+    joined = premises >= SAME
     for each in aside.statements:  # each has part in a clash among statements about the same individual
         own = {it for it in premises if joined or it.subject == each.subject}
         assert not is_sound(own)
 
 
 def test_an_individual_that_is_sound_keeps_all_that_is_said_of_it() -> None:
-    premises = {said("a", "mass", Literal(1)), said("a", "mass", Literal(2)), said("b", "mass", Literal(1))}
+    clashing = turtle("ex:a ex:mass 1, 2 .")
+    premises = clashing | turtle("ex:b ex:mass 1 .")
     aside, _ = contain(ONTOLOGY, premises, lambda out: Closure(ONTOLOGY | (premises - out)))
-    assert aside.statements == {said("a", "mass", Literal(1)), said("a", "mass", Literal(2))}
+    assert aside.statements == clashing
 
 
 @pytest.mark.slow
 def test_many_clashes_of_a_kind_are_found_at_once() -> None:
-    premises = {said(f"run{n}", "mass", Literal(value)) for n in range(50) for value in (n, n + 0.5)}
+    premises = turtle(" ".join(f"ex:run{n} ex:mass {n}, {n}.5 ." for n in range(50)))
     infer = mock.Mock(side_effect=lambda out: Closure(ONTOLOGY | (premises - out)))
     aside, _ = contain(ONTOLOGY, premises, infer)
     assert aside.statements == premises
@@ -84,7 +70,7 @@ def test_many_clashes_of_a_kind_are_found_at_once() -> None:
 
 
 def test_an_ontology_of_itself_is_not_doubted() -> None:
-    wrong = ONTOLOGY | {said("r", TYPE, node("Robot")), said("r", TYPE, node("Press"))}
+    wrong = ONTOLOGY | turtle("ex:r a ex:Robot, ex:Press .")
     with pytest.raises(Contradiction, match="cax-dw"):
         contain(wrong, set(), lambda out: Closure(wrong - out))
 

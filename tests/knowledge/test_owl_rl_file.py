@@ -4,6 +4,7 @@ import pytest
 from click.testing import CliRunner, Result
 from pyoxigraph import RdfFormat, Triple, parse
 from tests.knowledge.graphs import TURTLE, turtle
+from tests.knowledge.test_engines import DL
 
 from irtwin.cli import cli
 from irtwin.errors import InputError
@@ -82,17 +83,10 @@ def test_missing_file_and_unfit_place_are_refused(tmp_path: Path) -> None:
         close_file(source, tmp_path / "out.doc")
 
 
-DL = f"""{TURTLE}
-ex:o a owl:Ontology . ex:p a owl:ObjectProperty . ex:C a owl:Class . ex:D a owl:Class . ex:x a ex:C .
-ex:E a owl:Class ; owl:equivalentClass [ a owl:Restriction ; owl:onProperty ex:p ; owl:minCardinality 1 ] .
-ex:C rdfs:subClassOf [ a owl:Restriction ; owl:onProperty ex:p ; owl:someValuesFrom ex:D ] .
-"""
-
-
 @pytest.mark.slow
 def test_classification_by_hermit(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
-    source.write_text(DL)
+    source.write_text(f"{TURTLE} ex:o a owl:Ontology . {DL}")
     assert reasoned(source, out, "--engine", "hermit").exit_code == 0
     assert turtle("ex:C rdfs:subClassOf ex:E .") <= read(out, RdfFormat.N_TRIPLES)
 
@@ -100,7 +94,7 @@ def test_classification_by_hermit(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "in.ttl"
-    source.write_text(DL + "ex:D owl:disjointWith ex:D .")
+    source.write_text(f"{TURTLE} ex:o a owl:Ontology . {DL}" + "ex:D owl:disjointWith ex:D .")
     with pytest.raises(InputError, match="HermiT cannot read this as OWL 2 DL"):
         close_file(source, tmp_path / "out.nt", "hermit")
 
@@ -108,7 +102,7 @@ def test_ontology_that_is_not_owl_2_dl_is_refused(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_clash_that_only_dl_sees_names_its_statements(tmp_path: Path) -> None:
     source, out = tmp_path / "in.ttl", tmp_path / "out.nt"
-    source.write_text(DL + "ex:D rdfs:subClassOf owl:Nothing .")
+    source.write_text(f"{TURTLE} ex:o a owl:Ontology . {DL}" + "ex:D rdfs:subClassOf owl:Nothing .")
     outcome = reasoned(source, out, "--engine", "hermit")
     assert outcome.exit_code == 3
     assert "These statements cannot all be true" in outcome.output

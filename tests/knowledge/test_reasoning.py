@@ -1,10 +1,10 @@
 """Rules by SPARQL, as pySHACL runs them, and the graph before HermiT."""
 
-import pyshacl
 import pytest
 import rdflib
-from pyoxigraph import Literal, NamedNode, Quad, RdfFormat, Triple, parse, serialize
+from pyoxigraph import Literal, NamedNode, Triple
 from tests.individuals import individual
+from tests.knowledge.graphs import by_pyshacl
 
 from irtwin.errors import InputError
 from irtwin.knowledge import owl_dl
@@ -103,17 +103,8 @@ def test_closure_types_what_rules_concluded(reasoned: KnowledgeGraph) -> None:
 
 
 def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
-    limit = NamedNode("https://w3id.org/irtwin/limit/idle_share")
-    ontology = [
-        Quad(
-            one.subject,
-            one.predicate,
-            Literal(0.15) if (one.subject, one.predicate) == (limit, NamedNode(term("Limit_Value"))) else one.object,
-            NamedNode(GRAPH_ONTOLOGY),
-        )
-        for one in graph.triples(GRAPH_ONTOLOGY)
-    ]
-    graph.replace(ontology, GRAPH_ONTOLOGY)
+    of_limit = f"GRAPH <{GRAPH_ONTOLOGY}> {{ limit:idle_share irt:Limit_Value"
+    graph.update(f"DELETE {{ {of_limit} ?v }} }} INSERT {{ {of_limit} 0.15e0 }} }} WHERE {{ {of_limit} ?v }} }}")
     reason(graph)
     idle = {subject for subject, _, kind in short(graph.triples(GRAPH_OWL_RL)) if kind == "irt:Idle_Heavy_Run"}
     assert idle == {"id:run/Arm_A.idle_1", "id:run/Arm_A.check_1"}
@@ -121,17 +112,9 @@ def test_changed_limit_changes_the_conclusions(graph: KnowledgeGraph) -> None:
 
 def test_set_wise_rules_give_what_pyshacl_gives(graph: KnowledgeGraph) -> None:
     before = graph.triples()
-    data = rdflib.Graph().parse(data=serialize(before, format=RdfFormat.N_TRIPLES), format="nt")
-    pyshacl.validate(
-        data,
-        shacl_graph=rdflib.Graph().parse(folder("rules") / "rules.ttl"),
-        advanced=True,
-        inplace=True,
-        iterate_rules=True,
-    )
-    text = "\n".join(line for line in data.serialize(format="nt").splitlines() if "_:" not in line)
-    expected = {quad.triple for quad in parse(text, format=RdfFormat.N_TRIPLES)} - before
-    ours = set().union(*conclusions(before, read_rules(folder("rules") / "rules.ttl")).values()) - before
+    rules = folder("rules") / "rules.ttl"
+    expected = by_pyshacl(before, rdflib.Graph().parse(rules)) - before
+    ours = set().union(*conclusions(before, read_rules(rules)).values()) - before
     of_rules, of_pyshacl = (
         short({one for one in found if not isinstance(one.object, Literal)}) for found in (ours, expected)
     )
