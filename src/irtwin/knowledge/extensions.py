@@ -97,10 +97,9 @@ def _check_rules(file: Resource) -> None:
 def _check_rule(file: Resource, rule: Rule) -> None:
     if rule.language == SHACL and not rule.name.startswith(("http:", "https:", "urn:")):
         raise InputError(f"{file.path}: a rule has no IRI; give its shape one, for conclusions to name it")
-    line = _line_of(file, _end(rule.name))
 
     def fault(problem: str) -> InputError:
-        return InputError(f"{file.path}, line {line}: the rule {rule.label!r} {problem}")
+        return _fault_at(file, _end(rule.name), f"the rule {rule.label!r} {problem}")
 
     wrong = sparql_fault(rule.construct)
     if wrong is not None:
@@ -122,10 +121,8 @@ def _check_names(files: Files) -> None:
             other, name = known.setdefault(rule.graph, (file, rule.name))
             if (other, name) != (file, rule.name):
                 extension = file if file.is_extension else other
-                raise InputError(
-                    f"{extension.path}, line {_line_of(extension, _end(name))}: {other} and {file} both have a rule "
-                    f"called {_end(name)}; call it otherwise"
-                )
+                both = f"{other} and {file} both have a rule called {_end(name)}; call it otherwise"
+                raise _fault_at(extension, _end(name), both)
 
 
 def _check_terms(resources: Resources) -> None:
@@ -138,9 +135,8 @@ def _check_terms(resources: Resources) -> None:
         for triple in read_turtle(file.path) if file.is_extension else ():
             names = triple.predicate.value in _NAMES_A_TERM
             if names and isinstance(triple.object, NamedNode) and triple.object not in declared:
-                iri = str(getattr(triple.object, "value", triple.object))
-                line = _line_of(file, _end(iri))
-                raise InputError(f"{file.path}, line {line}: no module of the ontology declares {shorten(iri)}")
+                iri = triple.object.value
+                raise _fault_at(file, _end(iri), f"no module of the ontology declares {shorten(iri)}")
 
 
 def _check_shapes(file: Resource) -> None:
@@ -151,20 +147,19 @@ def _check_shapes(file: Resource) -> None:
         raise InputError(f"{file.path}: has no sh:NodeShape; a constraint is one")
     for term in sorted(map(str, {*shapes.predicates(), *shapes.objects(None, rdflib.RDF.type)})):
         if term.startswith(SHACL_TERMS) and _end(term) not in SH:
-            line = _line_of(file, f"sh:{_end(term)}")
-            raise InputError(f"{file.path}, line {line}: sh:{_end(term)} is no term of SHACL; correct it")
+            raise _fault_at(file, f"sh:{_end(term)}", f"sh:{_end(term)} is no term of SHACL; correct it")
     for kind in _TEXTS:
         for text in map(str, shapes.objects(None, kind)):
             fault = sparql_fault(_prefixed(shapes, text).replace("$PATH", "rdf:type"))
             if fault is not None:
-                raise InputError(f"{file.path}, line {_line_of(file, text)}: its SPARQL is none: {fault[1]}")
+                raise _fault_at(file, text, f"its SPARQL is none: {fault[1]}")
     conforms, report, _ = meta_validate(shapes)
     if not conforms:
-        raise InputError(f"{file.path}, {_shape_fault(file, shapes, report)}")
+        raise _shape_fault(file, shapes, report)
 
 
-def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> str:
-    """Say which rule of SHACL's own a shape breaks, and on which line."""
+def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> InputError:
+    """Return which rule of SHACL's own a shape breaks, and on which line."""
     faults = [
         tuple(report.value(result, SH[name]) for name in ("resultPath", "value", "resultMessage", "focusNode"))
         for result in report.objects(None, SH.result)
@@ -173,9 +168,8 @@ def _shape_fault(file: Resource, shapes: rdflib.Graph, report: rdflib.Graph) -> 
     while isinstance(node, rdflib.BNode) and (above := next(shapes.subjects(None, node), None)) is not None:
         node = above
     written = f"sh:{_end(str(path))}" if isinstance(value, rdflib.Literal) else _end(str(node))
-    line = _line_of(file, written)
     words = str(message).split("[")[0].strip() if path is not None else "is no node shape and no property shape"
-    return f"line {line}: not well-formed SHACL: {f'sh:{_end(str(path))}: ' if path else ''}{words}"
+    return _fault_at(file, written, f"not well-formed SHACL: {f'sh:{_end(str(path))}: ' if path else ''}{words}")
 
 
 def _check_mapping(file: Resource, engine: Engine) -> None:
@@ -253,6 +247,11 @@ def _with_line(file: Resource, message: str) -> str:
     named = re.match(r": the rule '(.+?)' ", rest) or re.search(r"[#/:<]([\w-]+)>?(?=[:, ])", rest)
     line = _line_of(file, named[1]) if named else 1
     return f"{file.path}, line {line}{rest}"
+
+
+def _fault_at(file: Resource, near: str, problem: str) -> InputError:
+    """Return the error of what stands near a text."""
+    return InputError(f"{file.path}, line {_line_of(file, near)}: {problem}")
 
 
 def _line_of(file: Resource, text: str) -> int:

@@ -18,10 +18,11 @@ from pyoxigraph import NamedNode, QuerySolutions, RdfFormat, Triple, parse
 from rdflib.namespace import OWL, RDF, RDFS, XSD
 from rdflib.paths import MulPath, SequencePath
 
-from irtwin.knowledge.rdflib_terms import to_rdflib
+from irtwin.knowledge.rdflib_terms import from_rdflib, to_rdflib
 from irtwin.knowledge.rules.conjunction import TURNED, Comparison, NoConjunction, Pattern, conjunction, joined_to
 from irtwin.knowledge.rules.rule import Rule
 from irtwin.knowledge.rules.swrl import FACETS, NAMESPACE
+from irtwin.knowledge.store.by_subject import BySubject
 from irtwin.knowledge.store.graph import KnowledgeGraph
 from irtwin.knowledge.vocabulary import GRAPH_ONTOLOGY, PREFIXES, shorten
 
@@ -60,17 +61,14 @@ class _Model:
 
     def __init__(self, graph: KnowledgeGraph):
         self._graph = graph
-        self.kinds: dict[str, set[str]] = {}
-        self.ranges: dict[str, str] = {}
-        for triple in graph.triples(GRAPH_ONTOLOGY):
-            if isinstance(triple.subject, NamedNode) and isinstance(triple.object, NamedNode):
-                if triple.predicate.value == str(RDF.type):
-                    self.kinds.setdefault(triple.subject.value, set()).add(triple.object.value)
-                elif triple.predicate.value == str(RDFS.range):
-                    self.ranges[triple.subject.value] = triple.object.value
+        self._said = BySubject(graph.triples(GRAPH_ONTOLOGY), str(RDFS))
 
     def is_a(self, term: Any, kind: rdflib.URIRef) -> bool:
-        return str(kind) in self.kinds.get(str(term), ())
+        return from_rdflib(kind) in self._said.values(from_rdflib(term), str(RDF.type))
+
+    def range_of(self, predicate: Any) -> rdflib.URIRef:
+        named = self._said.value(from_rdflib(predicate), "range")
+        return rdflib.URIRef(named.value if isinstance(named, NamedNode) else "")
 
     def values(self, patterns: list[Pattern]) -> list[dict[str, Any]]:
         """Return what patterns of no individual of the rule match; an empty row where there are no patterns."""
@@ -181,7 +179,7 @@ class _Imp:
         """Return the values of a property's datatype within limits."""
         if not limits:
             return "rdfs:Literal"
-        datatype, facets = rdflib.URIRef(self._model.ranges.get(str(predicate), "")), ""
+        datatype, facets = self._model.range_of(predicate), ""
         for sign, limit in limits:
             datatype, value = _comparable(datatype, limit)
             facets += f"[ xsd:{_FACET_OF[sign]} {value.n3()} ] "
