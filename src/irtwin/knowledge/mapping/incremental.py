@@ -26,7 +26,7 @@ from irtwin.knowledge.garbage import seldom_collected
 from irtwin.knowledge.mapping.plan import Statement
 from irtwin.knowledge.mapping.processor import planned
 from irtwin.knowledge.mapping.remembered import ENTRY, DamagedRows, Entries, RememberedRows
-from irtwin.knowledge.mapping.source import read, schema_version
+from irtwin.knowledge.mapping.source import declarations, read
 from irtwin.knowledge.mapping.terms import Row
 from irtwin.knowledge.store.blank_nodes import has_blank_node
 from irtwin.knowledge.store.graph import URI_SPACE, KnowledgeGraph
@@ -63,7 +63,7 @@ def _refresh(graph: KnowledgeGraph, engine: Engine, documents: Sequence[Path], f
     ):
         parts = (
             metadata.version("irtwin"),
-            schema_version(connection),
+            *(declarations(connection) or ()),  # a column's type decides on its literals
             graph.base,
             *(path.read_text(encoding="utf-8") for path in documents),
             *(statement.sql for statement in statements),

@@ -76,13 +76,6 @@ def snapshot(engine: Engine, seconds: float = math.inf) -> Iterator[Connection]:
             yield connection
 
 
-def schema_version(connection: Connection) -> str:
-    """Return what changes whenever a column's declared type does, where that decides on literals: in SQLite."""
-    if connection.dialect.name != "sqlite":
-        return ""
-    return str(connection.exec_driver_sql("PRAGMA main.schema_version").scalar())
-
-
 def declarations(connection: Connection) -> tuple[str, ...] | None:
     """Return what declares the tables and views of a database in SQLite; None in others, which are asked each time."""
     if connection.dialect.name != "sqlite":
