@@ -13,11 +13,13 @@ from irtwin.knowledge.explain.mapping import maps_of
 from irtwin.knowledge.rules.files import all_rules
 from irtwin.knowledge.rules.rule import head_of
 from irtwin.knowledge.store import ontology
+from irtwin.knowledge.store.by_subject import BySubject
 from irtwin.knowledge.vocabulary import IRT, LIMIT, OWL, RDFS, TARIFF, TYPE, shorten, term
 from irtwin.resources import Resources
 
 _DECLARING = (IRT, LIMIT, TARIFF)
-_BELOW = f"{RDFS}subClassOf"
+_SAME = f"{OWL}equivalentClass"
+_NOTEWORTHY = NamedNode(term("Noteworthy"))
 _CONCLUDED = re.compile(rf"(?:\birt:|<{IRT})(\w+)")
 _ALSO_SAID = frozenset(map(term, ("Saving_Action", "saves_at", "applies_Remedy", "Currency")))  # as of what was done
 
@@ -45,18 +47,11 @@ def refusal(statement: str, why: object) -> InputError:
 @lru_cache(maxsize=4)
 def _terms(resources: Resources) -> tuple[frozenset[str], frozenset[str]]:
     """Return the terms that the ontology declares, and the properties and classes that are concluded."""
-    statements = [
-        (quad.subject.value, quad.predicate.value, quad.object)
-        for quad in ontology.of_modules(resources)
-        if isinstance(quad.subject, NamedNode)
-    ]
-    defined = {name for name, property, _ in statements if property == f"{OWL}equivalentClass" and name.startswith(IRT)}
+    said = BySubject((quad.triple for quad in ontology.of_modules(resources)), RDFS)
+    named = {node.value: node for node in said.all() if isinstance(node, NamedNode)}
+    defined = {name for name, node in named.items() if name.startswith(IRT) and said.values(node, _SAME)}
     mapped = {kind.value for _, triples_map in maps_of(resources.of("mappings")) for kind in triples_map.classes}
-    above = {(name, of.value) for name, property, of in statements if property == _BELOW and isinstance(of, NamedNode)}
-    noteworthy = more = {term("Noteworthy")}
-    while more:
-        more = {name for name, parent in above if parent in more} - noteworthy
-        noteworthy = noteworthy | more
+    noteworthy = {name for name, node in named.items() if _NOTEWORTHY in said.reached(node, "subClassOf")}
     heads = ((rule.construct, head_of(rule.construct)) for rule in all_rules(resources))
     made = {term(name) for text, head in heads if head for name in _CONCLUDED.findall(text, *head.span())}
-    return frozenset(name for name, _, _ in statements), frozenset(defined - mapped | noteworthy | made - _ALSO_SAID)
+    return frozenset(named), frozenset(defined - mapped | noteworthy | made - _ALSO_SAID)

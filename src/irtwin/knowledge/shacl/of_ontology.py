@@ -119,23 +119,15 @@ class _Ontology:
             for target in self._by_hand.values(shape, "targetClass")
         }
         subjects = self._classes_of(name, "domain")
-        return bool(subjects) and all(asked & self._above(NamedNode(subject)) for subject in subjects)
-
-    def _above(self, kind: Node) -> set[Node]:
-        """Return a class with those that it is below of."""
-        above, todo = set[Node](), [kind]
-        while todo:
-            node = todo.pop()
-            if node not in above:
-                above.add(node)
-                todo += self._said.values(node, SUB_CLASS_OF.value)
-        return above
+        return bool(subjects) and all(
+            asked & self._said.reached(NamedNode(subject), SUB_CLASS_OF.value) for subject in subjects
+        )
 
     def _individuals(self, name: str) -> list[str]:
         """Return the individuals that the ontology says of a class; of classes below as well where it says any."""
         if not self._said.having(TYPE.value, name):
             return []
-        below = [kind for kind in self._classes if NamedNode(name) in self._above(kind)]
+        below = [kind for kind in self._classes if NamedNode(name) in self._said.reached(kind, SUB_CLASS_OF.value)]
         individuals = (node for kind in below for node in self._said.having(TYPE.value, kind.value))
         return sorted({str(individual.value) for individual in individuals})  # type: ignore[union-attr]
 

@@ -13,12 +13,19 @@ from typing import cast
 from pyoxigraph import Literal, NamedNode, QuerySolutions, Store, Triple
 
 from irtwin.knowledge.shacl.shapes import TARGETS, Shapes
-from irtwin.knowledge.store.by_subject import Node
+from irtwin.knowledge.store.by_subject import BySubject, Node
 from irtwin.knowledge.vocabulary import PREFIXES, RDF, RDFS, SH, XSD
 
 _KIND = "?_kind"
 _THIS = "?this"
-_COMPARED = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
+_BY_LITERAL = {  # what is true of a node by the literal of a constraint
+    "minInclusive": "{node} >= {value}",
+    "minExclusive": "{node} > {value}",
+    "maxInclusive": "{node} <= {value}",
+    "maxExclusive": "{node} < {value}",
+    "minLength": "(!isBlank({node}) && STRLEN(STR({node})) >= {value})",
+    "pattern": "(!isBlank({node}) && REGEX(STR({node}), {value}))",  # with `flags` it is not known
+}
 _BESIDE = {"lessThan": "<", "lessThanOrEquals": "<="}
 _SAYS_NOTHING = {SH + name for name in ("message", "severity", "name", "description", "order", "group", "rule")}
 _SAYS_NOTHING |= {RDF + "type", RDFS + "label", RDFS + "comment", SH + "path"}
@@ -46,9 +53,9 @@ def any_suspect(store: Store, asked: Iterable[str]) -> bool:
 class _Writer:
     def __init__(self, shapes: Shapes, classes: Iterable[Triple]):
         self._shapes = shapes
-        self._below: dict[Node, set[Node]] = {}
-        for triple in classes:
-            self._below.setdefault(triple.object, set()).add(triple.subject)
+        self._below = BySubject(
+            (Triple(above, name, kind) for kind, name, above in classes if not isinstance(above, Literal)), RDFS
+        )
         self._numbers = count()
 
     def queries(self) -> Iterator[str]:
@@ -76,11 +83,7 @@ class _Writer:
 
     def _of_kind(self, variable: str, kind: Node) -> str:
         """Return what is true of a variable that is a class, or below it."""
-        kinds, todo = {kind}, [kind]
-        while todo:
-            new = self._below.get(todo.pop(), set()) - kinds
-            kinds |= new
-            todo += new
+        kinds = self._below.reached(kind, "subClassOf")
         if all(isinstance(node, NamedNode) for node in kinds):
             names = sorted(map(str, kinds))
             if variable == _KIND:  # its individuals are looked up
@@ -113,12 +116,8 @@ class _Writer:
             return f"(datatype({node}) = {value} && {well_formed})"
         if name == "in":
             return self._is_in(node, self._shapes.items(value))
-        if name in _COMPARED and isinstance(value, Literal):
-            return f"{node} {_COMPARED[name]} {value}"
-        if name == "minLength" and isinstance(value, Literal):
-            return f"(!isBlank({node}) && STRLEN(STR({node})) >= {value})"
-        if name == "pattern" and isinstance(value, Literal):  # with `flags` it is not known
-            return f"(!isBlank({node}) && REGEX(STR({node}), {value}))"
+        if name in _BY_LITERAL and isinstance(value, Literal):
+            return _BY_LITERAL[name].format(node=node, value=value)
         raise _Unknown(name)
 
     def _of_values(self, shape: Node, node: str) -> Iterator[str]:

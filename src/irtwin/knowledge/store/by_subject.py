@@ -55,6 +55,15 @@ class BySubject:
         literal = self.value(node, name)
         return literal.value if isinstance(literal, Literal) else ""
 
+    def reached(self, node: Node, name: str) -> set[Node]:
+        """Return a node, and all that a property leads to from it, step by step."""
+        reached, todo = set[Node](), [node]
+        while todo:
+            if (one := todo.pop()) not in reached:
+                reached.add(one)
+                todo += self.values(one, name)
+        return reached
+
     def items(self, cell: Node | None) -> list[Node]:
         """Return the members of a list, by its first cell; none of what is no list that ends."""
         members, seen = list[Node](), set[Node]()
