@@ -139,7 +139,7 @@ class _Select:
         source = self.sources[side]
         name = source.column(identifier, where)
         index = self.chosen.setdefault((side, name), len(self.chosen))
-        return RowColumn(index, source.columns[name])
+        return index, source.columns[name]
 
     def join(self, join: Join) -> None:
         for child, parent in join.conditions:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote, unquote
 
@@ -30,14 +29,7 @@ _RESERVED = re.compile(
 _RELATIVE = re.compile("[^:/?#]+/")  # no scheme can come any more
 
 
-@dataclass(frozen=True)
-class RowColumn:
-    """Where a row holds a column, and how its values read."""
-
-    index: int
-    natural: Natural
-
-
+RowColumn = tuple[int, Natural]  # where a row holds a column, and how its values read
 Columns = Mapping[Identifier, RowColumn]
 
 
@@ -61,8 +53,7 @@ def term_maker(term_map: TermMap, columns: Columns, base_iri: str) -> TermMaker:
 def _text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
     if term_map.column is None:
         return _template_text(term_map, columns, base_iri)
-    column = columns[term_map.column]
-    index, natural = column.index, column.natural
+    index, natural = columns[term_map.column]
 
     def text(row: Row) -> Lexical | None:
         value = row[index]
@@ -82,10 +73,11 @@ def _template_text(term_map: TermMap, columns: Columns, base_iri: str) -> _Text:
             if isinstance(part, str):
                 result += part
                 continue
-            value = row[part.index]
+            index, natural = part
+            value = row[index]
             if value is None:
                 return None
-            lexical = part.natural(value)[0]
+            lexical = natural(value)[0]
             result += _RESERVED.sub(lambda match: quote(match[0], safe=""), lexical) if encoded else lexical
         return result, STRING
 

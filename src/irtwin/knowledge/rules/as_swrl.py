@@ -87,15 +87,15 @@ def _imps(rule: Rule, model: _Model) -> Iterator[str]:
 
     SWRL lets a rule conclude several things, but Openllet then draws one of them.
     """
-    parts = conjunction(rule.construct)
-    joined = joined_to(rdflib.Variable("this"), parts.patterns)
-    rows = model.values([pattern for pattern in parts.patterns if pattern not in joined])
-    own = _without_repeats(joined, [*parts.comparisons, *parts.template])
+    patterns, comparisons, template = conjunction(rule.construct)
+    joined = joined_to(rdflib.Variable("this"), patterns)
+    rows = model.values([pattern for pattern in patterns if pattern not in joined])
+    own = _without_repeats(joined, [*comparisons, *template])
     if not rows or len(rows) > MOST_VALUES:
         raise NoConjunction(f"what it looks up has {f'more than {MOST_VALUES}' if rows else 'no'} values in the graph")
-    for row, conclusion in product(rows, parts.template):
+    for row, conclusion in product(rows, template):
         written = _Imp(model)
-        body = written.body(_bound(own, row), _bound(parts.comparisons, row))
+        body = written.body(_bound(own, row), _bound(comparisons, row))
         yield written.written(rule, body, written.head(*_bound([conclusion], row)))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -30,20 +29,13 @@ class NoConjunction(Exception):
     """Why a rule is more than facts and comparisons that all hold."""
 
 
-@dataclass(frozen=True)
-class Conjunction:
-    """Patterns and comparisons that all hold, and the template of what then follows."""
+def conjunction(construct: str) -> tuple[list[Pattern], list[Comparison], list[Pattern]]:
+    """Return the patterns and comparisons of a CONSTRUCT that all hold, and the template of what then follows.
 
-    patterns: list[Pattern]
-    comparisons: list[Comparison]
-    template: list[Pattern]
-
-
-def conjunction(construct: str) -> Conjunction:
-    """Read a CONSTRUCT; NoConjunction where it is more."""
+    NoConjunction where it is more.
+    """
     query = algebra(construct)
-    patterns, comparisons = _conjuncts(query.p)
-    return Conjunction(patterns, comparisons, list(query.template))
+    return *_conjuncts(query.p), list(query.template)
 
 
 @lru_cache(maxsize=256)  # rdflib takes a tenth of a second a rule, and the rules are those of the last time
