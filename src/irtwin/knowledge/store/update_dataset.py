@@ -14,7 +14,6 @@ from pyoxigraph import NamedNode
 from irtwin.errors import InputError
 from irtwin.knowledge.store.keywords import fault_without, is_update, parse_update
 from irtwin.knowledge.store.sparql_text import after_prologue
-from irtwin.knowledge.store.syntax_error import in_words
 
 MOST_PLACES = 100  # each is tried, and costs some parses
 
@@ -24,17 +23,14 @@ _WHERE = re.compile("where", re.IGNORECASE | re.ASCII)
 def using(text: str, default_graphs: Sequence[str], named_graphs: Sequence[str], base: str | None = None) -> str:
     """Return an update that says USING and USING NAMED of the graphs wherever it asks.
 
-    `DELETE WHERE { }` has no place for them, so its pattern is written as template too. InputError where the text is
-    no update, says USING or WITH itself, or says WHERE too often.
+    `DELETE WHERE { }` has no place for them, so its pattern is written as template too. The text has passed
+    `updates.check`. InputError where it says USING or WITH itself, or says WHERE too often.
     """
     try:
         clauses = [f"USING {NamedNode(iri)}" for iri in default_graphs]
         clauses += [f"USING NAMED {NamedNode(iri)}" for iri in named_graphs]
-        parse_update(text, base)
     except ValueError as error:
         raise InputError(f"a graph's name is no IRI: {error}") from error
-    except SyntaxError as error:
-        raise InputError(f"not a SPARQL update: {in_words(error, text)}") from error
     if fault_without(text, ("using", "with"), parse_update, base) is not None:
         raise InputError("the update has USING or WITH and the request has using-graph-uri; use only one")
     places = [match.start() for match in _WHERE.finditer(text)]
