@@ -38,10 +38,11 @@ def disturbance(size, kind="line"):
     return SimpleNamespace(channel="torque", joint="j1", kind=kind, size=size)
 
 
-def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), known=1.0, made=0.0, **more):
+def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), known=1.0, made=0.0, others=1.0, **more):
     """before, after: RMS of each joint, in floors; `closing`: what the causes close; `turned`, `known` as of `Apart`.
 
-    `made`: what friction makes that differs from run to run, floors squared; `more` as left_open.
+    `made`: what friction makes that differs from run to run, floors squared; `others`: RMS that the other runs leave,
+    in floors; `more` as left_open.
     """
     floor = np.ones(len(before))
     finding = SimpleNamespace(
@@ -52,14 +53,14 @@ def left(before, after, causes=(), closing=MUCH, turned=(-np.inf,), known=1.0, m
         apart=SimpleNamespace(
             plain=SimpleNamespace(halves=(slice(None),)),
             left=(np.array(before), np.array(after)),
-            level=lambda floor: floor,
+            level=lambda floor: np.maximum(floor, others),
             turned=lambda floor: np.array(turned),
             known=np.array(known),
         ),
         steadied=SimpleNamespace(made=np.full(len(before), made)),
         closing=lambda some: closing,
     )
-    return left_open([finding], DEFAULT, **more)
+    return left_open([finding], DEFAULT, **more)[0]
 
 
 def finding(*classes, matters=True, least=0.1, effect="stribeck_friction"):
@@ -143,6 +144,18 @@ def test_a_tenth_of_a_floor_squared_is_no_gap_however_alike_reference_runs_are(m
     monkeypatch.setattr(verdict, "spread", lambda system, floor, rows: 0.04)
     assert left([1.05, 1.0], [1.05, 1.0], alike=True) is None
     assert left([1.15, 1.0], [1.15, 1.0], alike=True) == MUCH_IS_LEFT
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ({}, MUCH_IS_LEFT),
+        ({"between": True}, None),  # a simulator leaves it, too
+        ({"causes": [CAUSE]}, None),  # what changed is named, beside what the twin lacks in all runs
+    ],
+)
+def test_what_the_twin_lacks_in_reference_runs_too_is_a_gap_where_nothing_is_named(said, why):
+    assert left([3.0, 1.0], [3.0, 1.0], others=3.0, **said) == why
 
 
 @pytest.mark.parametrize(

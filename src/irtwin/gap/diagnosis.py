@@ -33,7 +33,6 @@ from irtwin.gap.isolation.verdict import (
     UNEXPLAINED,
     UNSURE,
     left_open,
-    most_left,
     verdict_of,
 )
 from irtwin.gap.localisation.channel_residuals import channel_residual, drawn, places
@@ -237,17 +236,16 @@ def diagnose(
         channel_residual(case, channel, twin_torque if channel is torque else torque or twin_torque)
         for channel in explained
     ]
-    open_because = left_open(
+    open_because, place = left_open(
         findings,
         thresholds,
         unmatched=refusals.unmatched,
         alike=case.alike,
+        between=case.against == "simulated",
         differing=differ,
         explained=[removal.disturbance for removal in taken],
     )
-    located = places(
-        left, seed, most_left(findings, thresholds, alike=case.alike) if open_because == MUCH_IS_LEFT else None
-    )
+    located = places(left, seed, place)
     tell("Designing the next experiment")
     stacks = {"torque": search.stack, "power": search.power_stack}
     equations = channel_equations(stacks, case, search.below, torque or twin_torque)

@@ -11,7 +11,7 @@ import numpy as np
 
 from irtwin.document import document
 from irtwin.effects.catalogue import catalogue
-from irtwin.gap.isolation.apart import Apart, spread
+from irtwin.gap.isolation.apart import spread
 from irtwin.gap.isolation.finding import ChannelFinding, branches
 from irtwin.gap.repeats.disturbances import DRIFT, OFFSET, Disturbance
 from irtwin.gap.thresholds import Thresholds
@@ -21,6 +21,9 @@ MUCH_IS_LEFT, IMPOSSIBLE_NUMBER, DOES_NOT_REPEAT, UNSURE = (
     "much_is_left", "impossible_number", "does_not_repeat", "unsure",
 )  # fmt: skip
 
+Place = tuple[str, int]
+"""A channel, and the number of a place in it."""
+
 
 def left_open(
     findings: Sequence[ChannelFinding],
@@ -28,45 +31,53 @@ def left_open(
     *,
     unmatched: bool = False,
     alike: bool = False,
+    between: bool = False,
     differing: Sequence[Disturbance] = (),
     explained: Sequence[Disturbance] = (),
-) -> str | None:
-    """Return why the gap stays unexplained, however sure its causes are; None where it does not.
+) -> tuple[str | None, Place | None]:
+    """Return why the gap stays unexplained, however sure its causes are, and where much is left; None if it does not.
 
     `unmatched`: a cause that cannot be true explains the data far better than those that were named instead.
     `alike`: reference runs were logged as the observed ones are, so that what they leave over one another counts.
+    `between`: a gap is what lies between the sides, as a simulator's runs leave what the twin lacks, too.
     `differing`: what differs between repeats, the largest share first; `explained`: those of it that effects explain.
     """
     if unmatched:
-        return IMPOSSIBLE_NUMBER
+        return IMPOSSIBLE_NUMBER, None
     located = [disturbance for disturbance in differing if not any(disturbance is known for known in explained)]
     located = [
         disturbance for disturbance in located if not any(_of_friction(disturbance, finding) for finding in findings)
     ]
     named = any(branch.closing.matters(limits.matters) for finding in findings for branch in branches(finding))
     nameless = bool(located) and located[0] is differing[0] and not named
-    excesses = (_largest(finding, explained, located) for finding in findings)
-    before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
-    much = max(limits.criterion.excess, (1 - limits.matters.closed) * before)
+
+    def beyond(*, references: bool, most: float | None = None) -> Place | None:
+        """Return where most is left over the floor or the other runs, if it is much, or more than `most`."""
+        excesses = (_largest(finding, explained, located, references) for finding in findings)
+        before, after, beside = max(excesses, default=(0.0, 0.0, 0.0))
+        much = max(limits.criterion.excess, (1 - limits.matters.closed) * before)
+        much = much if most is None else min(much, most)
+        return _most_left(findings, references) if after > much and not (nameless and beside <= much) else None
+
+    place = beyond(references=True)
+    if place is None and not named and not between:
+        place = beyond(references=False)  # what the twin lacks in the other runs, too
     if alike and not named:
-        much = min(much, max(_spread(findings, much), limits.matters.floors**2))
-        if _turned(findings, limits):
-            return MUCH_IS_LEFT
-    if after > much and not (nameless and beside <= much):
-        return MUCH_IS_LEFT
-    return DOES_NOT_REPEAT if nameless else None
+        known = _spread(findings)
+        most = None if known is None else max(known, limits.matters.floors**2)
+        place = _turned(findings, limits) or place or beyond(references=True, most=most)
+    if place is not None:
+        return MUCH_IS_LEFT, place
+    return (DOES_NOT_REPEAT, None) if nameless else (None, None)
 
 
-def most_left(findings: Sequence[ChannelFinding], limits: Thresholds, *, alike: bool = False) -> tuple[str, int]:
-    """Return the channel and the place in it with the largest excess that causes leave, over floor and references.
-
-    `alike` as of `left_open`: where dry friction turns otherwise than in the reference runs, that is the place.
-    """
-    left = (alike and _turned(findings, limits)) or {
-        (finding.name, place): float(_over(finding.apart, finding.floor_within)[1][place])
+def _most_left(findings: Sequence[ChannelFinding], references: bool) -> Place:
+    """Return the channel and the place in it with the largest excess that causes leave."""
+    left = {
+        (finding.name, place): float(excess)
         for finding in findings
         if finding.floor_within is not None
-        for place in range(len(finding.places))
+        for place, excess in enumerate(_over(finding, references)[1])
     }
     return max(left, key=lambda place: left[place])
 
@@ -100,47 +111,55 @@ def _classes(finding: document.Finding) -> list[list[float]]:
     return list(classes.values())
 
 
-def _spread(findings: Sequence[ChannelFinding], unknown: float) -> float:
-    """Return the largest spread of the reference runs in any channel; `unknown` where some channel cannot tell it."""
+def _spread(findings: Sequence[ChannelFinding]) -> float | None:
+    """Return the largest spread of the reference runs in any channel; None where some channel cannot tell it."""
     levels = [(finding.apart.plain, finding.floor_within) for finding in findings]
     known = [spread(plain, level, plain.halves[0]) for plain, level in levels if level is not None]
-    return max((unknown if value is None else value for value in known), default=unknown)
+    return None if None in known else max((value for value in known if value is not None), default=None)
 
 
-def _turned(findings: Sequence[ChannelFinding], limits: Thresholds) -> dict[tuple[str, int], float]:
-    """Return the channels and places where dry friction turns otherwise than in the reference runs, by how much."""
-    return {
+def _turned(findings: Sequence[ChannelFinding], limits: Thresholds) -> Place | None:
+    """Return where dry friction turns otherwise than in the reference runs, by most; None where it does not."""
+    turned = {
         (finding.name, place): float(more)
         for finding in findings
         if finding.floor_within is not None
         for place, more in enumerate(finding.apart.turned(finding.floor_within))
         if more > limits.criterion.excess
     }
+    return max(turned, key=lambda place: turned[place], default=None)
 
 
 def _largest(
-    finding: ChannelFinding, explained: Sequence[Disturbance], located: Sequence[Disturbance]
+    finding: ChannelFinding, explained: Sequence[Disturbance], located: Sequence[Disturbance], references: bool
 ) -> tuple[float, float, float]:
     """Return the largest excess of a channel without causes, of what these leave, and of that less `located`.
 
-    Over the floor, and over what the reference runs show, if there are any. They may lie at different joints. Of what
-    does not repeat, `explained` is out of the equations and is counted in the first; `located` is in them.
+    They may lie at different joints. Of what does not repeat, `explained` is out of the equations and is counted in the
+    first; `located` is in them.
     """
     if finding.floor_within is None:
         return 0.0, 0.0, 0.0
-    level = finding.apart.level(finding.floor_within)
-    before, after = _over(finding.apart, finding.floor_within)
+    level = _level(finding, references)
+    before, after = _over(finding, references)
     before = before + _excess(explained, finding, level)
     return float(before.max()), float(after.max()), float((after - _excess(located, finding, level)).max())
 
 
-def _over(apart: Apart, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (g,) the excess over a floor (g,) and reference runs, without causes and with them.
+def _over(finding: ChannelFinding, references: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return (g,) the excess, without causes and with them.
 
     A mean over all of a joint's rows: those in which dry friction turns have none.
     """
-    before, after = (apart.known * ((rms / apart.level(floor)) ** 2 - 1) for rms in apart.left)
+    apart, level = finding.apart, _level(finding, references)
+    before, after = (apart.known * ((rms / level) ** 2 - 1) for rms in apart.left)
     return before, after
+
+
+def _level(finding: ChannelFinding, references: bool) -> np.ndarray:
+    """Return (g,) RMS beyond which there is an excess: the floor, or what the other runs leave, if that is more."""
+    assert finding.floor_within is not None
+    return finding.apart.level(finding.floor_within) if references else finding.floor_within
 
 
 def _of_friction(disturbance: Disturbance, finding: ChannelFinding) -> bool:
