@@ -37,6 +37,7 @@ SEEDS = {
     "sealed_7": 907_000_000,
     "sealed_8": 1_013_000_000,
     "sealed_9": 1_103_000_000,
+    "sealed_10": 1_201_000_000,
 }
 LEVELS = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # floors that an effect leaves
 SHARES = {"clean_null": 0.2, "pair": 0.1}  # of the cases; the rest has one effect
